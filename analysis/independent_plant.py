@@ -1,0 +1,624 @@
+"""An independent simulator of the electric rudder servo: the source of truth that the package is held against.
+
+It shares no line and no method with the package. Eq. (1) of the paper, all on the rudder side of the gear:
+
+    L i' = v(u) - R i - K_e n w
+    J w' = n K_t i - B w - F_c Sgn(w) - k_s (theta - theta_0) - T_LH Sgn(theta - theta_0) + effects
+
+is stepped with Heun's rule at 5-10 us; Sgn is set-valued. Within a step the instants at which w or theta - theta_0 pass zero
+are located and the step is cut there; at rest the inclusion is solved in closed form (the servo stays where the torque lies inside
+the stick band, whose width is F_c + T_LH on theta = theta_0 and F_c elsewhere), so nothing creeps. Backlash and shaft compliance
+split J, B and F_c into a motor side and a rudder side joined by a spring with an optional gap.
+
+Angles rad, torques N m, voltages V, currents A, times s. What each effect means stands in `independent_effects.py`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from independent_effects import put_effects, samples_of
+from numba import njit
+
+TABLE_1 = {"J": 0.0031, "B": 0.0098, "K_t": 0.0175, "K_e": 0.0295, "k_s": 0.0877, "T_LH": 0.46, "F_c": 0.34, "R": 1.55,
+           "L": 0.0016, "theta_0": 0.261799, "n": 22.26}
+"""Table 1 of the paper, SI."""
+
+STAND_S = 0.25
+"""[s] how long the servo stands with u = 0 before t = 0."""
+
+FIELDS = """J B K_t K_e k_s T_LH F_c R L theta_0 n share_J share_B share_F
+    stri_f stri_v stri_form asym_c asym_v asym_dir load_mu load_form quad_c quad_p pos_a pos_k pos_ph pos_form
+    pre_s0 pre_s1 pre_vd pre_delta
+    two gap con_k con_c con_form ratio_s ratio_form ratio_a ratio_b rip_a rip_k rip_ph rip_h2 cog_a cog_k cog_ph cog_h2
+    sat_V sat_p lim_A lim_form dead_V dead_form delay_s th_R th_tau th_alpha th_beta th_fast sag_R sag_tau sag_V sag_form
+    bias grav grav_ph k3 k3_form stop_hi stop_lo stop_k stop_c stop_form
+    dist_T dist_t0 dist_d dist_form gust_T gust_w gust_ph gust_form
+    lag_s lag_form nl_a nl_P nl_ph nl_form q_step q_form adc_step
+    app_J app_k app_c bw_T bw_x bw_n age_a age_t0 age_D brush_V brush_i angdamp_a angdamp_P tacho_a tacho_ph
+    kt_sat mxw_k mxw_tau run_a run_D""".split()
+PLANT = np.dtype([(name, "f8") for name in FIELDS])
+"""Everything that the compiled code reads, one number a field; zero means absent."""
+
+CONTROLLER = ("KP", "KI", "KD", "TF", "UMAX", "FF_ON", "FF_C", "FF_TLH", "FF_KS", "FF_TH0")
+"""PID on the measured angle [V/rad, V/(rad s), V s/rad, s, V], feed-forward of spring and preload [V/(N m), N m, N m/rad, rad]."""
+
+TH, W, CUR, THM, WM, BRI, HYS, APP, APV, TEMP, FAST, BUS, LAG, MXW, AGE, RUN = range(16)
+STATES = 16
+
+
+class Run(NamedTuple):
+    """One simulated recording, (samples,) each; `theta` [rad] is measured, `clean` lacks noise and ordinary converter."""
+
+    theta: np.ndarray
+    clean: np.ndarray
+    true: np.ndarray
+    u: np.ndarray
+    i_A: np.ndarray
+
+
+# ---- drive ------------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True)
+def dead_zone(p, u):
+    """[V] 0 none, 1 u - d sgn u, 2 blanking, 3 the first with a rounded knee."""
+    size, d = abs(u), p.dead_V
+    if p.dead_form == 1.0:
+        size = max(size - d, 0.0)
+    elif p.dead_form == 2.0:
+        size = 0.0 if size < d else size
+    elif p.dead_form == 3.0:
+        knee = 0.3 * d
+        size = 0.5 * (size - d + np.sqrt((size - d) ** 2 + knee**2)) - 0.5 * (np.sqrt(d**2 + knee**2) - d)
+    return np.copysign(size, u)
+
+
+@njit(cache=True)
+def saturate(p, v):
+    """[V] hard clip, or v / (1 + |v/V|^p)^(1/p) where sat_p > 0."""
+    if p.sat_V <= 0.0:
+        return v
+    if p.sat_p <= 0.0:
+        return min(max(v, -p.sat_V), p.sat_V)
+    return v / (1.0 + abs(v / p.sat_V) ** p.sat_p) ** (1.0 / p.sat_p)
+
+
+@njit(cache=True)
+def bus_target(p, v, i):
+    """[V] supply behind its source resistance; drawn: 0 the motor's power (the bus takes none back), 1 the motor's current."""
+    if p.sag_form == 1.0:
+        return p.sag_V - p.sag_R * abs(i)
+    return p.sag_V - p.sag_R * max(v * i / p.sag_V, 0.0)
+
+
+@njit(cache=True)
+def terminal_voltage(p, y, u, gain):
+    """[V] what the drive puts on the motor when told u."""
+    v = saturate(p, dead_zone(p, u)) * gain
+    if p.sag_R > 0.0:
+        bus = y[BUS] if p.sag_tau > 0.0 else bus_target(p, v, y[CUR])
+        v *= bus / p.sag_V
+    if p.lim_A > 0.0 and p.lim_form == 1.0:
+        v -= np.copysign(12.0 * p.R * max(abs(y[CUR]) - p.lim_A, 0.0), y[CUR])
+    return v
+
+
+@njit(cache=True)
+def warmth(p, y):
+    """[K] winding temperature above the start, slow node plus fast node."""
+    return y[TEMP] + y[FAST]
+
+
+@njit(cache=True)
+def ratio(p, x):
+    """n(theta)/n at x = theta - theta_0: 0 constant, 1 crank and rod, 2 polynomial."""
+    if p.ratio_form == 1.0:
+        psi = x + p.ratio_a
+        lever = np.cos(psi) / np.sqrt(1.0 - (p.ratio_b * np.sin(psi)) ** 2)
+        start = np.cos(p.ratio_a) / np.sqrt(1.0 - (p.ratio_b * np.sin(p.ratio_a)) ** 2)
+        return 1.0 + p.ratio_s * (start / lever - 1.0)
+    if p.ratio_form == 2.0:
+        s = x / 0.35
+        return 1.0 + p.ratio_s * (p.ratio_a * s + p.ratio_b * s * s) / (1.0 + 0.2 * s * s)
+    return 1.0
+
+
+@njit(cache=True)
+def torque_constant(p, y):
+    """[N m/A] K_t at the winding's temperature and current."""
+    k = p.K_t * (1.0 - p.th_beta * warmth(p, y))
+    return k / (1.0 + (p.kt_sat * y[CUR]) ** 2)
+
+
+@njit(cache=True)
+def current_rate(p, y, u, gain):
+    """[A/s] L i' = v - R i - K_e n w - brush drop."""
+    i = y[CUR]
+    speed = y[WM] if p.two > 0.0 else y[W]
+    angle = y[THM] if p.two > 0.0 else y[TH]
+    warm = warmth(p, y)
+    emf = p.K_e * (1.0 - p.th_beta * warm) * p.n * ratio(p, y[TH] - p.theta_0) * speed
+    v = terminal_voltage(p, y, u, gain)
+    if p.tacho_a > 0.0:
+        v += p.tacho_a * emf * np.sin(p.n * angle + p.tacho_ph)
+    if p.brush_V > 0.0:
+        v -= np.copysign(p.brush_V * np.log1p(abs(i) / p.brush_i), i)
+    rate = (v - p.R * (1.0 + p.th_alpha * warm) * i - emf) / p.L
+    if p.lim_A > 0.0 and p.lim_form == 0.0 and abs(i) >= p.lim_A and rate * i > 0.0:
+        return 0.0
+    return rate
+
+
+# ---- friction ---------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True)
+def stribeck(p, w):
+    """Share of the static excess left at speed w: 0 rational, 1 Gaussian, 2 exponential."""
+    x = abs(w) / p.stri_v
+    if p.stri_form == 1.0:
+        return np.exp(-x * x)
+    if p.stri_form == 2.0:
+        return np.exp(-x)
+    return 1.0 / (1.0 + x * x)
+
+
+@njit(cache=True)
+def along_travel(p, x):
+    """Relative modulation of friction at x = theta - theta_0: 0 sine, 1 one tight spot, 2 tightening outwards."""
+    if p.pos_form == 1.0:
+        return np.exp(-(((x - p.pos_ph) * p.pos_k) ** 2))
+    if p.pos_form == 2.0:
+        return np.tanh(p.pos_k * x * x)
+    return np.sin(p.pos_k * x + p.pos_ph)
+
+
+@njit(cache=True)
+def friction_level(p, y, w, direction):
+    """[N m] size of the dry friction of the whole train when it moves, or would move, in `direction`."""
+    scale = 1.0 + direction * p.asym_c
+    if p.stri_f != 0.0:
+        scale += p.stri_f * stribeck(p, w)
+    if p.pos_a != 0.0:
+        scale += p.pos_a * along_travel(p, y[TH] - p.theta_0)
+    if p.age_a > 0.0:
+        scale += p.age_a * np.log1p(y[AGE] / p.age_t0)
+    if p.run_a != 0.0:
+        scale += p.run_a * (1.0 - np.exp(-y[RUN] / p.run_D))
+    level = p.F_c * max(scale, 0.02)
+    if p.load_mu > 0.0:
+        push = p.n * torque_constant(p, y) * y[CUR]
+        if p.load_form == 1.0:
+            push = np.sqrt(push * push + 0.05**2) - 0.05
+        level += p.load_mu * abs(push)
+    return level
+
+
+@njit(cache=True)
+def bristle_rate(p, y, level):
+    """[rad/s] z' = w |1 - x|^delta sgn(1 - x), x = sigma_0 z sgn(w)/level: LuGre and Dahl at delta = 1."""
+    w = y[W]
+    x = p.pre_s0 * y[BRI] * np.sign(w) / level
+    return w * np.copysign(abs(1.0 - x) ** p.pre_delta, 1.0 - x)
+
+
+@njit(cache=True)
+def viscous(p, y, w):
+    """[N m] drag that grows with speed, per whole train."""
+    b = p.B * (1.0 + np.sign(w) * p.asym_v)
+    if p.angdamp_a > 0.0:
+        b += p.angdamp_a * ((y[TH] - p.theta_0) / p.angdamp_P) ** 2
+    return b * w
+
+
+# ---- load -------------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True)
+def hinge(p, x):
+    """[N m] k3 x^3 and what looks like it: 0 cube, 1 6 k3 (x - sin x), 2 k3 x^3/(1 + 2 x^2)."""
+    if p.k3_form == 1.0:
+        return 6.0 * p.k3 * (x - np.sin(x))
+    if p.k3_form == 2.0:
+        return p.k3 * x**3 / (1.0 + 2.0 * x * x)
+    return p.k3 * x**3
+
+
+@njit(cache=True)
+def stop_torque(p, x, w):
+    """[N m] end stops at x = stop_hi and stop_lo, never pulling: 0 spring and damper, 1 Hunt-Crossley."""
+    side, depth = 1.0, x - p.stop_hi
+    if depth <= 0.0:
+        side, depth = -1.0, p.stop_lo - x
+    if depth <= 0.0:
+        return 0.0
+    damping = p.stop_c * side * w
+    if p.stop_form == 1.0:
+        damping *= depth / 0.003
+    return -side * max(p.stop_k * depth + damping, 0.0)
+
+
+@njit(cache=True)
+def pulse(p, t):
+    """[N m] 0 rectangle, 1 half sine, 2 sudden and fading."""
+    s = (t - p.dist_t0) / p.dist_d
+    if s < 0.0 or (s > 1.0 and p.dist_form != 2.0):
+        return 0.0
+    if p.dist_form == 1.0:
+        return p.dist_T * np.sin(np.pi * s)
+    if p.dist_form == 2.0:
+        return p.dist_T * np.exp(-3.0 * s)
+    return p.dist_T
+
+
+@njit(cache=True)
+def gust(p, t):
+    """[N m] 0 sine, 1 with a flat top, 2 with a slow swell."""
+    s = np.sin(p.gust_w * t + p.gust_ph)
+    if p.gust_form == 1.0:
+        return p.gust_T * np.tanh(1.5 * s) / 0.9052
+    if p.gust_form == 2.0:
+        return p.gust_T * s * (1.0 + 0.3 * np.sin(0.13 * p.gust_w * t))
+    return p.gust_T * s
+
+
+@njit(cache=True)
+def load_torque(p, y, t):
+    """[N m] all that acts on the rudder but preload, friction and the motor."""
+    x, w = y[TH] - p.theta_0, y[W]
+    tau = -p.k_s * x + p.bias
+    if p.grav != 0.0:
+        tau -= p.grav * np.sin(y[TH] + p.grav_ph)
+    if p.k3 != 0.0:
+        tau -= hinge(p, x)
+    if p.stop_k > 0.0:
+        tau += stop_torque(p, x, w)
+    if p.dist_T != 0.0:
+        tau += pulse(p, t)
+    if p.gust_T != 0.0:
+        tau += gust(p, t)
+    if p.rip_a != 0.0:
+        a = p.rip_k * y[TH] + p.rip_ph
+        tau += p.rip_a * (np.sin(a) + p.rip_h2 * np.sin(2.0 * a + 1.0))
+    if p.quad_c > 0.0:
+        tau -= np.copysign(p.quad_c * abs(w) ** p.quad_p, w)
+    if p.app_J > 0.0:
+        tau += p.app_k * (y[APP] - y[TH]) + p.app_c * (y[APV] - w)
+    if p.bw_T > 0.0:
+        tau -= p.bw_T * y[HYS]
+    if p.mxw_k > 0.0:
+        tau -= p.mxw_k * (x - y[MXW])
+    return tau
+
+
+@njit(cache=True)
+def motor_torque(p, y):
+    """[N m at the rudder] K_t i through the gear, and cogging."""
+    tau = p.n * ratio(p, y[TH] - p.theta_0) * torque_constant(p, y) * y[CUR]
+    if p.cog_a != 0.0:
+        a = p.cog_k * (y[THM] if p.two > 0.0 else y[TH]) + p.cog_ph
+        tau += p.cog_a * (np.sin(a) + p.cog_h2 * np.sin(2.0 * a + 0.7))
+    return tau
+
+
+@njit(cache=True)
+def contact_torque(p, y):
+    """[N m] joint between motor and rudder: 0 spring and damper in a gap, never pulling; 1 Hunt-Crossley; 2 hardening shaft."""
+    d, speed = y[THM] - y[TH], y[WM] - y[W]
+    if p.con_form == 2.0:
+        return p.con_k * d * (1.0 + (d / 0.03) ** 2) + p.con_c * speed
+    if p.gap <= 0.0:
+        return p.con_k * d + p.con_c * speed
+    side = 1.0 if d > 0.0 else -1.0
+    depth = abs(d) - p.gap
+    if depth <= 0.0:
+        return 0.0
+    damping = p.con_c * side * speed
+    if p.con_form == 1.0:
+        damping *= min(depth / 0.0003, 3.0)
+    return side * max(p.con_k * depth + damping, 0.0)
+
+
+@njit(cache=True)
+def free_torques(p, y, t):
+    """[N m] on (rudder, motor), dry friction and preload left out; one mass: all on the rudder."""
+    tau = load_torque(p, y, t)
+    if p.pre_s0 > 0.0:
+        level = friction_level(p, y, y[W], np.sign(y[W])) * (1.0 - p.two * p.share_F)
+        fade = np.exp(-((y[W] / p.pre_vd) ** 2)) if p.pre_vd > 0.0 else 1.0
+        tau -= p.pre_s0 * y[BRI] + p.pre_s1 * fade * bristle_rate(p, y, level)
+    if p.two > 0.0:
+        joint = contact_torque(p, y)
+        on_motor = motor_torque(p, y) - joint - p.share_B * viscous(p, y, y[WM])
+        return tau + joint - (1.0 - p.share_B) * viscous(p, y, y[W]), on_motor
+    drag = viscous(p, y, y[W])
+    if p.ratio_form > 0.0:
+        drag *= 1.0 + p.share_B * (ratio(p, y[TH] - p.theta_0) ** 2 - 1.0)
+    return tau + motor_torque(p, y) - drag, 0.0
+
+
+@njit(cache=True)
+def inertia(p, x):
+    """([kg m2], d/dtheta of it) of the rudder's mass: the motor's share grows with the ratio squared."""
+    j = p.J * (1.0 - p.two * p.share_J) - p.app_J
+    if p.ratio_form == 0.0:
+        return j, 0.0
+    r, slope = ratio(p, x), (ratio(p, x + 1e-5) - ratio(p, x - 1e-5)) / 2e-5
+    return j + p.J * p.share_J * (r * r - 1.0), 2.0 * p.J * p.share_J * r * slope
+
+
+# ---- the differential inclusion ---------------------------------------------------------------------------------------
+
+
+@njit(cache=True)
+def dry(p, y, w, direction, motor):
+    """[N m] dry friction of one of the masses; bristles carry the rudder's where there are any."""
+    if motor:
+        return p.share_F * friction_level(p, y, w, direction)
+    if p.pre_s0 > 0.0:
+        return 0.0
+    return (1.0 - p.two * p.share_F) * friction_level(p, y, w, direction)
+
+
+@njit(cache=True)
+def slow_rates(p, y, u, gain, dy):
+    """Rates of the states beside angle, speed and current."""
+    w, i = y[W], y[CUR]
+    dy[HYS] = w / p.bw_x * (1.0 - 0.5 * (1.0 + np.sign(w * y[HYS])) * abs(y[HYS]) ** p.bw_n) if p.bw_T > 0.0 else 0.0
+    if p.app_J > 0.0:
+        dy[APP] = y[APV]
+        dy[APV] = (p.app_k * (y[TH] - y[APP]) + p.app_c * (w - y[APV])) / p.app_J
+    if p.th_R > 0.0:
+        heat = p.th_R * p.R * (1.0 + p.th_alpha * warmth(p, y)) * i * i
+        dy[TEMP] = ((1.0 - p.th_fast) * heat - y[TEMP]) / p.th_tau
+        dy[FAST] = 8.0 * (p.th_fast * heat - y[FAST]) / p.th_tau
+    if p.sag_tau > 0.0:
+        dy[BUS] = (bus_target(p, saturate(p, dead_zone(p, u)) * gain, i) - y[BUS]) / p.sag_tau
+    dy[LAG] = (y[TH] - y[LAG]) / p.lag_s if p.lag_s > 0.0 else 0.0
+    dy[MXW] = (y[TH] - p.theta_0 - y[MXW]) / p.mxw_tau if p.mxw_k > 0.0 else 0.0
+    dy[AGE] = 1.0 - abs(w) * y[AGE] / p.age_D if p.age_a > 0.0 else 0.0
+    dy[RUN] = abs(w)
+
+
+@njit(cache=True)
+def rates(p, y, t, u, gain, rudder, motor, side, dy):
+    """y' with friction directions `rudder`, `motor` (+-1, 0 at rest) and preload side `side` (+-1) held."""
+    tau, tau_m = free_torques(p, y, t)
+    dy[TH] = dy[W] = 0.0
+    if rudder != 0.0:
+        j, slope = inertia(p, y[TH] - p.theta_0)
+        dy[TH] = y[W]
+        dy[W] = (tau - rudder * dry(p, y, y[W], rudder, False) - side * p.T_LH - 0.5 * slope * y[W] ** 2) / j
+    if p.two > 0.0:
+        dy[THM] = dy[WM] = 0.0
+        if motor != 0.0:
+            dy[THM] = y[WM]
+            dy[WM] = (tau_m - motor * dry(p, y, y[WM], motor, True)) / (p.share_J * p.J)
+    dy[CUR] = current_rate(p, y, u, gain)
+    if p.pre_s0 > 0.0:
+        level = friction_level(p, y, y[W], np.sign(y[W])) * (1.0 - p.two * p.share_F)
+        dy[BRI] = bristle_rate(p, y, level) if rudder != 0.0 else 0.0
+    slow_rates(p, y, u, gain, dy)
+
+
+@njit(cache=True)
+def directions(p, y, t):
+    """(rudder, motor, side): who moves which way; at rest 0 where the torque lies inside the stick band."""
+    x = y[TH] - p.theta_0
+    rudder, motor, side = np.sign(y[W]), np.sign(y[WM]), np.sign(x)
+    if rudder == 0.0 or (p.two > 0.0 and motor == 0.0):
+        tau, tau_m = free_torques(p, y, t)
+        if rudder == 0.0:
+            tau -= side * p.T_LH
+            rudder = np.sign(tau)
+            band = dry(p, y, 0.0, rudder, False) + (p.T_LH if side == 0.0 else 0.0)
+            rudder = 0.0 if abs(tau) <= band else rudder
+        if p.two > 0.0 and motor == 0.0:
+            motor = np.sign(tau_m)
+            motor = 0.0 if abs(tau_m) <= dry(p, y, 0.0, motor, True) else motor
+    return rudder, motor, (rudder if side == 0.0 else side)
+
+
+@njit(cache=True)
+def heun(p, y, t, u, gain, h, rudder, motor, side, work, out):
+    """One step of Heun's rule from y into out."""
+    k1, k2, mid = work[0], work[1], work[2]
+    rates(p, y, t, u, gain, rudder, motor, side, k1)
+    for j in range(STATES):
+        mid[j] = y[j] + h * k1[j]
+    rates(p, mid, t + h, u, gain, rudder, motor, side, k2)
+    for j in range(STATES):
+        out[j] = y[j] + 0.5 * h * (k1[j] + k2[j])
+    if p.lim_A > 0.0 and p.lim_form == 0.0:
+        out[CUR] = min(max(out[CUR], -p.lim_A), p.lim_A)
+
+
+@njit(cache=True)
+def first_event(p, y, end, rudder, motor, side):
+    """(share of the step, which) of the first of: 1 w, 2 theta - theta_0, 3 motor speed through zero; which 0: none."""
+    share, which = 1.0, 0
+    if end[W] * rudder < 0.0:
+        share, which = abs(y[W]) / (abs(y[W]) + abs(end[W])), 1
+    x, x_end = y[TH] - p.theta_0, end[TH] - p.theta_0
+    if rudder != 0.0 and x != 0.0 and x_end * side < 0.0:
+        s = abs(x) / (abs(x) + abs(x_end))
+        if s < share:
+            share, which = s, 2
+    if p.two > 0.0 and end[WM] * motor < 0.0:
+        s = abs(y[WM]) / (abs(y[WM]) + abs(end[WM]))
+        if s < share:
+            share, which = s, 3
+    return share, which
+
+
+@njit(cache=True)
+def advance(p, y, t, u, gain, h, work):
+    """One step of length h, cut at every reversal and at every pass of theta_0."""
+    out, left, hold, hold_m = work[3], h, False, False
+    for count in range(10):
+        rudder, motor, side = directions(p, y, t)
+        rudder = 0.0 if hold and y[W] == 0.0 else rudder
+        motor = 0.0 if hold_m and y[WM] == 0.0 else motor
+        heun(p, y, t, u, gain, left, rudder, motor, side, work, out)
+        share, which = first_event(p, y, out, rudder, motor, side)
+        if which == 0:
+            y[:] = out
+            return
+        hold = hold or (which == 1 and y[W] == 0.0)
+        hold_m = hold_m or (which == 3 and y[WM] == 0.0)
+        heun(p, y, t, u, gain, left * share, rudder, motor, side, work, out)
+        y[:] = out
+        if which == 1:
+            y[W] = 0.0
+        elif which == 2:
+            y[TH] = p.theta_0
+        else:
+            y[WM] = 0.0
+        t, left = t + left * share, left * (1.0 - share)
+        if count > 5 and which != 3:
+            settle(p, y, t)
+
+
+@njit(cache=True)
+def settle(p, y, t):
+    """Many passes within one step are the end of a bounce on theta_0: come to rest there if the band allows it."""
+    tau, _ = free_torques(p, y, t)
+    if abs(tau) <= dry(p, y, 0.0, np.sign(tau), False) + p.T_LH and abs(y[TH] - p.theta_0) < 1e-6:
+        y[TH], y[W] = p.theta_0, 0.0
+
+
+# ---- sensor and controller --------------------------------------------------------------------------------------------
+
+
+@njit(cache=True)
+def bend(p, x):
+    """[rad] error of the sensor at x = theta - theta_0: 1 square, 2 sine, 3 loaded potentiometer."""
+    s = x / p.nl_P
+    if p.nl_form == 1.0:
+        return p.nl_a * s * s
+    if p.nl_form == 2.0:
+        return p.nl_a * (np.sin(2.0 * np.pi * s + p.nl_ph) - np.sin(p.nl_ph))
+    if p.nl_form == 3.0:
+        return p.nl_a * 2.6 * s * (1.0 - s * s) / (1.0 + 0.5 * s * s)
+    return 0.0
+
+
+@njit(cache=True)
+def quantise(p, x):
+    """[rad] 0 to the nearest step, 1 downwards, 2 to the middle of a step."""
+    if p.q_step <= 0.0:
+        return x
+    if p.q_form == 1.0:
+        return np.floor(x / p.q_step) * p.q_step
+    if p.q_form == 2.0:
+        return (np.floor(x / p.q_step) + 0.5) * p.q_step
+    return np.round(x / p.q_step) * p.q_step
+
+
+@njit(cache=True)
+def sensed(p, y, ring, step, late):
+    """[rad] angle behind lag and bend: lag_form 1 first order, 2 pure delay, 3 mean over a window."""
+    angle = y[TH]
+    if p.lag_form == 1.0:
+        angle = y[LAG]
+    elif p.lag_form == 2.0:
+        angle = ring[(step - late) % ring.size]
+    elif p.lag_form == 3.0:
+        angle = ring.mean()
+    return angle + bend(p, angle - p.theta_0)
+
+
+@njit(cache=True)
+def pid(c, memory, target, angle, dt):
+    """[V] PID with filtered derivative, held integral at the limit, optional feed-forward; memory = (integral, slope, last)."""
+    error = target - angle
+    memory[1] = (c[3] * memory[1] + c[2] * (error - memory[2])) / (c[3] + dt)
+    memory[2] = error
+    x = target - c[9]
+    u = c[0] * error + memory[0] + memory[1] + c[5] * c[6] * (c[8] * x + c[7] * np.tanh(x / 0.01))
+    if abs(u) < c[4] or u * error < 0.0:
+        memory[0] += c[1] * dt * error
+    return min(max(u, -c[4]), c[4])
+
+
+@njit(cache=True)
+def march(plant, u_in, target, c, closed, dt, substeps, noise, stuck, spike, gain, stand, printed):
+    """(5, samples): measured, clean, true angle, u and current at the sample times."""
+    p = plant[0]
+    h, samples = dt / substeps, u_in.size
+    out, y, work, memory = np.zeros((5, samples)), np.zeros(STATES), np.zeros((4, STATES)), np.zeros(3)
+    y[TH] = y[THM] = y[LAG] = p.theta_0
+    y[BUS] = p.sag_V
+    delay, late = int(round(p.delay_s / h)), int(round(p.lag_s / h))
+    window = max(2 * late, 1) if p.lag_form == 3.0 else late + 1
+    ring = np.full(window, p.theta_0)
+    before = int(round(stand / h))
+    step = -before
+    for s in range(before):
+        advance(p, y, step * h, 0.0, 1.0, h, work)
+        step += 1
+        ring[step % window] = y[TH]
+    for k in range(samples):
+        clean = sensed(p, y, ring, step, late)
+        held = out[0, k - 1] if k > 0 else clean
+        held_clean = out[1, k - 1] if k > 0 else clean
+        out[1, k] = held_clean if stuck[k] else quantise(p, clean + spike[k])
+        raw = quantise(p, clean + spike[k] + noise[k])
+        raw = np.round(raw / p.adc_step) * p.adc_step if p.adc_step > 0.0 else raw
+        out[0, k], out[2, k], out[4, k] = (held if stuck[k] else raw), y[TH], y[CUR]
+        if k == 0:
+            memory[2] = target[0] - out[0, 0]
+        u = pid(c, memory, target[k], out[0, k], dt) if closed else u_in[k]
+        out[3, k] = np.round(u * printed) / printed + 0.0 if printed > 0.0 else u
+        for s in range(substeps):
+            told = (step - delay) // substeps
+            advance(p, y, step * h, out[3, told] if told >= 0 else 0.0, gain[k], h, work)
+            step += 1
+            ring[step % window] = y[TH]
+    return out
+
+
+# ---- the way in -------------------------------------------------------------------------------------------------------
+
+
+def plant_of(params):
+    """The compiled code's record for Eq. (1) with `params` (Table 1's letters, SI) and no effect."""
+    plant = np.zeros(1, PLANT)
+    for name, value in {**TABLE_1, **params}.items():
+        field = {"motor_inertia_share": "share_J", "motor_damping_share": "share_B"}.get(name, name)
+        plant[field] = value
+    for name in ("share_J", "share_B"):
+        if plant[name][0] == 0.0:
+            plant[name] = 0.5
+    for name in ("stri_v", "bw_x", "brush_i", "age_t0", "age_D", "run_D", "angdamp_P", "mxw_tau", "nl_P", "quad_p", "pre_delta"):
+        plant[name] = 1.0
+    plant["stop_hi"], plant["stop_lo"] = 1e9, -1e9
+    plant["sag_V"] = 24.0
+    return plant
+
+
+def simulate(params, effects, t, u, *, record=0, step=1e-5, noise=None, adc_step=0.0, controller=None, theta_ref=None,
+             stand=STAND_S, decimals=None):
+    """A `Run` at the times t [s] (uniform) under u [V] held between samples, or under `controller` (a mapping with the keys
+    CONTROLLER) following `theta_ref` [rad]. `effects`: mappings with label, strength, shape as the truth files have them;
+    `noise` [rad], (samples,), is added to the angle; `decimals` rounds the applied voltage; `step` [s] is the longest step.
+    """
+    t, samples = np.asarray(t, float), len(t)
+    dt = (t[-1] - t[0]) / (samples - 1)
+    plant = plant_of(params)
+    plant["adc_step"] = adc_step
+    put_effects(plant, effects, record)
+    stuck, spike, gain = samples_of(effects, record, samples, dt)
+    closed = controller is not None
+    c = np.array([controller[name] for name in CONTROLLER]) if closed else np.zeros(len(CONTROLLER))
+    target = np.asarray(theta_ref, float) if closed else np.zeros(samples)
+    u_in = np.zeros(samples) if closed else np.asarray(u, float)
+    noise = np.zeros(samples) if noise is None else np.asarray(noise, float)
+    out = march(plant, u_in, target, c, closed, dt, max(1, int(np.ceil(dt / step - 1e-9))), noise, stuck, spike, gain, stand,
+                0.0 if decimals is None else 10.0**decimals)
+    return Run(*out)
+
+
+def own_error(params, t, u, step=1e-5):
+    """[rad] largest change of the effect-free angle when the step is halved: how far this simulator can be trusted."""
+    return float(np.abs(simulate(params, [], t, u, step=step).true - simulate(params, [], t, u, step=0.5 * step).true).max())

@@ -1,0 +1,32 @@
+"""Play between the motor's side and the rudder."""
+
+import numpy as np
+
+from ers_mj.effects.base import Parameter, Transmission
+
+
+class Backlash(Transmission):
+    """Two bodies that touch at +-gap: inside, each moves on its own; at the ends, a stiff spring-damper.
+
+    The motor's side carries the shares rho of the inertia and phi of the friction; the contact's natural frequency
+    (against the total inertia) and damping ratio are nuisances of the collision.
+    """
+
+    name = "backlash"
+    sentence = "the rudder has a play of +-{gap} against its drive"
+    parameters = (
+        Parameter("gap", "position", "half-width of the play"),
+        Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.1, upper=0.95, absent=0.5),
+        Parameter("phi", "ratio", "motor side's share of the friction", lower=1e-3, upper=0.9, absent=0.1),
+        Parameter("f_contact", "frequency", "contact's natural frequency", lower=40.0, upper=400.0, absent=120.0),
+    )
+    contact_damping = 0.2
+
+    def starts(self, scales):
+        return [np.array([part * scales.position, rho, 0.15, 120.0])
+                for rho in (0.6,) for part in (0.003, 0.01, 0.03, 0.1)]
+
+    def coefficients(self, p, c):
+        contact = 2 * np.pi * p[3]
+        return c._replace(two_body=1.0, gap=p[0], rho=p[1], beta=p[1], phi=p[2], k_twist=contact**2,
+                          d_twist=2 * self.contact_damping * contact)

@@ -1,0 +1,167 @@
+"""What every missing-physics effect declares.
+
+An effect is one file in this folder. Where it acts is its base class, in the order the signal travels:
+:class:`Drive` -> :class:`Transmission` -> :class:`Load` / :class:`Friction` -> :class:`Sensor`.
+
+Laws work on the lumped model of Eq. (6): every torque is divided by the inertia J, so that a *torque* parameter
+is carried as an acceleration [output unit / s^2] and only turned into N m for the reader, where J is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Callable, ClassVar, NamedTuple
+
+import numpy as np
+
+
+class Coefficients(NamedTuple):
+    """The lumped plant: Eq. (6) with inductance, asymmetric friction, stops and a second body as options.
+
+    theta'' = -a_1 (theta - theta_0) - a_mech w + j - c_1 Sgn(theta - theta_0) - c_2 Sgn(w) + bias
+    tau_e j' = b u - a_emf w - j          (j = b u - a_emf w where tau_e = 0)
+
+    Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
+    ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
+    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``.
+    """
+
+    a_1: float = 0.0
+    a_mech_plus: float = 0.0
+    a_mech_minus: float = 0.0
+    a_emf: float = 0.0
+    b: float = 1.0
+    c_1: float = 0.0
+    c_2_plus: float = 0.0
+    c_2_minus: float = 0.0
+    theta_0: float = 0.0
+    tau_e: float = 0.0
+    bias: float = 0.0
+    lower: float = -np.inf
+    upper: float = np.inf
+    k_stop: float = 0.0
+    d_stop: float = 0.0
+    delay: float = 0.0
+    two_body: float = 0.0
+    rho: float = 0.5
+    beta: float = 0.5
+    phi: float = 0.0
+    k_twist: float = 0.0
+    d_twist: float = 0.0
+    gap: float = 0.0
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Typical sizes in the recordings at hand; effects take their starts and bounds from them.
+
+    ``position`` half the travel, ``low``/``high`` its ends, ``speed`` a high percentile of |w|, ``acceleration`` the
+    friction level (or the drive's, where there is none), ``input`` the peak |u|, ``sample_time`` [s], ``noise`` and
+    ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad.
+    """
+
+    position: float
+    low: float
+    high: float
+    speed: float
+    acceleration: float
+    input: float
+    sample_time: float
+    noise: float
+    quantum: float
+    is_angle: bool
+    tau_e_datasheet: float | None = None
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect.
+
+    ``kind`` names its dimension: torque, damping, stiffness, drag, cubic (all carried per inertia), position, speed,
+    input, time, ratio. ``positive`` parameters are fitted in their logarithm.
+    """
+
+    name: str
+    kind: str
+    meaning: str
+    positive: bool = True
+    lower: float = -np.inf
+    upper: float = np.inf
+    absent: float = 0.0
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Abstract base: a piece of physics that the reduced model of Eq. (6) leaves out.
+
+    ``torque(p, theta, w, j, t)`` and ``friction(p, level, theta, w, j, direction)`` are compiled laws (or None);
+    ``coefficients``, ``command`` and ``measure`` act outside the integrator. All are the identity unless overridden.
+    """
+
+    name: ClassVar[str] = ""
+    sentence: ClassVar[str] = ""
+    subsystem: ClassVar[str] = ""
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    torque: ClassVar[Callable | None] = None
+    friction: ClassVar[Callable | None] = None
+
+    def absent(self) -> np.ndarray:
+        """Parameter values (k,) at which the effect vanishes, so that models nest."""
+        return np.array([p.absent for p in self.parameters])
+
+    def starts(self, scales: Scales) -> list[np.ndarray]:
+        """Parameter vectors (k,) of a visible size from which a fit is begun; empty where the effect cannot apply."""
+        raise NotImplementedError
+
+    def coefficients(self, p: np.ndarray, c: Coefficients) -> Coefficients:
+        """The plant's coefficients with the effect in place."""
+        return c
+
+    def command(self, p: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """What the motor's terminals see (N,) of the command u (N,)."""
+        return u
+
+    def measure(self, p: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """What the sensor reads (N,) of the true output y (N,)."""
+        return y
+
+    def describe(self, values: dict[str, str]) -> str:
+        """The sentence with its numbers; ``values`` holds name -> formatted value with unit."""
+        return self.sentence.format(**values)
+
+
+class Drive(Effect):
+    """Between the command and the motor's torque."""
+
+    subsystem = "drive"
+
+
+class Transmission(Effect):
+    """Between the motor and the rudder."""
+
+    subsystem = "transmission"
+
+
+class Load(Effect):
+    """A torque on the rudder."""
+
+    subsystem = "load"
+
+
+class Friction(Effect):
+    """The level of dry or viscous friction at the rudder (subsystem: load)."""
+
+    subsystem = "load"
+
+
+class Sensor(Effect):
+    """Between the rudder and the number in the file."""
+
+    subsystem = "sensor"
+
+
+def law(function: Callable) -> staticmethod:
+    """Compile one effect's law for the integrator."""
+    from numba import njit
+
+    return staticmethod(njit(inline="never", nogil=True)(function))

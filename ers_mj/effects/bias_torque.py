@@ -1,0 +1,19 @@
+"""A constant torque on the rudder."""
+
+import numpy as np
+
+from ers_mj.effects.base import Load, Parameter
+
+
+class BiasTorque(Load):
+    """theta'' += tau_0 / J. In stick and slip it equals a Coulomb friction that differs between directions."""
+
+    name = "bias_torque"
+    sentence = "a constant torque of {tau_0} pushes the rudder to one side"
+    parameters = (Parameter("tau_0", "torque", "constant torque, positive towards growing angle", positive=False),)
+
+    def starts(self, scales):
+        return [np.array([sign * 0.1 * scales.acceleration]) for sign in (1, -1)]
+
+    def coefficients(self, p, c):
+        return c._replace(bias=c.bias + p[0])

@@ -1,0 +1,29 @@
+"""Stops that end the travel."""
+
+import numpy as np
+
+from ers_mj.effects.base import Load, Parameter
+
+
+class EndStop(Load):
+    """Stiff spring-dampers beyond ``lower`` and ``upper``; their natural frequency is f_stop (against J)."""
+
+    name = "end_stop"
+    sentence = "the travel ends at a stop: {lower} .. {upper}"
+    parameters = (
+        Parameter("lower", "position", "lower stop", positive=False, absent=-np.inf),
+        Parameter("upper", "position", "upper stop", positive=False, absent=np.inf),
+        Parameter("f_stop", "frequency", "natural frequency of the contact", lower=5.0, upper=400.0, absent=100.0),
+        Parameter("zeta", "ratio", "damping ratio of the contact", lower=0.02, upper=2.0, absent=0.3),
+    )
+
+    def starts(self, scales):
+        inset = 0.01 * (scales.high - scales.low)
+        low, high = scales.low + inset, scales.high - inset
+        frequency = min(100.0, 0.2 / scales.sample_time)
+        ends = ((low, np.inf), (-np.inf, high), (low, high))
+        return [np.array([lower, upper, frequency, 0.3]) for lower, upper in ends]
+
+    def coefficients(self, p, c):
+        contact = 2 * np.pi * p[2]
+        return c._replace(lower=p[0], upper=p[1], k_stop=contact**2, d_stop=2 * p[3] * contact)

@@ -1,0 +1,19 @@
+"""A command that arrives late."""
+
+import numpy as np
+
+from ers_mj.effects.base import Drive, Parameter
+
+
+class InputDelay(Drive):
+    """The terminals see u(t - T_d); a fraction of a sample is switched inside the sample."""
+
+    name = "input_delay"
+    sentence = "the command reaches the motor {T_d} late"
+    parameters = (Parameter("T_d", "time", "dead time of the command"),)
+
+    def starts(self, scales):
+        return [np.array([2 * scales.sample_time])]
+
+    def coefficients(self, p, c):
+        return c._replace(delay=c.delay + p[0])

@@ -1,0 +1,20 @@
+"""Drag that grows with the square of speed."""
+
+import numpy as np
+
+from ers_mj.effects.base import Friction, Parameter, law
+
+
+class QuadraticDrag(Friction):
+    """theta'' -= c w |w| / J: turbulent air or churned grease."""
+
+    name = "quadratic_drag"
+    sentence = "a drag of {c} times speed squared brakes fast motion"
+    parameters = (Parameter("c", "drag", "torque per speed squared"),)
+
+    def starts(self, scales):
+        return [np.array([0.1 * scales.acceleration / scales.speed**2])]
+
+    @law
+    def torque(p, theta, w, j, t):
+        return -p[0] * w * abs(w)

@@ -1,0 +1,19 @@
+"""A sensor that counts in coarse steps."""
+
+import numpy as np
+
+from ers_mj.effects.base import Parameter, Sensor
+
+
+class SensorQuantisation(Sensor):
+    """The output is rounded to the nearest multiple of ``step``. Found in the data itself, not by a fit."""
+
+    name = "sensor_quantisation"
+    sentence = "the sensor counts in steps of {step}"
+    parameters = (Parameter("step", "position", "one count of the sensor"),)
+
+    def starts(self, scales):
+        return []
+
+    def measure(self, p, y):
+        return np.round(y / p[0]) * p[0]

@@ -1,0 +1,19 @@
+"""A drive that gives no more than its supply."""
+
+import numpy as np
+
+from ers_mj.effects.base import Drive, Parameter
+
+
+class VoltageSaturation(Drive):
+    """The terminals see the command clipped at +-u_max."""
+
+    name = "voltage_saturation"
+    sentence = "the drive gives no more than {u_max}, whatever is commanded"
+    parameters = (Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),)
+
+    def starts(self, scales):
+        return [np.array([part * scales.input]) for part in (0.95, 0.8)]
+
+    def command(self, p, u):
+        return np.clip(u, -p[0], p[0])

@@ -1,0 +1,375 @@
+"""Fit a model's parameters to recordings by simulating them.
+
+The model runs as an observer of low gain, theta_hat' = w_hat + rate (y - theta_hat), so that one late stick event does not become
+a lasting offset, while forces stay in open loop. Time is cut into blocks; each block's misfit m_b = SSE_b / (n_b sigma^2) enters
+as C = sum_b ln(1 + m_b / tau): a few blocks where stick and slip fork cannot decide everything. C is minimised by
+Levenberg-Marquardt with weights 1 / (tau + m_b) over finite differences of the event-exact simulation, which is smooth.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.effects import BY_NAME
+from ers_mj.effects.base import Scales
+from ers_mj.plants.reduced import ReducedModel, lumped
+
+OBSERVER_RATE = 5.0  # [1/s]
+OBSERVER_STEP = 0.005  # [s] between corrections of the observer
+BLOCK = 0.25  # [s]
+DIFFERENCE = 1e-4  # step of the finite differences in transformed parameters
+BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share")
+STATES = ("gain", "offset", "friction_level")
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, and the state it starts in."""
+
+    name: str
+    t: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+    valid: np.ndarray
+    enable: np.ndarray | None
+    load: np.ndarray | None
+    sigma: float
+    quantum: float
+    start: tuple[float, float]
+    block: np.ndarray
+    counts: np.ndarray
+
+    @property
+    def sample_time(self) -> float:
+        """Median step [s]."""
+        return float(np.median(np.diff(self.t)))
+
+    def part(self, begin: int, end: int) -> Trace:
+        """Samples begin..end as a trace of their own."""
+        cut = slice(begin, end)
+        pick = lambda a: None if a is None else a[cut]  # noqa: E731
+        return make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
+                          pick(self.load), self.sigma, self.quantum)
+
+
+def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
+    """A trace with its blocks of BLOCK seconds and its initial state."""
+    block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
+    counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
+    observed = np.where(valid, y, np.nan)
+    return Trace(name, t, u, observed, valid, enable, load, sigma, quantum, start_state(t, observed), block, counts)
+
+
+def start_state(t: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """(output, speed) at the first sample, by a parabola through the first 50 ms or 10 samples; a speed within 3 sigma of 0 is 0."""
+    n = max(10, int(np.searchsorted(t, t[0] + 0.05)))
+    s, v = t[:n] - t[0], y[:n]
+    s, v = s[np.isfinite(v)], v[np.isfinite(v)]
+    if v.size < 5:
+        return float(v[0]) if v.size else 0.0, 0.0
+    flat = float(np.mean(v))
+    design = np.vander(s / s[-1], 3, increasing=True)
+    coefficient, *_ = np.linalg.lstsq(design, v, rcond=None)
+    spread = np.std(v - design @ coefficient, ddof=3)
+    error = spread * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+    if abs(coefficient[1]) <= 3 * error or np.std(v) == 0:
+        return flat, 0.0
+    return float(coefficient[0]), float(coefficient[1] / s[-1])
+
+
+def noise_sigma(y: np.ndarray, quantum: float) -> float:
+    """Noise of a record (N,): scaled median of third differences, never below the converter's own q / sqrt(12)."""
+    d = np.abs(np.diff(y, 3))
+    d = d[np.isfinite(d)]
+    floor = quantum / math.sqrt(12.0)
+    spread = 1.4826 * float(np.median(d)) / math.sqrt(20.0) if d.size else 0.0
+    if spread <= floor and d.size:
+        spread = math.sqrt(float(np.mean(np.minimum(d, np.quantile(d, 0.99)) ** 2)) / 20.0)
+    return max(spread, floor, 1e-9 * float(np.nanstd(y)) + 1e-300)
+
+
+@dataclass(frozen=True)
+class Free:
+    """One fitted number: where it lives, how it is transformed and bounded."""
+
+    owner: str
+    name: str
+    index: int
+    positive: bool
+    scale: float
+    lower: float
+    upper: float
+    prior: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """A structure with values: the baseline, the effects on top, and what differs from recording to recording.
+
+    ``values`` holds all of BASE; ``free`` names those that are fitted. ``effects`` are (name, parameters (k,));
+    infinite parameters are absent, not fitted. ``states`` maps a record state to its value in each recording.
+    """
+
+    values: Mapping[str, float]
+    free: tuple[str, ...]
+    effects: tuple[tuple[str, np.ndarray], ...] = ()
+    states: Mapping[str, np.ndarray] | None = None
+    scales: Scales | None = None
+    priors: Mapping[str, tuple[float, float]] | None = None
+    frozen: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects' names in the order of their addition."""
+        return tuple(name for name, _ in self.effects)
+
+    def layout(self) -> list[Free]:
+        """Every fitted number."""
+        out = []
+        for name in self.free:
+            positive = name not in ("theta_0", "b") or name == "b"
+            lower, upper = (1e-9, np.inf)
+            if name == "theta_0":
+                positive, lower, upper = False, self.scales.low - self.scales.position, self.scales.high + self.scales.position
+            if name == "emf_share":
+                lower, upper = 0.02, 0.999
+            if name == "tau_e":
+                lower, upper = self._tau_bounds()
+            prior = (self.priors or {}).get(name)
+            out.append(Free("base", name, 0, positive, self.scales.position, lower, upper, prior))
+        for row, (effect_name, values) in enumerate(self.effects):
+            if effect_name in self.frozen:
+                continue
+            for k, parameter in enumerate(BY_NAME[effect_name].parameters):
+                if np.isfinite(values[k]):
+                    scale = max(abs(values[k]), 1e-12) if not parameter.positive else 1.0
+                    out.append(Free(effect_name, parameter.name, row * 16 + k, parameter.positive, scale,
+                                    max(parameter.lower, 1e-12) if parameter.positive else parameter.lower,
+                                    parameter.upper))
+        for state, per_record in (self.states or {}).items():
+            for k in range(1, len(per_record)):
+                out.append(Free(state, state, k, state != "offset", self.scales.position, 0.2 if state != "offset" else -np.inf,
+                                5.0 if state != "offset" else np.inf))
+        return out
+
+    def _tau_bounds(self) -> tuple[float, float]:
+        known = self.scales.tau_e_datasheet
+        return (0.2 * known, 2.0 * known) if known else (1e-6, 1.0)
+
+    def vector(self, layout: Sequence[Free]) -> np.ndarray:
+        """The fitted numbers, transformed (logarithm of positive ones, others over their scale)."""
+        z = np.empty(len(layout))
+        for i, f in enumerate(layout):
+            v = self._get(f)
+            z[i] = math.log(max(abs(v), 1e-300)) if f.positive else v / f.scale
+        return z
+
+    def _get(self, f: Free) -> float:
+        if f.owner == "base":
+            return self.values[f.name]
+        if f.owner in STATES:
+            return self.states[f.owner][f.index]
+        return self.effects[f.index // 16][1][f.index % 16]
+
+    def at(self, layout: Sequence[Free], z: np.ndarray) -> Model:
+        """The model with the fitted numbers of z, held within their bounds."""
+        values, effects = dict(self.values), [(n, v.copy()) for n, v in self.effects]
+        states = {k: v.copy() for k, v in (self.states or {}).items()}
+        for f, q in zip(layout, z):
+            v = math.exp(min(q, 60.0)) if f.positive else q * f.scale
+            v = min(max(v, f.lower), f.upper)
+            if f.owner == "base":
+                values[f.name] = math.copysign(v, self.values["b"]) if f.name == "b" else v
+            elif f.owner in STATES:
+                states[f.owner][f.index] = v
+            else:
+                effects[f.index // 16][1][f.index % 16] = v
+        return replace(self, values=values, effects=tuple(effects), states=states or None)
+
+    def with_effect(self, name: str, start: np.ndarray) -> Model:
+        """The model with one more effect at ``start``."""
+        return replace(self, effects=(*self.effects, (name, np.array(start, float))))
+
+    def without_effect(self, name: str) -> Model:
+        """The model with one effect less."""
+        return replace(self, effects=tuple(e for e in self.effects if e[0] != name))
+
+    def with_state(self, state: str, records: int) -> Model:
+        """The model with a record state free in every recording but the first."""
+        neutral = np.zeros(records) if state == "offset" else np.ones(records)
+        return replace(self, states={**(self.states or {}), state: neutral})
+
+    def plant(self, record: int = 0) -> ReducedModel:
+        """The reduced model of one recording (its record state applied)."""
+        c = lumped(self.values)
+        if self.states:
+            gain = self.states["gain"][record] if "gain" in self.states else 1.0
+            level = self.states["friction_level"][record] if "friction_level" in self.states else 1.0
+            c = c._replace(b=c.b * gain, c_2_plus=c.c_2_plus * level, c_2_minus=c.c_2_minus * level)
+        return ReducedModel(c, self.effects)
+
+    def offset(self, record: int) -> float:
+        """Output offset of one recording."""
+        return float(self.states["offset"][record]) if self.states and "offset" in self.states else 0.0
+
+    def predict(self, trace: Trace, record: int = 0, rate: float = 0.0, start=None) -> np.ndarray:
+        """Simulated output (N,) of a recording: free run, or observer form where ``rate`` [1/s] > 0."""
+        every = max(1, round(OBSERVER_STEP / trace.sample_time))
+        gain = 1.0 - math.exp(-rate * every * trace.sample_time)
+        shift = self.offset(record)
+        theta, omega = trace.start if start is None else start
+        plant = self.plant(record)
+        drive = 0.0 if omega == 0 else plant.coefficients.b * trace.u[0] - plant.coefficients.a_emf * omega
+        y = trace.y - shift if gain > 0 else None
+        return plant.theta(trace.t, trace.u, (theta - shift, omega, drive), enable=trace.enable, load=trace.load,
+                           y=y, gain=gain, every=every) + shift
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model: its cost C, block misfits m (B,), and the curvature in transformed parameters (k, k)."""
+
+    model: Model
+    cost: float
+    misfit: np.ndarray
+    hessian: np.ndarray
+    simulations: int
+
+    @property
+    def size(self) -> int:
+        """Number of fitted numbers."""
+        return self.hessian.shape[0]
+
+
+def residuals(model: Model, traces: Sequence[Trace], rate: float) -> np.ndarray:
+    """y - y_hat over all traces, in sigmas of each, 0 where a sample is not valid; NaN where the simulation ran away."""
+    parts = []
+    for k, trace in enumerate(traces):
+        e = (trace.y - model.predict(trace, k, rate)) / trace.sigma
+        parts.append(np.where(trace.valid, e, 0.0))
+    return np.concatenate(parts)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Block bookkeeping over several traces: index of each sample (N,), samples in each block (B,)."""
+
+    index: np.ndarray
+    counts: np.ndarray
+
+    @staticmethod
+    def of(traces: Sequence[Trace]) -> Blocks:
+        index, counts, base = [], [], 0
+        for trace in traces:
+            index.append(trace.block + base)
+            counts.append(trace.counts)
+            base += trace.counts.size
+        return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0))
+
+    def misfit(self, e: np.ndarray) -> np.ndarray:
+        """Mean squared residual (in sigmas) of each block."""
+        return np.bincount(self.index, e * e, self.counts.size) / self.counts
+
+
+def score(misfit: np.ndarray, tau: float) -> np.ndarray:
+    """Each block's share of the cost C."""
+    return np.log((tau + misfit) / (1.0 + tau))
+
+
+def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25) -> Fit:
+    """Minimise C over the model's free numbers, from the model's own values.
+
+    Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the mean
+    misfit, where C is nearly a sum of squares, and lowers it to the one that was asked for.
+    """
+    now = math.inf
+    while True:
+        misfit = Blocks.of(traces).misfit(residuals(model, traces, rate))
+        level = float(np.mean(misfit)) if np.all(np.isfinite(misfit)) else math.inf
+        now = max(tau, min(level, 0.1 * now))
+        last = now <= 1.5 * tau
+        found = descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3)
+        if last:
+            return found
+        model = found.model
+
+
+def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float) -> Fit:
+    """Levenberg-Marquardt on C at one ``tau``; two steps in a row that gain less than ``tolerance`` end it."""
+    layout, blocks = model.layout(), Blocks.of(traces)
+    z = model.vector(layout)
+    damping, small, calls = 1e-3, 0, 1
+
+    def evaluate(z):
+        e = residuals(model.at(layout, z), traces, rate)
+        if not np.all(np.isfinite(e)):
+            return e, None, np.inf
+        m = blocks.misfit(e)
+        return e, m, float(score(m, tau).sum()) + _prior_cost(layout, z)
+
+    e, m, cost = evaluate(z)
+    if m is None:
+        e, m = np.full(blocks.index.size, 1e6), np.full(blocks.counts.size, 1e12)
+    jacobian, fresh = None, False
+    for _ in range(steps):
+        if jacobian is None:
+            jacobian, fresh = _jacobian(model, layout, z, e, traces, rate), True
+            calls += z.size
+        weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
+        weighted = jacobian * weight[:, None]
+        hessian, slope = weighted.T @ jacobian, weighted.T @ e
+        _add_prior(layout, z, hessian, slope)
+        step = None
+        for _ in range(6 if fresh else 2):
+            scale = np.diag(hessian) + 1e-9 * np.trace(hessian) / z.size + 1e-12
+            step = np.clip(-np.linalg.solve(hessian + damping * np.diag(scale), slope), -1.0, 1.0)
+            goal = model.at(layout, z + step).vector(layout)
+            trial = evaluate(goal)
+            calls += 1
+            if trial[2] < cost:
+                break
+            damping = max(damping * 8, 1e-6)
+            step = None
+        if step is None:
+            if fresh:
+                break
+            jacobian = None
+            continue
+        moved, gain = goal - z, cost - trial[2]
+        promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
+        if gain > 0.3 * promised and moved @ moved > 0:
+            jacobian, fresh = jacobian + np.outer(trial[0] - e - jacobian @ moved, moved / (moved @ moved)), False
+        else:
+            jacobian = None
+        z, (e, m, cost) = goal, trial
+        damping = max(damping / 8, 1e-9)
+        small = small + 1 if gain < tolerance else 0
+        if small >= 2 or gain < 0.1 * tolerance:
+            break
+    return Fit(model.at(layout, z), cost, m, hessian, calls)
+
+
+def _jacobian(model, layout, z, e, traces, rate):
+    """Finite differences of the residuals e (N,) by the fitted numbers: (N, k)."""
+    jacobian = np.empty((e.size, z.size))
+    for k in range(z.size):
+        shifted = z.copy()
+        shifted[k] += DIFFERENCE
+        jacobian[:, k] = (residuals(model.at(layout, shifted), traces, rate) - e) / DIFFERENCE
+    jacobian[~np.isfinite(jacobian)] = 0.0
+    return jacobian
+
+
+def _prior_cost(layout, z):
+    return sum(0.5 * ((q - f.prior[0]) / f.prior[1]) ** 2 for f, q in zip(layout, z) if f.prior)
+
+
+def _add_prior(layout, z, hessian, slope):
+    for k, f in enumerate(layout):
+        if f.prior:
+            hessian[k, k] += 1.0 / f.prior[1] ** 2
+            slope[k] += (z[k] - f.prior[0]) / f.prior[1] ** 2

@@ -1,0 +1,1 @@
+"""The electric rudder system as models that turn voltages into motion."""

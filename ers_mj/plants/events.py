@@ -1,0 +1,667 @@
+"""The compiled integrator of Eq. (1)/(5): smooth flow between events, every switch of a Sgn located exactly.
+
+State x = (theta, w, j, theta_m, w_m): rudder angle and speed, drive acceleration j (the motor torque over J; current in
+disguise), and the motor's side where a second body exists. Mode m = (s, side, stop, s_m, twist): the values that the set-valued
+terms take until the next event: direction of slip (0 = stuck), side of theta_0 (0 = held in the corner), stop touched,
+motor slip, contact of the play. A flow ends where the mode's inequality fails; the instant is found on the flow itself.
+
+Within a mode the plant itself is linear: a precomputed map over a whole segment of a sample, a Taylor series to machine
+precision over a part of one. What the laws of effects add is a force; over a segment it enters the same maps as a parabola in time
+through three evaluations (an exponential integrator), over a part of one by a fourth-order Runge-Kutta step.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ers_mj.effects import EFFECTS
+from ers_mj.effects.base import Coefficients
+from ers_mj.plants.compiled import compiled_cache
+
+INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
+(A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
+ BETA, PHI, K_TWIST, D_TWIST, GAP) = range(len(Coefficients._fields))
+N_PARAMETERS = max(4, max(len(effect.parameters) for effect in EFFECTS))
+RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
+CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
+RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
+LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
+CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
+ORDER = (0, 4, 1, 2, 3, 5, 6)  # speeds first: between their zeros angles are monotone, so that later events have one root
+GAUSS_X, GAUSS_W = (0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(10)[1])
+
+
+def _chain_torque(laws):
+    """One compiled function that adds up the torques of the effects that are on."""
+    if not laws:
+        @njit(nogil=True)
+        def total(on, p, theta, w, j, t):
+            return 0.0
+        return total
+    (row, law), rest = laws[0], _chain_torque(laws[1:])
+
+    @njit(nogil=True)
+    def total(on, p, theta, w, j, t):
+        a = rest(on, p, theta, w, j, t)
+        if on[row]:
+            a += law(p[row], theta, w, j, t)
+        return a
+    return total
+
+
+def _chain_friction(laws):
+    """One compiled function that passes the friction level through the effects that are on."""
+    if not laws:
+        @njit(nogil=True)
+        def total(on, p, level, theta, w, j, direction):
+            return level
+        return total
+    (row, law), rest = laws[0], _chain_friction(laws[1:])
+
+    @njit(nogil=True)
+    def total(on, p, level, theta, w, j, direction):
+        level = rest(on, p, level, theta, w, j, direction)
+        if on[row]:
+            level = law(p[row], level, theta, w, j, direction)
+        return level
+    return total
+
+
+_torque = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
+_friction = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
+HAS_LAW = np.array([bool(e.torque or e.friction) for e in EFFECTS])
+
+
+@njit(nogil=True, inline="always")
+def _stop_force(c, stop, theta, w):
+    """Acceleration of the touched stop (0 where none is)."""
+    if stop == 0:
+        return 0.0
+    wall = c[UPPER] if stop > 0 else c[LOWER]
+    return -c[K_STOP] * (theta - wall) - c[D_STOP] * w
+
+
+@njit(nogil=True, inline="always")
+def _twist_force(c, twist, theta, w, theta_m, w_m):
+    """Acceleration (per total inertia) that the motor's side exerts on the rudder through the contact."""
+    if twist == 0:
+        return 0.0
+    return c[K_TWIST] * (theta_m - theta - twist * c[GAP]) + c[D_TWIST] * (w_m - w)
+
+
+@njit(nogil=True)
+def _held(c, on, p, lawful, t, x, m):
+    """(net acceleration without friction on the rudder at rest, its friction up, down), per total inertia."""
+    theta, w, j, theta_m, w_m = x
+    a = c[BIAS] + c[A_1] * (c[THETA_0] - theta) - c[C_1] * m[1] + _stop_force(c, m[2], theta, 0.0)
+    share = 1.0
+    if c[TWO] > 0:
+        a += _twist_force(c, m[4], theta, 0.0, theta_m, w_m)
+        share = 1.0 - c[PHI]
+    else:
+        a += j
+    up, down = c[C_PLUS], c[C_MINUS]
+    if lawful:
+        a += _torque(on, p, theta, 0.0, j, t)
+        up, down = _friction(on, p, up, theta, 0.0, j, 1.0), _friction(on, p, down, theta, 0.0, j, -1.0)
+    up, down = share * up, share * down
+    if m[1] == 0:
+        up, down = up + c[C_1], down + c[C_1]
+    return a, up, down
+
+
+@njit(nogil=True)
+def _held_motor(c, x, m):
+    """(net acceleration without friction on the motor's side at rest, its friction), per total inertia."""
+    theta, w, j, theta_m, w_m = x
+    a = j - _twist_force(c, m[4], theta, w, theta_m, 0.0)
+    return a, c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS])
+
+
+@njit(nogil=True)
+def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
+    """d/dt of (theta, w, j, theta_m, w_m) within a mode."""
+    theta, w, j, theta_m, w_m = x
+    two = c[TWO] > 0
+    speed = w_m if two else w
+    if tau > 0:
+        dj = (drive - a_emf * speed - j) / tau
+    else:
+        j = drive - a_emf * speed
+        dj = 0.0
+    dw = 0.0
+    push = 0.0
+    if two:
+        push = _twist_force(c, m[4], theta, w, theta_m, w_m)
+    if m[0] != 0:
+        level = c[C_PLUS] if m[0] > 0 else c[C_MINUS]
+        a_mech = c[A_PLUS] if m[0] > 0 else c[A_MINUS]
+        force = c[BIAS] + c[A_1] * (c[THETA_0] - theta) - c[C_1] * m[1] + _stop_force(c, m[2], theta, w)
+        if lawful:
+            force += _torque(on, p, theta, w, j, t)
+            level = _friction(on, p, level, theta, w, j, float(m[0]))
+        if two:
+            force += push - (1.0 - c[BETA]) * a_mech * w - (1.0 - c[PHI]) * level * m[0]
+            dw = force / (1.0 - c[RHO])
+        else:
+            dw = force + j - a_mech * w - level * m[0]
+    dw_m = 0.0
+    if two and m[3] != 0:
+        a_mech = c[A_PLUS] if w_m > 0 else c[A_MINUS]
+        level = c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS])
+        dw_m = (j - push - c[BETA] * a_mech * w_m - level * m[3]) / c[RHO]
+    return w, dw, dj, w_m, dw_m
+
+
+@njit(nogil=True, inline="always")
+def _plus(x, h, d):
+    return (x[0] + h * d[0], x[1] + h * d[1], x[2] + h * d[2], x[3] + h * d[3], x[4] + h * d[4])
+
+
+@njit(nogil=True)
+def _runge_kutta(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
+    """One classical fourth-order step of length dt."""
+    k1 = _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)
+    k2 = _derivative(c, on, p, lawful, t + 0.5 * dt, _plus(x, 0.5 * dt, k1), m, drive, tau, a_emf)
+    k3 = _derivative(c, on, p, lawful, t + 0.5 * dt, _plus(x, 0.5 * dt, k2), m, drive, tau, a_emf)
+    k4 = _derivative(c, on, p, lawful, t + dt, _plus(x, dt, k3), m, drive, tau, a_emf)
+    d = (k1[0] + 2 * (k2[0] + k3[0]) + k4[0], k1[1] + 2 * (k2[1] + k3[1]) + k4[1], k1[2] + 2 * (k2[2] + k3[2]) + k4[2],
+         k1[3] + 2 * (k2[3] + k3[3]) + k4[3], k1[4] + 2 * (k2[4] + k3[4]) + k4[4])
+    x = _plus(x, dt / 6.0, d)
+    if tau <= 0:
+        return x[0], x[1], drive - a_emf * (x[4] if c[TWO] > 0 else x[1]), x[3], x[4]
+    return x
+
+
+@njit(nogil=True)
+def _linear(c, x, m, drive, tau, a_emf, dt, scale):
+    """The flow within a mode without laws, exact: Taylor series in steps of about one time constant.
+
+    ``scale`` 1 includes the constant forces, 0 leaves them and the drive out (the homogeneous flow).
+    """
+    theta, w, j, theta_m, w_m = x
+    two = c[TWO] > 0
+    load_free, motor_free = m[0] != 0, two and m[3] != 0
+    a1 = a2 = force = kt = dt_ = force_m = a2_m = 0.0
+    rho, rest = c[RHO], 1.0 - c[RHO]
+    if two and m[4] != 0:
+        kt, dt_ = c[K_TWIST], c[D_TWIST]
+    if load_free:
+        a1, a2 = c[A_1], c[A_PLUS] if m[0] > 0 else c[A_MINUS]
+        level = c[C_PLUS] if m[0] > 0 else c[C_MINUS]
+        if two:
+            a2, level = a2 * (1.0 - c[BETA]), level * (1.0 - c[PHI])
+        force = c[BIAS] + c[A_1] * c[THETA_0] - c[C_1] * m[1] - level * m[0] - kt * m[4] * c[GAP]
+        if m[2] != 0:
+            a1, a2 = a1 + c[K_STOP], a2 + c[D_STOP]
+            force += c[K_STOP] * (c[UPPER] if m[2] > 0 else c[LOWER])
+    if motor_free:
+        a2_m = c[BETA] * 0.5 * (c[A_PLUS] + c[A_MINUS])
+        force_m = kt * m[4] * c[GAP] - c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS]) * m[3]
+    rate = abs(a2) + math.sqrt(abs(a1)) + (1.0 / tau + math.sqrt(abs(a_emf) / tau) if tau > 0 else a_emf)
+    if two:
+        rate = (rate + math.sqrt(kt) + dt_) / min(rho, rest)
+    n = int(0.7 * rate * dt) + 1
+    h = dt / n
+    for _ in range(n):
+        v_t, v_w, v_j, v_tm, v_wm = theta, w, j, theta_m, w_m
+        for k in range(1, 40):
+            q = h / k
+            first = scale if k == 1 else 0.0
+            speed = v_wm if two else v_w
+            if tau > 0:
+                e_j = q * (first * drive - a_emf * speed - v_j) / tau
+                pull = v_j
+            else:
+                e_j = 0.0
+                pull = first * drive - a_emf * speed
+            e_t = e_w = e_tm = e_wm = 0.0
+            if load_free:
+                e_t = q * v_w
+                e_w = first * force - a1 * v_t - a2 * v_w
+                if two:
+                    e_w = q * (e_w + kt * (v_tm - v_t) + dt_ * (v_wm - v_w)) / rest
+                else:
+                    e_w = q * (e_w + pull)
+            if motor_free:
+                e_tm = q * v_wm
+                e_wm = q * (first * force_m + pull - a2_m * v_wm - kt * (v_tm - v_t) - dt_ * (v_wm - v_w)) / rho
+            v_t, v_w, v_j, v_tm, v_wm = e_t, e_w, e_j, e_tm, e_wm
+            theta, w, j, theta_m, w_m = theta + v_t, w + v_w, j + v_j, theta_m + v_tm, w_m + v_wm
+            if k > 2 and abs(v_w) <= 1e-15 * abs(w) and abs(v_j) <= 1e-15 * abs(j) and abs(v_wm) <= 1e-15 * abs(w_m):
+                break
+    if tau <= 0:
+        j = scale * drive - a_emf * (w_m if two else w)
+    return theta, w, j, theta_m, w_m
+
+
+@njit(nogil=True, inline="always")
+def _violation(e, c, on, p, lawful, t, x, m):
+    """Event function e: positive where the mode's inequality fails."""
+    theta, w, j, theta_m, w_m = x
+    if e == 0:
+        return -m[0] * w if m[0] != 0 else -1.0
+    if e == 1:
+        return -m[1] * (theta - c[THETA_0]) if m[0] != 0 else -1.0
+    if e == 2:
+        if m[2] == 0:
+            return max(theta - c[UPPER], c[LOWER] - theta)
+        return c[UPPER] - theta if m[2] > 0 else theta - c[LOWER]
+    if e == 3:
+        if m[0] != 0:
+            return -1.0
+        a, up, down = _held(c, on, p, lawful, t, x, m)
+        return max(a - up, -a - down)
+    if c[TWO] <= 0:
+        return -1.0
+    if e == 4:
+        return -m[3] * w_m if m[3] != 0 else -1.0
+    if e == 5:
+        twist = theta_m - theta
+        return abs(twist) - c[GAP] if m[4] == 0 else c[GAP] - m[4] * twist
+    if m[3] != 0:
+        return -1.0
+    a, level = _held_motor(c, x, m)
+    return abs(a) - level
+
+
+@njit(nogil=True)
+def _direction(a, up, down):
+    """Slip direction of a body at rest: 0 within its friction."""
+    if a > up:
+        return 1
+    return -1 if a < -down else 0
+
+
+@njit(nogil=True)
+def _switch(e, c, on, p, lawful, t, x, m, corner):
+    """State and mode just after event e."""
+    theta, w, j, theta_m, w_m = x
+    s, side, stop, s_m, twist = m
+    if e == 0 or e == 3:
+        w = 0.0
+        if c[C_1] > 0 and abs(theta - c[THETA_0]) < 1e-12:
+            side = 0
+        x = (theta, w, j, theta_m, w_m)
+        a, up, down = _held(c, on, p, lawful, t, x, (0, side, stop, s_m, twist))
+        s = _direction(a, up, down) if e == 0 else (1 if a - up > -a - down else -1)
+        if side == 0 and c[C_1] > 0 and s != 0:
+            side = s
+    elif e == 1:
+        theta = c[THETA_0]
+        x = (theta, w, j, theta_m, w_m)
+        side = 1 if w > 0 else -1
+        if abs(w) < corner:
+            a, up, down = _held(c, on, p, lawful, t, x, (0, 0, stop, s_m, twist))
+            if _direction(a, up, down) == 0:
+                s, side = 0, 0
+                x = (theta, 0.0, j, theta_m, w_m)
+    elif e == 2:
+        if stop == 0:
+            stop = 1 if theta > 0.5 * (c[UPPER] + c[LOWER]) or c[LOWER] == -np.inf else -1
+            if c[UPPER] == np.inf:
+                stop = -1
+        else:
+            stop = 0
+    elif e == 4 or e == 6:
+        x = (theta, w, j, theta_m, 0.0)
+        a, level = _held_motor(c, x, m)
+        s_m = _direction(a, level, level) if e == 4 else (1 if a > 0 else -1)
+    elif twist == 0:
+        twist = 1 if theta_m > theta else -1
+    else:
+        twist = 0
+    return x, (s, side, stop, s_m, twist)
+
+
+@njit(nogil=True)
+def _rate(c, tau, a_emf):
+    """An upper bound [1/s] of the fastest rate in any mode."""
+    rate = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
+    if tau > 0:
+        rate = max(rate, 1.0 / tau) + math.sqrt(a_emf / tau)
+    if c[UPPER] < np.inf or c[LOWER] > -np.inf:
+        rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
+    if c[TWO] > 0:
+        share = c[RHO] * (1.0 - c[RHO])
+        rate = max(rate / min(c[RHO], 1.0 - c[RHO]), math.sqrt(c[K_TWIST] / share) + c[D_TWIST] / share)
+    return rate
+
+
+@njit(nogil=True)
+def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
+    """The state dt later within the mode."""
+    if not lawful:
+        return _linear(c, x, m, drive, tau, a_emf, dt, 1.0)
+    n = int(_rate(c, tau, a_emf) * dt / RATE_STEP) + 1
+    for k in range(n):
+        x = _runge_kutta(c, on, p, lawful, t + k * dt / n, x, m, drive, tau, a_emf, dt / n)
+    return x
+
+
+@njit(nogil=True)
+def _locate(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, g1):
+    """First instant in (0, dt] where event function e vanishes (Illinois method on the flow), and the state there.
+
+    A body that has just been released starts on the root that it left; the search then begins where it moves.
+    """
+    lo, hi = 0.0, dt
+    g_lo, g_hi = _violation(e, c, on, p, lawful, t, x, m), g1
+    z = x
+    while g_lo >= 0.0:
+        lo = 0.5 * hi if lo == 0.0 else 0.5 * lo
+        if e not in (0, 4) or lo < dt / 200:
+            return 0.0, x
+        z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, lo)
+        g_lo = _violation(e, c, on, p, lawful, t + lo, z, m)
+    side = 0
+    for _ in range(60):
+        te = hi - g_hi * (hi - lo) / (g_hi - g_lo)
+        z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, te)
+        g = _violation(e, c, on, p, lawful, t + te, z, m)
+        if abs(g) <= 1e-11 * abs(g1) or hi - lo < 1e-14:
+            return te, z
+        if g > 0:
+            hi, g_hi = te, g
+            if side == 1:
+                g_lo *= 0.5
+            side = 1
+        else:
+            lo, g_lo = te, g
+            if side == -1:
+                g_hi *= 0.5
+            side = -1
+    return te, z
+
+
+@njit(nogil=True)
+def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
+    """Integrate over dt under a constant drive, through every event on the way. Returns (x, m, settled)."""
+    if tau <= 0:
+        x = (x[0], x[1], drive - a_emf * (x[4] if c[TWO] > 0 else x[1]), x[3], x[4])
+        if m[0] == 0 and _violation(3, c, on, p, lawful, t, x, m) > 0:
+            x, m = _switch(3, c, on, p, lawful, t, x, m, corner)
+    left, events = dt, 0
+    while left > 1e-13 * dt:
+        h = min(left, h_max)
+        z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, h)
+        while h > dt / 40 and _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
+            h *= 0.25
+            z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, h)
+        first, event = h, -1
+        for e in ORDER:
+            g = _violation(e, c, on, p, lawful, t + first, z, m)
+            if g > 0:
+                first, z = _locate(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, first, g)
+                event = e
+        if event < 0:
+            x = z
+        else:
+            events += 1
+            at_rest = first <= 0.0 and event == 0
+            x, m_new = _switch(event, c, on, p, lawful, t + first, z, m, corner)
+            if at_rest or (events > RELEASE_LIMIT and event in (0, 3)):
+                m = (0, m_new[1], m_new[2], m_new[3], m_new[4])
+                j = drive + (x[2] - drive) * math.exp(-h / tau) if tau > 0 else x[2]
+                if c[TWO] <= 0:
+                    x, first = (x[0], 0.0, j, x[3], x[4]), h
+            else:
+                m = m_new
+            if events > 4 * RELEASE_LIMIT:
+                return (x[0], 0.0, x[2], x[3], 0.0), (0, m[1], m[2], 0, m[4])
+        t += first
+        left -= first
+    return x, m
+
+
+@njit(nogil=True)
+def _start_mode(c, on, p, lawful, t, x):
+    """The mode that fits an initial state."""
+    theta, w = x[0], x[1]
+    side = 0
+    if c[C_1] > 0 and abs(theta - c[THETA_0]) > 0:
+        side = 1 if theta > c[THETA_0] else -1
+    if c[C_1] > 0 and side == 0 and w != 0:
+        side = 1 if w > 0 else -1
+    stop = 1 if theta > c[UPPER] else (-1 if theta < c[LOWER] else 0)
+    s = 1 if w > 0 else (-1 if w < 0 else 0)
+    s_m = 1 if x[4] > 0 else (-1 if x[4] < 0 else 0)
+    twist = 0
+    if c[TWO] > 0 and abs(x[3] - theta) > c[GAP]:
+        twist = 1 if x[3] > theta else -1
+    return s, side, stop, s_m, twist
+
+
+@njit(nogil=True)
+def _corrected(c, on, p, lawful, t, x, m, jump):
+    """The state after the observer has moved the angle by ``jump`` (both bodies), unless the corner holds it."""
+    theta = x[0] + jump
+    side = 0
+    if c[C_1] > 0:
+        side = 1 if theta > c[THETA_0] else -1
+    stop = 1 if theta > c[UPPER] else (-1 if theta < c[LOWER] else 0)
+    z = (theta, x[1], x[2], x[3] + jump, x[4])
+    m_new = (m[0], side, stop, m[3], m[4])
+    if m[0] == 0 and m[1] == 0 and c[C_1] > 0:
+        a, up, down = _held(c, on, p, lawful, t, z, m_new)
+        if a > up or a < -down:
+            return x, m
+    return z, m_new
+
+
+@njit(nogil=True)
+def _unit(k):
+    return (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0, 1.0 if k == 3 else 0.0,
+            1.0 if k == 4 else 0.0)
+
+
+@njit(nogil=True)
+def _fill_map(e, c, m, tau, a_emf, h):
+    """The exact map over h in a mode with side 0: e (5, 11), columns x (5), constant, drive, side, force 1, s, s^2 (s = t/h)."""
+    for k in range(5):
+        z = _linear(c, _unit(k), m, 0.0, tau, a_emf, h, 0.0)
+        for i in range(5):
+            e[i, k] = z[i]
+    zero = _unit(9)
+    base = _linear(c, zero, m, 0.0, tau, a_emf, h, 1.0)
+    pull = _linear(c, zero, m, 1.0, tau, a_emf, h, 1.0)
+    share = 1.0 - c[RHO] if c[TWO] > 0 else 1.0
+    for i in range(5):
+        e[i, 5], e[i, 6] = base[i], pull[i] - base[i]
+        e[i, 8] = e[i, 9] = e[i, 10] = 0.0
+    if m[0] != 0:
+        for g in range(GAUSS_X.size):
+            z = _linear(c, (0.0, 1.0 / share, 0.0, 0.0, 0.0), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0)
+            for i in range(5):
+                v = z[i] * h * GAUSS_W[g]
+                e[i, 8] += v
+                e[i, 9] += v * GAUSS_X[g]
+                e[i, 10] += v * GAUSS_X[g] ** 2
+    for i in range(5):
+        e[i, 7] = -c[C_1] * e[i, 8]
+
+
+@njit(nogil=True)
+def _maps(c, tau, a_emf, h):
+    """Maps over h and over h/2 for every mode away from the stops: (2, 3, 3, 3, 5, 11), indices s + 1, s_m + 1, twist + 1."""
+    e = np.zeros((2, 3, 3, 3, 5, 11))
+    for half in range(2):
+        for s in range(-1, 2):
+            for s_m in range(-1, 2):
+                for twist in range(-1, 2):
+                    if c[TWO] > 0 or (s_m == 0 and twist == 0 and s != 0):
+                        _fill_map(e[half, s + 1, s_m + 1, twist + 1], c, (s, 0, 0, s_m, twist), tau, a_emf,
+                                  h / (1 + half))
+    return e
+
+
+@njit(nogil=True, inline="always")
+def _row(e, i, x, drive, side, f0, f1, f2):
+    return (e[i, 0] * x[0] + e[i, 1] * x[1] + e[i, 2] * x[2] + e[i, 5] + e[i, 6] * drive + e[i, 7] * side
+            + e[i, 8] * f0 + e[i, 9] * f1 + e[i, 10] * f2)
+
+
+@njit(nogil=True, inline="always")
+def _mapped(e, two, x, drive, side, f0, f1, f2):
+    """The state after a map, under the force f0 + f1 s + f2 s^2 (s from 0 to 1) on the rudder."""
+    if not two:
+        return (_row(e, 0, x, drive, side, f0, f1, f2), _row(e, 1, x, drive, side, f0, f1, f2),
+                _row(e, 2, x, drive, side, f0, f1, f2), x[3], x[4])
+    return (_row(e, 0, x, drive, side, f0, f1, f2) + e[0, 3] * x[3] + e[0, 4] * x[4],
+            _row(e, 1, x, drive, side, f0, f1, f2) + e[1, 3] * x[3] + e[1, 4] * x[4],
+            _row(e, 2, x, drive, side, f0, f1, f2) + e[2, 3] * x[3] + e[2, 4] * x[4],
+            _row(e, 3, x, drive, side, f0, f1, f2) + e[3, 3] * x[3] + e[3, 4] * x[4],
+            _row(e, 4, x, drive, side, f0, f1, f2) + e[4, 3] * x[3] + e[4, 4] * x[4])
+
+
+@njit(nogil=True)
+def _extra(c, on, p, t, x, s):
+    """What the laws of effects add to the force on a slipping rudder, per total inertia."""
+    level = c[C_PLUS] if s > 0 else c[C_MINUS]
+    share = 1.0 - c[PHI] if c[TWO] > 0 else 1.0
+    return _torque(on, p, x[0], x[1], x[2], t) - s * share * (_friction(on, p, level, x[0], x[1], x[2], float(s)) - level)
+
+
+@njit(nogil=True)
+def _segment(e, c, on, p, lawful, t, x, m, drive, load, h):
+    """The state a whole segment later if no event falls into it."""
+    two = c[TWO] > 0
+    whole, half = e[0, m[0] + 1, m[3] + 1, m[4] + 1], e[1, m[0] + 1, m[3] + 1, m[4] + 1]
+    if not lawful or m[0] == 0:
+        return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0)
+    g0 = load + _extra(c, on, p, t, x, m[0])
+    ga = load + _extra(c, on, p, t + 0.5 * h, _mapped(half, two, x, drive, m[1], g0, 0.0, 0.0), m[0])
+    gb = load + _extra(c, on, p, t + h, _mapped(whole, two, x, drive, m[1], g0, 2.0 * (ga - g0), 0.0), m[0])
+    return _mapped(whole, two, x, drive, m[1], g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0))
+
+
+@njit(nogil=True)
+def _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
+    """True where a slipping body may have stopped and gone on within the step from x to z: it brakes first, speeds up last."""
+    if m[0] == 0:
+        return False
+    d0 = _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1] * m[0]
+    return (d0 < 0.0 and abs(z[1]) < -d0 * h
+            and _derivative(c, on, p, lawful, t + h, z, m, drive, tau, a_emf)[1] * m[0] > 0.0)
+
+
+@njit(nogil=True)
+def _cuts(c, h0, tau, a_emf, lawful, refine):
+    """Segment ends within a uniform sample [s] and whether the input of this sample (1) or the one before (0) acts in each.
+
+    Returns (ends (k,), fresh (k,), whole samples that the delay swallows).
+    """
+    step = h0
+    if lawful:
+        mechanical = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
+        step = min(step, LAW_STEP / mechanical)
+    if c[TWO] > 0:
+        step = min(step, CONTACT_STEP / math.sqrt(c[K_TWIST] / (c[RHO] * (1.0 - c[RHO]))))
+    step /= refine
+    skip = int(c[DELAY] / h0 + 1e-9)
+    late = c[DELAY] - skip * h0
+    if late < 1e-9 * h0:
+        late = 0.0
+    before, after = int(math.ceil(late / step - 1e-9)), int(math.ceil((h0 - late) / step - 1e-9))
+    ends, fresh = np.empty(before + after), np.zeros(before + after, np.int64)
+    for k in range(before):
+        ends[k] = late * (k + 1) / before
+    for k in range(after):
+        ends[before + k] = late + (h0 - late) * (k + 1) / after
+        fresh[before + k] = 1
+    return ends, fresh, skip
+
+
+def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
+    """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
+
+    ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
+    hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
+    (effects,) is true where an effect with a law acts; ``refine`` divides the segments.
+    """
+    n = t.size
+    lawful, two = on.any(), c[TWO] > 0
+    h0 = t[1] - t[0]
+    tau, a_emf, bias = c[TAU], c[A_EMF], c[BIAS]
+    ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
+    first = ends[0]
+    last = ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
+    late, early = _maps(c, tau, a_emf, last), _maps(c, tau, a_emf, first)
+    h_max = np.inf
+    if c[UPPER] < np.inf or c[LOWER] > -np.inf:
+        h_max = CONTACT_STEP / (math.sqrt(c[K_STOP]) + c[D_STOP])
+    if two or lawful:
+        h_max = min(h_max, last / refine)
+    corner = CORNER * (c[C_1] + c[C_PLUS]) * h0
+    x = (x0[0], x0[1], x0[2], x0[0], x0[1] if two else 0.0)
+    m = _start_mode(c, on, p, lawful, t[0], x)
+    for k in range(n):
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[1], x[2], x[3]
+        if k == n - 1:
+            break
+        if gain > 0.0 and k % every == 0 and y[k] == y[k]:
+            x, m = _corrected(c, on, p, lawful, t[k], x, m, gain * (y[k] - x[0]))
+        uniform = abs(t[k + 1] - t[k] - h0) < 1e-6 * h0
+        stretch = 1.0 if uniform else (t[k + 1] - t[k]) / h0
+        start = 0.0
+        for i in range(ends.size):
+            h = (ends[i] - start) * stretch
+            now = t[k] + start * stretch
+            start = ends[i]
+            drive = c[B] * u[max(k - skip - 1 + fresh[i], 0)]
+            if uniform and enable[k] and m[2] == 0:
+                e = late if fresh[i] == 1 else early
+                if m[0] == 0 and not two:
+                    j = drive + (x[2] - drive) * math.exp(-h / tau) if tau > 0 else drive
+                    x = (x[0], 0.0, x[2] if tau > 0 else drive, x[3], x[4])
+                    z = (x[0], 0.0, j, x[3], x[4])
+                    c[BIAS] = bias + load[k]
+                    held = (_violation(3, c, on, p, lawful, now + h, z, m) <= 0
+                            and _violation(3, c, on, p, lawful, now, x, m) <= 0)
+                    c[BIAS] = bias
+                    if held:
+                        x = z
+                        continue
+                elif not two:
+                    if tau <= 0:
+                        x = (x[0], x[1], drive - a_emf * x[1], x[3], x[4])
+                    z = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h)
+                    if tau <= 0:
+                        z = (z[0], z[1], drive - a_emf * z[1], z[3], z[4])
+                    if (z[1] * m[0] > 0 and (z[0] - c[THETA_0]) * m[1] >= 0 and z[0] <= c[UPPER] and z[0] >= c[LOWER]
+                            and not (abs(z[1]) < 0.2 * abs(x[1])
+                                     and _turns(c, on, p, lawful, now, x, z, m, drive, tau, a_emf, h))):
+                        x = z
+                        continue
+                else:
+                    if tau <= 0:
+                        x = (x[0], x[1], drive - a_emf * x[4], x[3], x[4])
+                    z = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h)
+                    if tau <= 0:
+                        z = (z[0], z[1], drive - a_emf * z[4], z[3], z[4])
+                    c[BIAS] = bias + load[k]
+                    clean = True
+                    for event in range(7):
+                        clean = clean and _violation(event, c, on, p, lawful, now + h, z, m) <= 0
+                    if tau <= 0:
+                        clean = clean and _violation(3, c, on, p, lawful, now, x, m) <= 0
+                    c[BIAS] = bias
+                    if clean:
+                        x = z
+                        continue
+            c[BIAS] = bias + load[k]
+            if enable[k]:
+                x, m = _advance(c, on, p, lawful, now, x, m, drive, tau, a_emf, h, h_max, corner)
+            else:
+                x, m = _advance(c, on, p, lawful, now, (x[0], x[1], 0.0, x[3], x[4]), m, 0.0, 0.0, 0.0, h, h_max, corner)
+            c[BIAS] = bias
+        if not (abs(x[0]) < 1e12):
+            out[k + 1:, :] = np.nan
+            return
+
+
+with compiled_cache():
+    simulate_kernel = njit(nogil=True, cache=True)(_simulate)

@@ -1,0 +1,93 @@
+"""The reduced model, Eq. (1)/(5)/(6), with any effects of the library switched on: voltages in, motion out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ers_mj.effects import BY_NAME, EFFECTS
+from ers_mj.effects.base import Coefficients
+from ers_mj.plants.events import N_PARAMETERS, simulate_kernel
+
+ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
+
+
+def lumped(values: Mapping[str, float]) -> Coefficients:
+    """Kernel coefficients of Eq. (6)'s letters: a_1 a_2 b c_1 c_2 theta_0, with tau_e [s] and emf_share optional.
+
+    a_2 splits into the back-EMF's part a_2 * emf_share (which acts through the current) and the mechanical rest.
+    """
+    share = values.get("emf_share", 0.0)
+    a_2 = values.get("a_2", 0.0)
+    c_2 = values.get("c_2", 0.0)
+    return Coefficients(a_1=values.get("a_1", 0.0), a_mech_plus=a_2 * (1 - share), a_mech_minus=a_2 * (1 - share),
+                        a_emf=a_2 * share, b=values["b"], c_1=values.get("c_1", 0.0), c_2_plus=c_2, c_2_minus=c_2,
+                        theta_0=values.get("theta_0", 0.0), tau_e=values.get("tau_e", 0.0))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A simulated motion, each (N,): time [s], angle, speed, drive acceleration n K_t i / J, motor-side angle."""
+
+    t: np.ndarray
+    theta: np.ndarray
+    omega: np.ndarray
+    drive: np.ndarray
+    theta_m: np.ndarray
+    measured: np.ndarray
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """Eq. (6)'s coefficients and the effects on top of them.
+
+    ``effects`` is a sequence of (name, parameters (k,)); torques are carried per inertia (see effects/base.py).
+    """
+
+    coefficients: Coefficients
+    effects: Sequence[tuple[str, np.ndarray]] = ()
+    _lowered: tuple = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self):
+        c = self.coefficients
+        on, p = np.zeros(len(EFFECTS), np.bool_), np.zeros((len(EFFECTS), N_PARAMETERS))
+        for name, values in self.effects:
+            effect = BY_NAME[name]
+            c = effect.coefficients(values, c)
+            if effect.torque or effect.friction:
+                on[ROW[name]] = True
+                p[ROW[name], :len(values)] = values
+        object.__setattr__(self, "_lowered", (np.array(c, float), on, p))
+
+    def terminal(self, u: np.ndarray) -> np.ndarray:
+        """The input (N,) that is left of the command u (N,) after the drive's static effects."""
+        for name, values in self.effects:
+            u = BY_NAME[name].command(values, u)
+        return np.ascontiguousarray(u, float)
+
+    def _run(self, t, u, start, enable, load, y, gain, every, refine):
+        c, on, p = self._lowered
+        out = np.empty((t.size, 4))
+        enable = np.ones(t.size, np.bool_) if enable is None else enable
+        load = np.zeros(t.size) if load is None else load
+        x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
+        simulate_kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p, refine, x0, out)
+        return out
+
+    def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
+        """Output (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see events.simulate_kernel).
+
+        ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool.
+        """
+        return self._run(t, u, start, enable, load, y, gain, every, 1)[:, 0]
+
+    def simulate(self, t, u, start=None, *, enable=None, load=None, refine=1) -> Motion:
+        """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples."""
+        start = (self.coefficients.theta_0, 0.0) if start is None else start
+        out = self._run(t, u, start, enable, load, None, 0.0, 1, refine)
+        measured = out[:, 0]
+        for name, values in self.effects:
+            measured = BY_NAME[name].measure(values, measured)
+        return Motion(t, out[:, 0], out[:, 1], out[:, 2], out[:, 3], measured)
