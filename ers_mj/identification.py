@@ -17,79 +17,14 @@ import numpy as np
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.traces import Blocks, Trace, parabola_start, start_samples
 
 OBSERVER_RATE = 5.0  # [1/s]
 OBSERVER_STEP = 0.005  # [s] between corrections of the observer
-BLOCK = 0.25  # [s]
 DIFFERENCE = 1e-4  # step of the finite differences in transformed parameters
 BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share")
+SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
 STATES = ("gain", "offset", "friction_level")
-
-
-@dataclass(frozen=True)
-class Trace:
-    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, and the state it starts in."""
-
-    name: str
-    t: np.ndarray
-    u: np.ndarray
-    y: np.ndarray
-    valid: np.ndarray
-    enable: np.ndarray | None
-    load: np.ndarray | None
-    sigma: float
-    quantum: float
-    start: tuple[float, float]
-    block: np.ndarray
-    counts: np.ndarray
-
-    @property
-    def sample_time(self) -> float:
-        """Median step [s]."""
-        return float(np.median(np.diff(self.t)))
-
-    def part(self, begin: int, end: int) -> Trace:
-        """Samples begin..end as a trace of their own."""
-        cut = slice(begin, end)
-        pick = lambda a: None if a is None else a[cut]  # noqa: E731
-        return make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
-                          pick(self.load), self.sigma, self.quantum)
-
-
-def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
-    """A trace with its blocks of BLOCK seconds and its initial state."""
-    block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
-    counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
-    observed = np.where(valid, y, np.nan)
-    return Trace(name, t, u, observed, valid, enable, load, sigma, quantum, start_state(t, observed), block, counts)
-
-
-def start_state(t: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """(output, speed) at the first sample, by a parabola through the first 50 ms or 10 samples; a speed within 3 sigma of 0 is 0."""
-    n = max(10, int(np.searchsorted(t, t[0] + 0.05)))
-    s, v = t[:n] - t[0], y[:n]
-    s, v = s[np.isfinite(v)], v[np.isfinite(v)]
-    if v.size < 5:
-        return float(v[0]) if v.size else 0.0, 0.0
-    flat = float(np.mean(v))
-    design = np.vander(s / s[-1], 3, increasing=True)
-    coefficient, *_ = np.linalg.lstsq(design, v, rcond=None)
-    spread = np.std(v - design @ coefficient, ddof=3)
-    error = spread * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
-    if abs(coefficient[1]) <= 3 * error or np.std(v) == 0:
-        return flat, 0.0
-    return float(coefficient[0]), float(coefficient[1] / s[-1])
-
-
-def noise_sigma(y: np.ndarray, quantum: float) -> float:
-    """Noise of a record (N,): scaled median of third differences, never below the converter's own q / sqrt(12)."""
-    d = np.abs(np.diff(y, 3))
-    d = d[np.isfinite(d)]
-    floor = quantum / math.sqrt(12.0)
-    spread = 1.4826 * float(np.median(d)) / math.sqrt(20.0) if d.size else 0.0
-    if spread <= floor and d.size:
-        spread = math.sqrt(float(np.mean(np.minimum(d, np.quantile(d, 0.99)) ** 2)) / 20.0)
-    return max(spread, floor, 1e-9 * float(np.nanstd(y)) + 1e-300)
 
 
 @dataclass(frozen=True)
@@ -130,7 +65,8 @@ class Model:
     def layout(self) -> list[Free]:
         """Every fitted number."""
         out = []
-        for name in self.free:
+        held = {name for effect, _ in self.effects for name in BY_NAME[effect].absorbs}
+        for name in (n for n in self.free if n not in held):
             positive = name not in ("theta_0", "b") or name == "b"
             lower, upper = (1e-9, np.inf)
             if name == "theta_0":
@@ -147,9 +83,9 @@ class Model:
             for k, parameter in enumerate(BY_NAME[effect_name].parameters):
                 if np.isfinite(values[k]):
                     scale = max(abs(values[k]), 1e-12) if not parameter.positive else 1.0
+                    least = SMALLEST * self.scales.noise if parameter.kind == "position" else 1e-12
                     out.append(Free(effect_name, parameter.name, row * 16 + k, parameter.positive, scale,
-                                    max(parameter.lower, 1e-12) if parameter.positive else parameter.lower,
-                                    parameter.upper))
+                                    max(parameter.lower, least) if parameter.positive else parameter.lower, parameter.upper))
         for state, per_record in (self.states or {}).items():
             for k in range(1, len(per_record)):
                 out.append(Free(state, state, k, state != "offset", self.scales.position, 0.2 if state != "offset" else -np.inf,
@@ -254,27 +190,6 @@ def residuals(model: Model, traces: Sequence[Trace], rate: float) -> np.ndarray:
     return np.concatenate(parts)
 
 
-@dataclass(frozen=True)
-class Blocks:
-    """Block bookkeeping over several traces: index of each sample (N,), samples in each block (B,)."""
-
-    index: np.ndarray
-    counts: np.ndarray
-
-    @staticmethod
-    def of(traces: Sequence[Trace]) -> Blocks:
-        index, counts, base = [], [], 0
-        for trace in traces:
-            index.append(trace.block + base)
-            counts.append(trace.counts)
-            base += trace.counts.size
-        return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0))
-
-    def misfit(self, e: np.ndarray) -> np.ndarray:
-        """Mean squared residual (in sigmas) of each block."""
-        return np.bincount(self.index, e * e, self.counts.size) / self.counts
-
-
 def score(misfit: np.ndarray, tau: float) -> np.ndarray:
     """Each block's share of the cost C."""
     return np.log((tau + misfit) / (1.0 + tau))
@@ -299,10 +214,13 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
 
 
 def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float) -> Fit:
-    """Levenberg-Marquardt on C at one ``tau``; two steps in a row that gain less than ``tolerance`` end it."""
+    """Levenberg-Marquardt on C at one ``tau``, until a step along a fresh Jacobian gains less than ``tolerance``.
+
+    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised.
+    """
     layout, blocks = model.layout(), Blocks.of(traces)
     z = model.vector(layout)
-    damping, small, calls = 1e-3, 0, 1
+    damping, calls = 1e-3, 1
 
     def evaluate(z):
         e = residuals(model.at(layout, z), traces, rate)
@@ -339,7 +257,7 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
                 break
             jacobian = None
             continue
-        moved, gain = goal - z, cost - trial[2]
+        moved, gain, was_fresh = goal - z, cost - trial[2], fresh
         promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
         if gain > 0.3 * promised and moved @ moved > 0:
             jacobian, fresh = jacobian + np.outer(trial[0] - e - jacobian @ moved, moved / (moved @ moved)), False
@@ -347,9 +265,10 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
             jacobian = None
         z, (e, m, cost) = goal, trial
         damping = max(damping / 8, 1e-9)
-        small = small + 1 if gain < tolerance else 0
-        if small >= 2 or gain < 0.1 * tolerance:
-            break
+        if gain < tolerance:
+            if was_fresh:
+                break
+            jacobian = None
     return Fit(model.at(layout, z), cost, m, hessian, calls)
 
 
@@ -362,6 +281,43 @@ def _jacobian(model, layout, z, e, traces, rate):
         jacobian[:, k] = (residuals(model.at(layout, shifted), traces, rate) - e) / DIFFERENCE
     jacobian[~np.isfinite(jacobian)] = 0.0
     return jacobian
+
+
+def with_starts(model: Model, traces: Sequence[Trace]) -> list[Trace]:
+    """The traces with their initial states fitted by the model on the first 50 ms or 10 samples of each."""
+    return [replace(trace, start=fitted_start(model, trace, k)) for k, trace in enumerate(traces)]
+
+
+def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, float]:
+    """(output, speed) at the first sample by least squares of a free run on the first 50 ms or 10 samples.
+
+    The search begins at rest and at a parabola's speed; rest is kept unless a speed buys more than 9 sigma^2.
+    """
+    n = start_samples(trace.t)
+    head = trace.part(0, n)
+
+    def misses(x):
+        e = np.where(head.valid, head.y - model.predict(head, record, start=x), 0.0) / trace.sigma
+        return e if np.all(np.isfinite(e)) else np.full(n, 1e9)
+
+    def settle(x, moving):
+        step = np.array([0.1 * trace.sigma, trace.sigma / (trace.t[n - 1] - trace.t[0])])[:1 + moving]
+        e = misses(x)
+        for _ in range(6):
+            j = np.column_stack([(misses(x + np.eye(2)[k] * step[k]) - e) / step[k] for k in range(1 + moving)])
+            move = np.zeros(2)
+            move[:1 + moving] = -np.linalg.lstsq(j, e, rcond=1e-9)[0]
+            trial = misses(x + move)
+            if not trial @ trial < e @ e:
+                break
+            x, e = x + move, trial
+        return float(e @ e), x
+
+    first = float(np.mean(head.y[head.valid][:3])) if head.valid.any() else trace.start[0]
+    at_rest = settle(np.array([first, 0.0]), 0)
+    moving = min((settle(np.array(s, float), 1) for s in (trace.start, parabola_start(head.t, head.y))), key=lambda f: f[0])
+    cost, x = at_rest if at_rest[0] <= moving[0] + 9.0 else moving
+    return float(x[0]), float(x[1])
 
 
 def _prior_cost(layout, z):

@@ -19,14 +19,15 @@ class Backlash(Transmission):
         Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.1, upper=0.95, absent=0.5),
         Parameter("phi", "ratio", "motor side's share of the friction", lower=1e-3, upper=0.9, absent=0.1),
         Parameter("f_contact", "frequency", "contact's natural frequency", lower=40.0, upper=400.0, absent=120.0),
+        Parameter("zeta", "ratio", "contact's damping ratio", lower=0.02, upper=2.0, absent=0.2),
     )
-    contact_damping = 0.2
+    tries = 3
 
     def starts(self, scales):
-        return [np.array([part * scales.position, rho, 0.15, 120.0])
-                for rho in (0.6,) for part in (0.003, 0.01, 0.03, 0.1)]
+        return [np.array([part * scales.position, 0.6, 0.2, 120.0, 0.2])
+                for part in (0.003, 0.01, 0.03, 0.1)]
 
     def coefficients(self, p, c):
         contact = 2 * np.pi * p[3]
         return c._replace(two_body=1.0, gap=p[0], rho=p[1], beta=p[1], phi=p[2], k_twist=contact**2,
-                          d_twist=2 * self.contact_damping * contact)
+                          d_twist=2 * p[4] * contact)

@@ -102,6 +102,8 @@ class Effect:
     sentence: ClassVar[str] = ""
     subsystem: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
+    absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
+    tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
 
@@ -116,6 +118,10 @@ class Effect:
     def coefficients(self, p: np.ndarray, c: Coefficients) -> Coefficients:
         """The plant's coefficients with the effect in place."""
         return c
+
+    def constants(self, p: np.ndarray, c: Coefficients) -> np.ndarray:
+        """What the compiled law receives as its ``p`` (at most 4 numbers)."""
+        return p
 
     def command(self, p: np.ndarray, u: np.ndarray) -> np.ndarray:
         """What the motor's terminals see (N,) of the command u (N,)."""

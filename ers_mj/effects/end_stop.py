@@ -16,6 +16,7 @@ class EndStop(Load):
         Parameter("f_stop", "frequency", "natural frequency of the contact", lower=5.0, upper=400.0, absent=100.0),
         Parameter("zeta", "ratio", "damping ratio of the contact", lower=0.02, upper=2.0, absent=0.3),
     )
+    tries = 2
 
     def starts(self, scales):
         inset = 0.01 * (scales.high - scales.low)

@@ -6,16 +6,18 @@ from ers_mj.effects.base import Load, Parameter, law
 
 
 class HingeMomentCubic(Load):
-    """theta'' -= k_3 theta^3 / J: a hardening (or softening, k_3 < 0) aerodynamic hinge moment about angle zero."""
+    """theta'' -= k_3 (theta - theta_0)^3 / J: a hardening (or, k_3 < 0, softening) moment about the rest angle."""
 
     name = "hinge_moment_cubic"
     sentence = "a hinge moment of {k_3} times angle cubed acts on the rudder"
     parameters = (Parameter("k_3", "cubic", "torque per angle cubed", positive=False),)
 
     def starts(self, scales):
-        reach = max(abs(scales.low), abs(scales.high))
-        return [np.array([sign * 0.2 * scales.acceleration / reach**3]) for sign in (1, -1)]
+        return [np.array([sign * 0.2 * scales.acceleration / scales.position**3]) for sign in (1, -1)]
+
+    def constants(self, p, c):
+        return np.array([p[0], c.theta_0])
 
     @law
     def torque(p, theta, w, j, t):
-        return -p[0] * theta * theta * theta
+        return -p[0] * (theta - p[1]) ** 3

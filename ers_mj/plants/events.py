@@ -28,6 +28,7 @@ N_PARAMETERS = max(4, max(len(effect.parameters) for effect in EFFECTS))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
+EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
 ORDER = (0, 4, 1, 2, 3, 5, 6)  # speeds first: between their zeros angles are monotone, so that later events have one root
@@ -379,7 +380,7 @@ def _locate(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, g1):
 
 @njit(nogil=True)
 def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
-    """Integrate over dt under a constant drive, through every event on the way. Returns (x, m, settled)."""
+    """Integrate over dt under a constant drive, through every event on the way. Returns (x, m, number of events)."""
     if tau <= 0:
         x = (x[0], x[1], drive - a_emf * (x[4] if c[TWO] > 0 else x[1]), x[3], x[4])
         if m[0] == 0 and _violation(3, c, on, p, lawful, t, x, m) > 0:
@@ -411,10 +412,10 @@ def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
             else:
                 m = m_new
             if events > 4 * RELEASE_LIMIT:
-                return (x[0], 0.0, x[2], x[3], 0.0), (0, m[1], m[2], 0, m[4])
+                return (x[0], 0.0, x[2], x[3], 0.0), (0, m[1], m[2], 0, m[4]), events
         t += first
         left -= first
-    return x, m
+    return x, m, events
 
 
 @njit(nogil=True)
@@ -580,7 +581,8 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
 
     ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
     hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
-    (effects,) is true where an effect with a law acts; ``refine`` divides the segments.
+    (effects,) is true where an effect with a law acts; ``refine`` divides the segments. A motion that runs away, or chatters
+    beyond EVENT_BUDGET, is NaN from there on.
     """
     n = t.size
     lawful, two = on.any(), c[TWO] > 0
@@ -596,6 +598,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     if two or lawful:
         h_max = min(h_max, last / refine)
     corner = CORNER * (c[C_1] + c[C_PLUS]) * h0
+    budget = EVENT_BUDGET * n + 1000
     x = (x0[0], x0[1], x0[2], x0[0], x0[1] if two else 0.0)
     m = _start_mode(c, on, p, lawful, t[0], x)
     for k in range(n):
@@ -654,11 +657,13 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                         continue
             c[BIAS] = bias + load[k]
             if enable[k]:
-                x, m = _advance(c, on, p, lawful, now, x, m, drive, tau, a_emf, h, h_max, corner)
+                x, m, events = _advance(c, on, p, lawful, now, x, m, drive, tau, a_emf, h, h_max, corner)
             else:
-                x, m = _advance(c, on, p, lawful, now, (x[0], x[1], 0.0, x[3], x[4]), m, 0.0, 0.0, 0.0, h, h_max, corner)
+                x, m, events = _advance(c, on, p, lawful, now, (x[0], x[1], 0.0, x[3], x[4]), m, 0.0, 0.0, 0.0, h, h_max,
+                                        corner)
             c[BIAS] = bias
-        if not (abs(x[0]) < 1e12):
+            budget -= events
+        if not (abs(x[0]) < 1e12) or budget < 0:
             out[k + 1:, :] = np.nan
             return
 

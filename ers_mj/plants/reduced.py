@@ -58,7 +58,8 @@ class ReducedModel:
             c = effect.coefficients(values, c)
             if effect.torque or effect.friction:
                 on[ROW[name]] = True
-                p[ROW[name], :len(values)] = values
+                constants = effect.constants(values, c)
+                p[ROW[name], :len(constants)] = constants
         object.__setattr__(self, "_lowered", (np.array(c, float), on, p))
 
     def terminal(self, u: np.ndarray) -> np.ndarray:

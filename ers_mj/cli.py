@@ -1,0 +1,86 @@
+"""The command line `ers`: one parser, one file a command in `commands/`, bad input in one sentence."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+from ers_mj import __version__
+from ers_mj.commands import COMMANDS
+from ers_mj.errors import InputError
+
+DONE, CHECK_FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 130
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that raises InputError instead of printing its usage and leaving."""
+
+    def __init__(self, **settings):
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **settings)
+
+    def error(self, message: str) -> None:
+        raise InputError(f"{message} (see {self.prog} --help)")
+
+    def _check_value(self, action: argparse.Action, value: object) -> None:
+        if action.choices is not None and value not in action.choices:
+            near = get_close_matches(str(value), list(action.choices), n=1, cutoff=0.6)
+            hint = f"did you mean {near[0]}? " if near else ""
+            what = "command" if isinstance(action, argparse._SubParsersAction) else "/".join(action.option_strings)
+            self.error(f"there is no {what} {str(value)[:40]!r}; {hint}there are {', '.join(action.choices)}")
+
+
+def build_parser() -> Parser:
+    """The whole command line."""
+    parser = Parser(
+        prog="ers",
+        description="Finds, names and models the physics that a servo simulation leaves out.",
+        epilog="example: ers diagnose run1.csv run2.csv --datasheet table1 --holdout run3.csv",
+    )
+    parser.add_argument("--version", action="version", version=f"ers {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
+    for command in COMMANDS:
+        command.add_parser(commands)
+    return parser
+
+
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """The arguments of one call. In `--holdout H A B` without other recordings, A and B are the recordings.
+
+    Raises:
+        InputError: argv is no call of ers.
+    """
+    try:
+        return build_parser().parse_args(argv)
+    except InputError as error:
+        if "--holdout" not in argv or "required: REC" not in str(error):
+            raise
+        return build_parser().parse_args(_recordings_first(list(argv)))
+
+
+def _recordings_first(argv: list[str]) -> list[str]:
+    """argv with what follows the last `--holdout H` moved to the place of the recordings."""
+    begin = len(argv) - argv[::-1].index("--holdout") + 1
+    end = next((k for k in range(begin, len(argv)) if argv[k].startswith("-")), len(argv))
+    return [argv[0], *argv[begin:end], *argv[1:begin], *argv[end:]]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; the exit code: 0 done, 1 a check failed, 2 bad input, 130 interrupted."""
+    for stream in (sys.stdout, sys.stderr):  # a terminal without a degree sign gets a question mark
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    try:
+        arguments = parse(list(sys.argv[1:] if argv is None else argv))
+        return arguments.run(arguments)
+    except InputError as error:
+        print(f"ers: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("ers: stopped, nothing was written", file=sys.stderr)
+        return STOPPED
+    except BrokenPipeError:  # the reader of our output has left
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE

@@ -1,0 +1,8 @@
+"""The commands of `ers`: one file each, with `add_parser(commands)` and `run(arguments) -> exit code`.
+
+What is slow to import is imported inside `run`, so that `ers --help` is quick.
+"""
+
+from ers_mj.commands import demo, diagnose, simulate
+
+COMMANDS = (demo, diagnose, simulate)

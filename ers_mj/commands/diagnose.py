@@ -1,0 +1,171 @@
+"""`ers diagnose`: locate, name, model and show what a simulation of the recordings leaves out."""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ers_mj.commands.options import add_common, add_out, mapping, pair, results_folder
+from ers_mj.commands.output import Progress, as_json, bold, plain, write_results
+from ers_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from ers_mj.datasheet import Datasheet
+    from ers_mj.recording import Recording
+
+FITS = (("training", "train"), ("held out", "heldout"), ("recalibrated", "recalibrated"))
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    """Add this command to the command line."""
+    parser = commands.add_parser(
+        "diagnose", help="find, name and model the missing physics",
+        description="Diagnose a servo from recordings: what did its simulation leave out?",
+        epilog="examples:\n  ers diagnose run1.csv run2.csv --datasheet servo.toml --holdout run3.csv\n"
+               "  ers diagnose runs.parquet#run=17 --map t_s=Time --map theta_deg=Angle --json")
+    parser.add_argument("recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several")
+    parser.add_argument("--datasheet", metavar="TOML", help="what is known of the servo; table1 is the paper's (default: nothing)")
+    parser.add_argument("--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable")
+    parser.add_argument("--map", type=pair, action="append", default=[], metavar="name=column",
+                        help="take the column as this name, as in t_s=Time; repeatable")
+    add_out(parser)
+    add_common(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, diagnose, write, tell; 0 whatever the verdict."""
+    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    names = mapping(arguments.map)
+    from ers_mj.datasheet import read_datasheet
+    from ers_mj.recording import read_recording
+
+    datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
+    recordings = [read_recording(spec, names) for spec in arguments.recordings]
+    holdout = [read_recording(spec, names) for spec in arguments.holdout]
+    return diagnose_and_tell(recordings, holdout, datasheet, folder, arguments)
+
+
+def diagnose_and_tell(recordings: list[Recording], holdout: list[Recording], datasheet: Datasheet | None,
+                      folder: Path | None, arguments: argparse.Namespace) -> int:
+    """The part that `diagnose` and `demo` share: from recordings to files and words."""
+    refuse_twice(recordings, holdout)
+    refuse_mixed_units([*recordings, *holdout])
+    from ers_mj import diagnosis
+
+    with Progress() as progress:
+        found = diagnosis.diagnose(recordings, datasheet, holdout, seed=arguments.seed, jobs=arguments.jobs, progress=progress)
+        document = plain(found.document)
+        files = _write(folder, document, found, progress) if folder is not None else []
+    print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
+    return 0
+
+
+def _write(folder: Path, document: dict, found: object, progress: Progress) -> list[Path]:
+    from ers_mj.datasheet import write_model
+    from ers_mj.report import report_page
+
+    progress("drawing the report", 1.0)
+    page = report_page(document, found.evidence)
+    return write_results(folder, {
+        "diagnosis.json": lambda path: _text(path, as_json(document) + "\n"),
+        "report.html": lambda path: _text(path, page),
+        "model.toml": lambda path: write_model(path, found.model),
+    })
+
+
+def _text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+# -- what cannot be diagnosed together --------------------------------------------------------------------------
+
+
+def refuse_twice(recordings: list[Recording], holdout: list[Recording]) -> None:
+    """Raise InputError where one recording, by its content, is given twice or both trained and held out."""
+    first: dict[tuple[str, str], str] = {}
+    trained = {_identity(recording) for recording in recordings}
+    for recording, held_out in [*((r, False) for r in recordings), *((r, True) for r in holdout)]:
+        key = _identity(recording)
+        if held_out and key in trained:
+            raise InputError(f"{recording.name}: is held out and also among the training recordings "
+                             f"(as {first[key]}), a recording cannot judge what it taught")
+        if key in first:
+            raise InputError(f"{recording.name}: is the same recording as {first[key]}, give it once")
+        first[key] = recording.name
+
+
+def _identity(recording: Recording) -> tuple[str, str]:
+    """Content and run."""
+    return recording.sha256, recording.name.partition("#run=")[2]
+
+
+def refuse_mixed_units(recordings: list[Recording]) -> None:
+    """Raise InputError where outputs or inputs are not all of one unit."""
+    for noun, attribute in (("output", "output_unit"), ("input", "input_unit")):
+        units = Counter(getattr(recording, attribute) for recording in recordings)
+        if len(units) > 1:
+            common = units.most_common(1)[0][0]
+            odd = next(r for r in recordings if getattr(r, attribute) != common)
+            other = next(r for r in recordings if getattr(r, attribute) == common)
+            raise InputError(f"{odd.name}: its {noun} is in {getattr(odd, attribute)} and that of {other.name} in {common}, "
+                             "recordings of one unit were expected")
+
+
+# -- the diagnosis in lines ---------------------------------------------------------------------------------------
+
+
+def _told(document: dict, files: list[Path]) -> list[str]:
+    """What a terminal shows when all is done."""
+    verdict = document.get("verdict") or "no verdict"
+    lines = ["", f"{bold(verdict.upper())} ({verdict})", str(document.get("sentence") or ""), ""]
+    lines += _told_fit(document)
+    lines += _told_effects(document)
+    where = [entry.get("sentence") for entry in document.get("where") or [] if entry.get("sentence")]
+    lines += _section("where", where[:3])
+    state = [entry.get("sentence") for entry in document.get("record_state") or [] if entry.get("sentence")]
+    lines += _section("differs between recordings", state)
+    lines += _section("problems in the data", [str(problem) for problem in (document.get("data") or {}).get("problems") or []][:6])
+    following = (document.get("next_recording") or {}).get("sentence")
+    lines += _section("record next", [following] if following else [])
+    return lines + _section("written", [str(path) for path in files])
+
+
+def _section(title: str, sentences: list[str]) -> list[str]:
+    return [bold(title), *(f"  {sentence}" for sentence in sentences), ""] if sentences else []
+
+
+def _told_fit(document: dict) -> list[str]:
+    """The three fit numbers, before and after, as a table."""
+    from ers_mj.display import shown
+
+    fit, unit = document.get("fit") or {}, (document.get("data") or {}).get("output_unit")
+    unit = shown(unit, fit.get("heldout_rmse_before_rad"))
+    lines = [bold(f"{'free-run error [' + unit.label + ']':24}{'before':>12}{'after':>12}")]
+    for title, key in FITS:
+        before, after = (unit.bare(fit.get(f"{key}_rmse_{when}_rad")) for when in ("before", "after"))
+        lines.append(f"  {title:22}{before:>12}{after:>12}")
+    return [*lines, f"  {'noise floor':22}{unit.bare(fit.get('noise_floor_rad')):>12}", ""]
+
+
+def _told_effects(document: dict) -> list[str]:
+    from ers_mj.display import shown
+
+    lines = []
+    for effect in document.get("missing") or []:
+        lines.append(f"  {bold(str(effect.get('effect')))} ({effect.get('subsystem')}): {effect.get('sentence')}")
+        for name, entry in (effect.get("parameters") or {}).items():
+            unit = shown(entry.get("unit"), entry.get("value"))
+            lines.append(f"    {name:10}{unit(entry.get('value')):>16}{_told_interval(entry, unit)}")
+        if others := [str(other.get("effect")) for other in effect.get("alternatives") or []]:
+            lines.append(f"    not excluded: {', '.join(others)}")
+    return [bold("missing physics"), *lines, ""] if lines else []
+
+
+def _told_interval(entry: dict, unit: object) -> str:
+    from ers_mj.display import NONE, interval
+
+    told = interval(entry.get("ci95"), unit)
+    return "" if told == NONE else f"   (95 %: {told})"

@@ -1,0 +1,110 @@
+"""Options that several commands share, and the checks on them."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+from pathlib import Path
+
+from ers_mj.errors import InputError
+
+DEFAULT_OUT = "ers-out"
+
+
+def number(least: float | None = None, above: float | None = None):
+    """A type for argparse: a finite number, not below `least`, above `above`."""
+
+    def parse(text: str) -> float:
+        try:
+            x = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+        if not math.isfinite(x):
+            raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+        if least is not None and x < least:
+            raise argparse.ArgumentTypeError(f"{text} is below {least:g}")
+        if above is not None and x <= above:
+            raise argparse.ArgumentTypeError(f"{text} is not above {above:g}")
+        return x
+
+    return parse
+
+
+def whole(least: int):
+    """A type for argparse: a whole number of at least `least`."""
+
+    def parse(text: str) -> int:
+        try:
+            x = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if not least <= x < 2**63:
+            raise argparse.ArgumentTypeError(f"{text} is not between {least} and 2^63")
+        return x
+
+    return parse
+
+
+def pair(text: str) -> tuple[str, str]:
+    """A type for argparse: name=column."""
+    name, mark, column = text.partition("=")
+    if not mark or not name or not column:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form name=column, as in t_s=Time")
+    return name, column
+
+
+def add_out(parser: argparse.ArgumentParser) -> None:
+    """--out DIR and --force."""
+    parser.add_argument("--out", metavar="DIR", help=f"folder for the results (default {DEFAULT_OUT}/)")
+    parser.add_argument("--force", action="store_true", help="write into a named folder that holds files already")
+
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """--seed, --jobs and --json."""
+    parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of everything drawn by chance (default 0)")
+    parser.add_argument("--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N", help="cores to use (default all)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
+
+
+def mapping(pairs: list[tuple[str, str]]) -> dict[str, str]:
+    """--map as a dictionary.
+
+    Raises:
+        InputError: a name is mapped twice.
+    """
+    chosen = dict(pairs)
+    if len(chosen) < len(pairs):
+        twice = next(name for name, _ in pairs if [n for n, _ in pairs].count(name) > 1)
+        raise InputError(f"--map gives {twice} twice, one column was expected")
+    return chosen
+
+
+def results_folder(out: str | None, force: bool, as_json: bool) -> Path | None:
+    """The folder that results will go to, checked before any work starts; None where no file is to be written.
+
+    Raises:
+        InputError: the folder is a file, cannot be written, or was named and holds files.
+    """
+    if out is None and as_json:
+        return None
+    folder = Path(DEFAULT_OUT if out is None else out)
+    if out == "":
+        raise InputError("--out is empty, a folder was expected")
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is a file, --out needs a folder")
+    refuse_unwritable(folder)
+    if out is not None and not force and folder.is_dir() and any(folder.iterdir()):
+        raise InputError(f"{folder}: holds files already, give --force to write into it or name another folder")
+    return folder
+
+
+def refuse_unwritable(path: Path) -> None:
+    """Raise InputError where `path` cannot be made: its nearest existing parent is a file or is locked."""
+    parent = path.absolute()
+    while not parent.exists():
+        parent = parent.parent
+    if not parent.is_dir() and parent != path.absolute():
+        raise InputError(f"{path}: cannot be made, {parent} is a file")
+    if not os.access(parent, os.W_OK):
+        raise InputError(f"{path}: cannot be written, {parent} is read-only")

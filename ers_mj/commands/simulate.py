@@ -1,0 +1,149 @@
+"""`ers simulate`: a recording with known truth."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ers_mj.commands.options import number, refuse_unwritable, whole
+from ers_mj.commands.output import as_json
+from ers_mj.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+PLANTS, LINKAGES = ("reduced", "mujoco"), ("constant", "rod")
+OTHER_FORMATS = (".parquet", ".mat", ".h5", ".hdf5", ".npz", ".json", ".toml")
+MOST_SAMPLES = 20_000_000
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    """Add this command to the command line."""
+    parser = commands.add_parser(
+        "simulate", help="write a recording with known truth", description="Simulate a servo: a recording with known truth.",
+        epilog="examples:\n  ers simulate --plant reduced --input steps --effect stribeck:dF_s=0.1,v_s=0.2 --noise-deg 0.01 --out rec.csv\n"
+               "  ers simulate model.toml --plant reduced --input volts.csv --out rec.csv")
+    parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)")
+    parser.add_argument("--plant", choices=PLANTS, default="reduced", help="what to simulate (default reduced)")
+    parser.add_argument("--input", required=True, metavar="CSV|NAME", help="columns t_s,u_V, or multisine, chirp, ramp, steps, square")
+    parser.add_argument("--gap", type=number(least=0), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
+    parser.add_argument("--linkage", choices=LINKAGES, default="constant", help="of the rudder (default constant)")
+    parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
+    parser.add_argument("--effect", action="append", default=[], metavar="NAME:key=value,...", help="physics to add, SI; repeatable")
+    parser.add_argument("--noise-deg", type=number(least=0), default=0.0, metavar="X", help="sensor noise, standard deviation [deg]")
+    parser.add_argument("--rate-hz", type=number(above=0), metavar="N", help="sample rate of a named input (default 1000)")
+    parser.add_argument("--duration", type=number(above=0), metavar="S", help="of a named input [s] (default 10)")
+    parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of the noise (default 0)")
+    parser.add_argument("--out", required=True, metavar="FILE", help="the CSV file to write")
+    parser.add_argument("--force", action="store_true", help="overwrite FILE")
+    parser.add_argument("--json", action="store_true", help="print a summary as one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate and write; 0."""
+    out = _checked_out(arguments)
+    _refuse_not_yet(arguments)
+    from ers_mj.datasheet import read_datasheet
+    from ers_mj.recording import write_recording
+    from ers_mj.simulation import parse_effect, simulate_recording
+
+    datasheet = read_datasheet(arguments.model)
+    effects = [parse_effect(text) for text in arguments.effect]
+    t, u = _input(arguments)
+    columns = simulate_recording(
+        datasheet, t, u, effects=effects, noise=math.radians(arguments.noise_deg), seed=arguments.seed,
+        gap=math.radians(arguments.gap), inductance=arguments.inductance == "on")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_recording(out, columns)
+    summary = _summary(arguments, columns, [*datasheet.effects, *effects])
+    print(as_json(summary) if arguments.json else _told(summary))
+    return 0
+
+
+def _checked_out(arguments: argparse.Namespace) -> Path:
+    """The file to write, checked before any work starts."""
+    out = Path(arguments.out)
+    if not arguments.out or out.is_dir():
+        raise InputError(f"--out {arguments.out or 'is empty'}: a file was expected, as in --out rec.csv")
+    if out.suffix.lower() in OTHER_FORMATS:
+        raise InputError(f"{out}: the file name ends in {out.suffix!r}, simulate writes .csv")
+    if out.exists() and not arguments.force:
+        raise InputError(f"{out}: exists already, give --force to overwrite it")
+    refuse_unwritable(out)
+    return out
+
+
+def _refuse_not_yet(arguments: argparse.Namespace) -> None:
+    if arguments.plant != "reduced":
+        raise InputError(f"--plant {arguments.plant}: does not exist yet, the one plant is reduced")
+    if arguments.linkage != "constant":
+        raise InputError(f"--linkage {arguments.linkage}: does not exist yet, the one linkage is constant")
+
+
+def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
+    """Time and voltage, of a name or of a file."""
+    import numpy as np
+
+    from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
+
+    if arguments.input not in INPUTS:
+        for option, value in (("--rate-hz", arguments.rate_hz), ("--duration", arguments.duration)):
+            if value is not None and Path(arguments.input).exists():
+                raise InputError(f"{option} is for named inputs ({', '.join(INPUTS)}), the file brings its own times")
+        return read_input(arguments.input)
+    rate, duration = arguments.rate_hz or RATE_HZ, arguments.duration or DURATION
+    if not 2 <= rate * duration <= MOST_SAMPLES:
+        raise InputError(f"{duration:g} s at {rate:g} Hz are {rate * duration:.3g} samples, 2 to {MOST_SAMPLES:.0e} were expected")
+    t = np.arange(round(rate * duration)) / rate
+    return t, INPUTS[arguments.input](t)
+
+
+def read_input(path: str) -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and voltage [V], each (N,), of a CSV or Parquet file with the columns t_s and u_V.
+
+    Raises:
+        InputError: the file is no such thing, in one sentence.
+    """
+    import numpy as np
+
+    from ers_mj import recording
+    from ers_mj.plants.inputs import INPUTS
+
+    file = Path(path)
+    if not file.exists() and not file.suffix:
+        raise InputError(f"--input {path}: there is no such file and no input of that name; there are {', '.join(INPUTS)}")
+    table = recording._table(recording._content(file), file.suffix.lower(), file.name)
+    columns = []
+    for label in ("t_s", "u_V"):
+        if label not in table.column_names:
+            raise InputError(f"{file.name}: there is no column {label}, the columns are {', '.join(table.column_names)[:400]}")
+        x = recording._numbers(table[label], label, file.name)
+        if not np.isfinite(x).all():
+            row = 1 + int(np.argmax(~np.isfinite(x)))
+            raise InputError(f"{file.name}: {label} is missing or infinite in data row {row}, an input has no holes")
+        columns.append(x)
+    if columns[0].size < 2:
+        raise InputError(f"{file.name}: has {columns[0].size} samples, at least 2 are needed")
+    recording._refuse_time(columns[0], "t_s", file.name)
+    return columns[0], columns[1]
+
+
+def _summary(arguments: argparse.Namespace, columns: dict, effects: list) -> dict:
+    t, theta = columns["t_s"], columns["theta_rad"]
+    if arguments.gap:
+        effects = [*effects, ("backlash", {"gap": math.radians(arguments.gap)})]
+    return {"out": arguments.out, "plant": arguments.plant, "linkage": arguments.linkage, "input": arguments.input,
+            "inductance": arguments.inductance == "on", "gap_rad": math.radians(arguments.gap), "samples": int(t.size),
+            "duration_s": float(t[-1] - t[0]), "noise_rad": math.radians(arguments.noise_deg), "seed": arguments.seed,
+            "effects": [{"name": name, "parameters": dict(values)} for name, values in effects],
+            "theta_rms_rad": float(theta.std()), "theta_min_rad": float(theta.min()), "theta_max_rad": float(theta.max())}
+
+
+def _told(summary: dict) -> str:
+    effects = ", ".join(effect["name"] for effect in summary["effects"]) or "no effect"
+    low, high = math.degrees(summary["theta_min_rad"]), math.degrees(summary["theta_max_rad"])
+    return (f"{summary['out']}: {summary['samples']} samples over {summary['duration_s']:.4g} s, "
+            f"{low:.1f} to {high:.1f} deg, {effects}")

@@ -1,0 +1,106 @@
+"""Recordings as a fit sees them: noise level, time blocks, initial state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+BLOCK = 0.25  # [s]
+START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
+START_SAMPLES = 10
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, and the state it starts in."""
+
+    name: str
+    t: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+    valid: np.ndarray
+    enable: np.ndarray | None
+    load: np.ndarray | None
+    sigma: float
+    quantum: float
+    start: tuple[float, float]
+    block: np.ndarray
+    counts: np.ndarray
+
+    @property
+    def sample_time(self) -> float:
+        """Median step [s]."""
+        return float(np.median(np.diff(self.t)))
+
+    def part(self, begin: int, end: int) -> Trace:
+        """Samples begin..end as a trace of their own."""
+        cut = slice(begin, end)
+        pick = lambda a: None if a is None else a[cut]  # noqa: E731
+        return make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
+                          pick(self.load), self.sigma, self.quantum)
+
+
+def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
+    """A trace with its blocks of BLOCK seconds and its initial state."""
+    block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
+    counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
+    observed = np.where(valid, y, np.nan)
+    n = start_samples(t)
+    start = parabola_start(t[:n], observed[:n])
+    return Trace(name, t, u, observed, valid, enable, load, sigma, quantum, start, block, counts)
+
+
+def start_samples(t: np.ndarray) -> int:
+    """Number of samples that an initial state is taken from: 50 ms or 10 samples, whichever is longer."""
+    return min(max(START_SAMPLES, int(np.searchsorted(t, t[0] + START))), t.size)
+
+
+def parabola_start(t: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """(output, speed) at the first sample by a parabola through the samples (N,) given; a speed within 3 sigma of 0 is 0."""
+    known = np.isfinite(y)
+    if known.sum() < 5:
+        return (float(y[known][0]) if known.any() else 0.0), 0.0
+    s, v = (t[known] - t[0]) / (t[-1] - t[0]), y[known]
+    design = np.vander(s, 3, increasing=True)
+    coefficient, *_ = np.linalg.lstsq(design, v, rcond=None)
+    spread = np.std(v - design @ coefficient, ddof=3)
+    error = spread * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+    if abs(coefficient[1]) <= 3 * error:
+        return float(np.mean(v)), 0.0
+    return float(coefficient[0]), float(coefficient[1] / (t[-1] - t[0]))
+
+
+def noise_sigma(y: np.ndarray, quantum: float) -> float:
+    """Noise of a record (N,): third differences over sqrt(20), their median (or trimmed rms on a lattice), at least q / sqrt(12)."""
+    d = np.abs(np.diff(y, 3))
+    d = d[np.isfinite(d)]
+    if d.size == 0:
+        return 1e-9 * float(np.nanstd(y)) + 1e-300
+    spread = 1.4826 * float(np.median(d)) / math.sqrt(20.0)
+    if quantum > 0:  # the median of a few counts is itself a count
+        spread = max(spread, math.sqrt(float(np.mean(d[d <= 4 * (spread * math.sqrt(20.0) + quantum)] ** 2)) / 20.0))
+    return max(spread, quantum / math.sqrt(12.0), 1e-9 * float(np.nanstd(y)) + 1e-300)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Block bookkeeping over several traces: index of each sample (N,), samples in each block (B,)."""
+
+    index: np.ndarray
+    counts: np.ndarray
+
+    @staticmethod
+    def of(traces: Sequence[Trace]) -> Blocks:
+        index, counts, base = [], [], 0
+        for trace in traces:
+            index.append(trace.block + base)
+            counts.append(trace.counts)
+            base += trace.counts.size
+        return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0))
+
+    def misfit(self, e: np.ndarray) -> np.ndarray:
+        """Mean squared residual (in sigmas) of each block."""
+        return np.bincount(self.index, e * e, self.counts.size) / self.counts
