@@ -195,6 +195,11 @@ def score(misfit: np.ndarray, tau: float) -> np.ndarray:
     return np.log((tau + misfit) / (1.0 + tau))
 
 
+def tau_of(misfit: np.ndarray) -> float:
+    """The misfit at which C turns from squares to logarithms: a tenth of the median, never below the noise."""
+    return max(1.0, 0.1 * float(np.median(misfit)))
+
+
 def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25) -> Fit:
     """Minimise C over the model's free numbers, from the model's own values.
 
@@ -235,7 +240,7 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
     jacobian, fresh = None, False
     for _ in range(steps):
         if jacobian is None:
-            jacobian, fresh = _jacobian(model, layout, z, e, traces, rate), True
+            jacobian, fresh = jacobian_of(model, layout, z, e, traces, rate), True
             calls += z.size
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
         weighted = jacobian * weight[:, None]
@@ -272,7 +277,7 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
     return Fit(model.at(layout, z), cost, m, hessian, calls)
 
 
-def _jacobian(model, layout, z, e, traces, rate):
+def jacobian_of(model, layout, z, e, traces, rate):
     """Finite differences of the residuals e (N,) by the fitted numbers: (N, k)."""
     jacobian = np.empty((e.size, z.size))
     for k in range(z.size):

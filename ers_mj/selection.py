@@ -8,14 +8,14 @@ does not rest on a model of the noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
-from ers_mj.identification import OBSERVER_RATE, Fit, Model, _jacobian, fit, residuals, score
+from ers_mj.identification import OBSERVER_RATE, STATES, Fit, fit, jacobian_of, residuals, score, tau_of
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 0.02  # decrease of C per block that an effect must buy: an error of about 0.2 sigma RMS
@@ -23,7 +23,7 @@ LEAST_Z = 2.0  # and the paired z-score of that decrease over the blocks
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
 FINISHED = 3  # of those, how many are fitted to the end
-MOST_EFFECTS = 4
+MOST_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def screen(base: Fit, traces: Sequence[Trace], tau: float, exclude: Sequence[str
     e = residuals(model, traces, OBSERVER_RATE)
     m = blocks.misfit(e)
     root = np.sqrt(2.0 / ((tau + m) * blocks.counts))[blocks.index]
-    basis, _ = np.linalg.qr(_jacobian(model, layout, z, e, traces, OBSERVER_RATE) * root[:, None])
+    basis, _ = np.linalg.qr(jacobian_of(model, layout, z, e, traces, OBSERVER_RATE) * root[:, None])
     target = root * e
     target = target - basis @ (basis.T @ target)
     found = []
@@ -83,53 +83,61 @@ def screen(base: Fit, traces: Sequence[Trace], tau: float, exclude: Sequence[str
     return [(name, [start for _, start in tried[:BY_NAME[name].tries]]) for name, tried in found]
 
 
-def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str]) -> list[Candidate]:
-    """The promising effects, each refitted with the whole baseline, best first."""
-    ranked = screen(base, traces, tau, exclude)[:REFITTED]
+def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str],
+               anchors: Sequence[Mapping[str, float]] = ()) -> list[Candidate]:
+    """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first."""
+    reference = float(score(base.misfit, tau).sum())
 
     def quick(item):
         name, starts = item
-        fits = [fit(base.model.with_effect(name, start), traces, tau=tau, steps=6) for start in starts]
-        return name, min(fits, key=lambda f: f.cost)
+        if name in STATES:
+            return name, fit(base.model.with_state(name, len(traces)), traces, tau=tau, steps=6)
+        models = [base.model.with_effect(name, start) for start in starts]
+        models += [replace(models[0], values={**models[0].values, **values}) for values in anchors]
+        return name, min((fit(model, traces, tau=tau, steps=6) for model in models), key=lambda f: f.cost)
 
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20)
 
+    states = [(s, []) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     with ThreadPoolExecutor(jobs) as pool:
-        rough = sorted(pool.map(quick, ranked), key=lambda item: item[1].cost)
+        rough = sorted(pool.map(quick, screen(base, traces, tau, exclude)[:REFITTED] + states), key=lambda item: item[1].cost)
         done = list(pool.map(finish, rough[:FINISHED])) + rough[FINISHED:]
-    out = [Candidate(name, f, base.cost - f.cost, paired_z(f.misfit, base.misfit, tau)) for name, f in done]
+    out = [Candidate(name, f, reference - float(score(f.misfit, tau).sum()), paired_z(f.misfit, base.misfit, tau)) for name, f in done]
     return sorted(out, key=lambda c: -c.worth)
 
 
 @dataclass(frozen=True)
 class Selection:
-    """The chosen model, the baseline it grew from, and each round's candidates."""
+    """The chosen model, the baseline it grew from, each round's candidates, and the tau at which the last was judged."""
 
     base: Fit
     chosen: Fit
     rounds: tuple[tuple[Candidate, ...], ...]
+    tau: float
 
 
-def select(base: Fit, traces: Sequence[Trace], *, tau: float = 1.0, jobs: int = 1,
-           progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
-    """Grow the model effect by effect while the data asks for it, dropping what later effects make needless."""
-    current, rounds = base, []
-    blocks = base.misfit.size
-    while len(current.model.effects) < MOST_EFFECTS and current.cost > LEAST_GAIN * blocks:
-        progress(f"round {len(rounds) + 1}: comparing effects", 0.2 + 0.15 * len(rounds))
-        ranked = candidates(current, traces, tau, jobs, current.model.names)
+def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str, float]] = (), exclude: Sequence[str] = (),
+           jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
+    """Grow the model while the data asks for it, dropping what later additions make needless."""
+    current, rounds, blocks = base, [], base.misfit.size
+    tau = tau_of(base.misfit)
+    while len(rounds) < MOST_ROUNDS and float(score(current.misfit, tau).sum()) > LEAST_GAIN * blocks:
+        progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
+        ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else ())
         rounds.append(tuple(ranked))
         if not ranked or ranked[0].gain < LEAST_GAIN * blocks or ranked[0].z < LEAST_Z:
             break
-        current = _pruned(ranked[0].fit, traces, tau, blocks)
-    return Selection(base, current, tuple(rounds))
+        current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
+        tau = tau_of(current.misfit)
+        current = fit(current.model, traces, tau=tau, steps=20)
+    return Selection(base, current, tuple(rounds), tau)
 
 
-def _pruned(current: Fit, traces: Sequence[Trace], tau: float, blocks: int) -> Fit:
+def _pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> Fit:
     """Without the earlier effects that no longer pay."""
-    for name in current.model.names[:-1]:
+    for name in (n for n in current.model.names if n != newest):
         without = fit(current.model.without_effect(name), traces, tau=tau, steps=12)
-        if without.cost - current.cost < LEAST_GAIN * blocks:
+        if without.cost - current.cost < LEAST_GAIN * current.misfit.size:
             current = without
     return current

@@ -1,0 +1,134 @@
+"""The baseline: Eq. (1) where the datasheet gives L, else Eq. (5), its identifiable parameters refitted to the recordings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.datasheet import Datasheet
+from ers_mj.effects import BY_NAME
+from ers_mj.effects.base import Scales
+from ers_mj.errors import InputError
+from ers_mj.guess import guesses
+from ers_mj.identification import Fit, Model, descend, fit, tau_of, with_starts
+from ers_mj.traces import Trace
+
+SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
+OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
+STARTS = 6  # guesses that are refitted
+SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
+
+
+def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bool, tau_e: float | None) -> Scales:
+    """Typical sizes in these recordings."""
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    low, high = float(y.min()), float(y.max())
+    lags = [max(1, round(0.02 / t.sample_time)) for t in traces]
+    speeds = np.concatenate([np.abs(t.y[k:] - t.y[:-k]) / (k * t.sample_time) for t, k in zip(traces, lags)])
+    peak = max(float(np.max(np.abs(t.u))) for t in traces)
+    return Scales(position=0.5 * (high - low), low=low, high=high, speed=float(np.nanquantile(speeds, 0.95)) + 1e-12,
+                  acceleration=max(values.get("c_2", 0.0), 0.05 * abs(values["b"]) * peak), input=peak,
+                  sample_time=float(np.median([t.sample_time for t in traces])),
+                  noise=float(np.median([t.sigma for t in traces])), quantum=max(t.quantum for t in traces),
+                  is_angle=is_angle, tau_e_datasheet=tau_e)
+
+
+@dataclass(frozen=True)
+class Start:
+    """The refitted baseline, the traces with their fitted initial states, and other values that fits may start from."""
+
+    fit: Fit
+    traces: list[Trace]
+    anchors: tuple[Mapping[str, float], ...] = ()
+
+
+def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool) -> Start:
+    """The refitted baseline of these recordings.
+
+    Raises:
+        InputError: no motion of the model resembles the recordings.
+    """
+    known = datasheet.to_lumped() if datasheet is not None else {}
+    if {"a_2", "b"} <= known.keys():
+        found = Start(*_refined(_from_datasheet(traces, known, is_angle), traces))
+    else:
+        found = _from_scratch(traces, known, is_angle)
+    if not np.isfinite(found.fit.cost):
+        raise InputError("no motion that the reduced model can make resembles these recordings: check units and signs of input and output")
+    return found
+
+
+def _refined(model: Model, traces: Sequence[Trace]) -> tuple[Fit, list[Trace]]:
+    """Fit, with the initial states fitted before and after."""
+    traces = with_starts(model, traces)
+    first = fit(model, traces)
+    traces = with_starts(first.model, traces)
+    return fit(first.model, traces, tau=tau_of(first.misfit)), traces
+
+
+def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> Model:
+    values = {"a_1": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0, **known}
+    scales = scales_of(traces, values, is_angle, values["tau_e"] or None)
+    values["c_2"] = max(values["c_2"], 1e-3 * scales.acceleration)
+    return Model(values, _free(values, traces), scales=scales, priors=_priors(values))
+
+
+def _free(values: Mapping[str, float], traces: Sequence[Trace]) -> tuple[str, ...]:
+    """What is fitted: springs only where there is one, the back-EMF's share only where current or an open circuit shows it."""
+    spring, preload = values["a_1"] > 0, values["c_1"] > 0
+    names = ["a_2", "b", "c_2", *(["a_1"] if spring else []), *(["c_1"] if preload else []),
+             *(["theta_0"] if spring or preload else [])]
+    opened = any(t.enable is not None and not t.enable.all() for t in traces)
+    if values["tau_e"] > 0:
+        names.append("tau_e")
+    if values["tau_e"] > 0 or opened:
+        names.append("emf_share")
+    return tuple(names)
+
+
+def _priors(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    return {"emf_share": (math.log(values["emf_share"]), SHARE_PRIOR)} if values["tau_e"] > 0 and values["emf_share"] > 0 else {}
+
+
+def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> Start:
+    """Several guesses, refitted as observers of falling gain; the simplest structure that the data supports.
+
+    Stops and one-sided friction disturb the search most, so both are tried as a scaffold that is taken away at the end: a spring
+    must beat one-sided friction to be kept, and what was found under the scaffold stays as an anchor for later fits.
+    """
+    opened = any(t.enable is not None and not t.enable.all() for t in traces)
+    starts = [{"tau_e": 0.0, "emf_share": 0.5 if opened else 0.0, **g, **known} for g in guesses(traces)]
+    scales = scales_of(traces, starts[0], is_angle, None)
+    stops = ("end_stop", BY_NAME["end_stop"].starts(scales)[-1])
+    sided = ("asymmetric_friction", BY_NAME["asymmetric_friction"].starts(scales)[0])
+    least = {"a_1": 1e-3 * scales.acceleration / scales.position, "c_1": 0.1 * scales.acceleration}
+    best = {"bare": _searched(traces, starts, scales, (), {}, ((), (stops,), (sided,))),
+            "spring": _searched(traces, starts, scales, ("a_1",), least, ((), (stops,))),
+            "preload": _searched(traces, starts, scales, ("a_1", "c_1"), least, ((), (stops,)))}
+    chosen, price = best["bare"], SUPPORT * best["bare"].misfit.size
+    for kind in ("spring", "preload"):
+        if chosen.cost - best[kind].cost > price:
+            chosen = best[kind]
+    scales = scales_of(traces, chosen.model.values, is_angle, None)
+    found, traces = _refined(replace(chosen.model, effects=(), scales=scales), traces)
+    return Start(found, traces, (dict(chosen.model.values),) if chosen.model.effects else ())
+
+
+def _searched(traces, starts, scales, springs, least, scaffolds) -> Fit:
+    """The best of the guesses with these spring terms, under the scaffold that serves it best."""
+    def prepared(values):
+        absent = {name: 0.0 for name in ("a_1", "c_1") if name not in springs}
+        return {**values, **{name: max(values[name], least[name]) for name in springs}, **absent}
+
+    pool = [v for v in starts if (v["c_1"] > 0) == ("c_1" in springs)] or starts
+    tries = []
+    for values in map(prepared, pool[:STARTS]):
+        for effects in scaffolds:
+            model = Model(values, _free(values, traces), effects=effects, scales=scales)
+            tries.append(descend(model, traces, OPENING_RATES[0], 1e3, 6, 1.0))
+    tries.sort(key=lambda f: f.cost)
+    finals = [fit(f.model, traces, rate=OPENING_RATES[1], steps=10) for f in tries[:2]]
+    return min(finals, key=lambda f: f.cost)

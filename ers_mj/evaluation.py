@@ -1,0 +1,108 @@
+"""The three fit numbers: free runs on the training data, on held-out data, and on held-out data after recalibration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.identification import OBSERVER_RATE, Fit, Model, fit, fitted_start, score
+from ers_mj.traces import Blocks, Trace
+
+RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
+LAST_PART = 0.7  # where the only recording is cut into training and held out
+
+
+@dataclass(frozen=True)
+class Score:
+    """Squared free-run error summed over samples, their number, and block misfits (B,) of the observer form."""
+
+    squares: float
+    samples: int
+    misfit: np.ndarray
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the free-run error [output unit]."""
+        return math.sqrt(self.squares / self.samples) if self.samples else math.nan
+
+
+def pooled(scores: Sequence[Score]) -> Score:
+    """One score of several recordings."""
+    return Score(sum(s.squares for s in scores), sum(s.samples for s in scores), np.concatenate([s.misfit for s in scores]))
+
+
+def free_run(model: Model, trace: Trace, record: int = 0) -> np.ndarray:
+    """Simulated output (N,) of a recording from its fitted initial state, nothing corrected on the way."""
+    return model.predict(trace, record, start=fitted_start(model, trace, record))
+
+
+def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0) -> Score:
+    """Score of a recording from sample ``begin`` on."""
+    e = np.where(trace.valid, trace.y - free_run(model, trace, record), 0.0)[begin:]
+    e = np.nan_to_num(e, nan=10 * float(np.nanstd(trace.y)))
+    local = np.where(trace.valid, (trace.y - model.predict(trace, record, OBSERVER_RATE)) / trace.sigma, 0.0)
+    return Score(float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)))
+
+
+def neutral(model: Model) -> Model:
+    """The model without record states: what a recording that was never seen gets."""
+    return replace(model, states=None)
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A held-out recording, and the training ones where the model must be refitted without it (None: it never saw it)."""
+
+    held_out: Trace
+    training: tuple[Trace, ...] | None
+
+
+def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold], str]:
+    """What is held out, and the sentence that says so."""
+    if holdout:
+        return [Fold(h, None) for h in holdout], "held-out recordings were opened after selection had ended"
+    if len(traces) > 1:
+        return ([Fold(out, tuple(t for t in traces if t is not out)) for out in traces],
+                "each recording was held out in turn while the parameters were refitted to the others; the structure was chosen on all")
+    cut = int(LAST_PART * traces[0].t.size)
+    return ([Fold(traces[0].part(cut, traces[0].t.size), (traces[0].part(0, cut),))],
+            "the last 30 % of the only recording was held out while the parameters were refitted; the structure was chosen on all of it")
+
+
+def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int, steps: int = 6) -> list[Model]:
+    """The model of each fold, refitted to its training recordings where it has some."""
+    def one(fold: Fold) -> Model:
+        return neutral(model) if fold.training is None else fit(neutral(model), fold.training, tau=tau, steps=steps).model
+
+    with ThreadPoolExecutor(jobs) as pool:
+        return list(pool.map(one, parts))
+
+
+def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, float]]:
+    """Gain, offset and friction level fitted on the first 30 % of a recording; the score is taken on the rest."""
+    cut = int(RECALIBRATED * trace.t.size)
+    head = trace.part(0, cut)
+    still = replace(neutral(model), free=(), frozen=model.names)
+    pair = still.with_state("gain", 2).with_state("friction_level", 2).with_state("offset", 2)
+    found = _state_fit(pair, head)
+    shifted = replace(pair, states={k: np.array([v[0], v[1]]) for k, v in found.model.states.items()})
+    return scored(shifted, trace, 1, cut), {k: float(v[1]) for k, v in found.model.states.items()}
+
+
+def _state_fit(pair: Model, head: Trace) -> Fit:
+    """Fit the second record's state: an empty first trace stands for the training recordings."""
+    blank = replace(head, valid=np.zeros(head.t.size, bool), y=head.y, counts=np.zeros_like(head.counts))
+    return fit(pair, [blank, head], steps=10)
+
+
+def paired_p(better: np.ndarray, worse: np.ndarray) -> float:
+    """One-sided p-value that ``better`` predicts held-out blocks no better than ``worse`` (paired z over blocks)."""
+    d = score(worse, 1.0) - score(better, 1.0)
+    spread = float(np.std(d, ddof=1)) if d.size > 1 else 0.0
+    if spread == 0.0:
+        return 1.0 if float(np.mean(d)) <= 0 else 0.0
+    return 0.5 * math.erfc(float(np.mean(d)) * math.sqrt(d.size) / spread / math.sqrt(2.0))

@@ -1,0 +1,206 @@
+"""Where does the refitted baseline fail? In time, angle, speed, direction, input level, frequency, and in which subsystem.
+
+The error that is located is that of a fast observer (LOCAL_RATE): it forgets within 1 / LOCAL_RATE, so that a force that was
+missing shows where it was missing and not where its effect on the angle ended.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import welch
+
+from ers_mj.evidence import ResidualMap
+from ers_mj.identification import Model
+from ers_mj.selection import Candidate
+from ers_mj.effects import BY_NAME
+from ers_mj.traces import Trace
+
+LOCAL_RATE = 30.0  # [1/s]
+BINS = 24
+LEAST_EXCESS = 0.2  # share of error minus share of time from which a region is worth a sentence
+
+
+@dataclass(frozen=True)
+class Samples:
+    """All valid samples of several recordings, each (N,): record, t, angle, speed, input, and two squared local errors."""
+
+    record: np.ndarray
+    t: np.ndarray
+    angle: np.ndarray
+    speed: np.ndarray
+    input: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(frozen=True)
+class Place:
+    """A region in which more of the squared error lives than its share of time."""
+
+    axis: str
+    region: tuple[float, float] | None
+    unit: str | None
+    label: str | None
+    share_of_error: float
+    share_of_time: float
+    sentence: str
+
+
+def smooth_speed(trace: Trace) -> np.ndarray:
+    """Speed (N,) [output unit / s] by differences over about 20 ms."""
+    k = max(1, round(0.01 / trace.sample_time))
+    y = np.interp(trace.t, trace.t[trace.valid], trace.y[trace.valid])
+    padded_y, padded_t = np.pad(y, k, mode="edge"), np.pad(trace.t, k, mode="edge")
+    return (padded_y[2 * k:] - padded_y[:-2 * k]) / np.maximum(padded_t[2 * k:] - padded_t[:-2 * k], 1e-12)
+
+
+def gather(before: Model, after: Model, traces: Sequence[Trace]) -> Samples:
+    """The samples that the localiser looks at."""
+    parts = []
+    for k, trace in enumerate(traces):
+        v = trace.valid
+        error = [np.nan_to_num((trace.y - model.predict(trace, k, LOCAL_RATE))[v]) ** 2 for model in (before, after)]
+        parts.append((np.full(v.sum(), k), trace.t[v], trace.y[v], smooth_speed(trace)[v], trace.u[v], *error))
+    return Samples(*(np.concatenate(column) for column in zip(*parts)))
+
+
+def _best_interval(values: np.ndarray, squares: np.ndarray, edges: np.ndarray):
+    """(low, high, share of error, share of samples) of the run of bins with the greatest excess of error over time."""
+    bins = np.clip(np.digitize(values, edges) - 1, 0, edges.size - 2)
+    error = np.bincount(bins, squares, edges.size - 1) / max(squares.sum(), 1e-300)
+    time = np.bincount(bins, minlength=edges.size - 1) / values.size
+    total = np.concatenate([[0.0], np.cumsum(error - time)])
+    excess = total[None, :] - total[:, None]
+    i, j = np.unravel_index(np.argmax(np.triu(excess)), excess.shape)
+    return edges[i], edges[j], float(error[i:j].sum()), float(time[i:j].sum())
+
+
+def places(samples: Samples, traces: Sequence[Trace], rounds: Sequence[Sequence[Candidate]], base_cost: float,
+           output_unit: str, input_unit: str) -> list[Place]:
+    """Regions worth telling, subsystem first, then by how much more error than time they hold."""
+    found = [*_by_value(samples, output_unit, input_unit), *_by_direction(samples), *_by_time(samples, traces),
+             *_by_frequency(samples, traces)]
+    found = [p for p in found if p.share_of_error - p.share_of_time >= LEAST_EXCESS]
+    found.sort(key=lambda p: p.share_of_time - p.share_of_error)
+    return [*_by_subsystem(rounds, base_cost), *found]
+
+
+def _shown(value: float, unit: str) -> str:
+    return f"{math.degrees(value):.3g} deg" + unit[3:] if unit.startswith("rad") else f"{value:.3g} {unit}"
+
+
+def _by_value(samples: Samples, output_unit: str, input_unit: str) -> list[Place]:
+    axes = (("angle", samples.angle, output_unit, "the output is"), ("speed", np.abs(samples.speed), f"{output_unit}/s", "speed is"),
+            ("input", np.abs(samples.input), input_unit, "|u| is"))
+    out = []
+    for axis, values, unit, words in axes:
+        low, high = np.quantile(values, [0.001, 0.999])
+        if high <= low:
+            continue
+        a, b, error, time = _best_interval(values, samples.before, np.linspace(low, high, BINS + 1))
+        out.append(Place(axis, (float(a), float(b)), unit, None, error, time,
+                         f"{error:.0%} of the squared error lies in the {time:.0%} of the time where {words} between "
+                         f"{_shown(a, unit)} and {_shown(b, unit)}"))
+    return out
+
+
+def _by_direction(samples: Samples) -> list[Place]:
+    still = 0.05 * float(np.quantile(np.abs(samples.speed), 0.95))
+    total, out = max(samples.before.sum(), 1e-300), []
+    for label, mask in (("up", samples.speed > still), ("down", samples.speed < -still), ("at rest", np.abs(samples.speed) <= still)):
+        error, time = float(samples.before[mask].sum() / total), float(mask.mean())
+        words = "the output is at rest" if label == "at rest" else f"the output moves {label}"
+        out.append(Place("direction", None, None, label, error, time,
+                         f"{error:.0%} of the squared error lies in the {time:.0%} of the time where {words}"))
+    return out
+
+
+def _by_time(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
+    """The recording, and the span in it, that holds most of the error beyond its share of time."""
+    out = []
+    for k, trace in enumerate(traces):
+        mask = samples.record == k
+        if not mask.any():
+            continue
+        a, b, error, time = _best_interval(samples.t[mask], samples.before[mask], np.linspace(trace.t[0], trace.t[-1], BINS + 1))
+        part = float(samples.before[mask].sum() / max(samples.before.sum(), 1e-300))
+        whole = float(mask.mean())
+        out.append(Place("time", (float(a), float(b)), "s", trace.name, part * error, whole * time,
+                         f"{part * error:.0%} of the squared error lies between {a:.2f} s and {b:.2f} s of {trace.name}, "
+                         f"{whole * time:.0%} of the time"))
+    return sorted(out, key=lambda p: p.share_of_time - p.share_of_error)[:2]
+
+
+def _by_frequency(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
+    """The band that holds most of the error's power, against the band that holds the motion's."""
+    power = {}
+    for k, trace in enumerate(traces):
+        mask = samples.record == k
+        if mask.sum() < 64:
+            continue
+        size = int(min(mask.sum(), 2 ** int(math.log2(max(2.0 / trace.sample_time, 64)))))
+        for name, x in (("error", np.sqrt(samples.before[mask])), ("motion", samples.angle[mask])):
+            f, p = welch(x - x.mean(), 1.0 / trace.sample_time, nperseg=size)
+            power.setdefault(name, []).append((f, p * mask.sum()))
+    if not power:
+        return []
+    grid = power["error"][0][0][1:]
+    spectrum = {name: np.sum([np.interp(grid, f, p) for f, p in parts], axis=0) for name, parts in power.items()}
+    share = {name: np.cumsum(p) / max(p.sum(), 1e-300) for name, p in spectrum.items()}
+    total = np.concatenate([[0.0], share["error"] - share["motion"]])
+    excess = total[None, :] - total[:, None]
+    i, j = np.unravel_index(np.argmax(np.triu(excess)), excess.shape)
+    if j <= i:
+        return []
+    cumulated = {name: np.concatenate([[0.0], s]) for name, s in share.items()}
+    error, motion = (float(cumulated[n][j] - cumulated[n][i]) for n in ("error", "motion"))
+    low, high = float(grid[i]), float(grid[j - 1])
+    return [Place("frequency", (low, high), "Hz", None, error, motion,
+                  f"{error:.0%} of the error's size varies at {low:.3g} to {high:.3g} Hz, where {motion:.0%} of the motion's power is")]
+
+
+def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float) -> list[Place]:
+    """Subsystems by what their best effect explains of the baseline's cost."""
+    best: dict[str, tuple[float, str]] = {}
+    for candidate in (rounds[0] if rounds else ()):
+        if candidate.name not in BY_NAME:
+            continue
+        subsystem = BY_NAME[candidate.name].subsystem
+        share = max(candidate.gain, 0.0) / max(base_cost, 1e-9)
+        best[subsystem] = max(best.get(subsystem, (0.0, "")), (min(share, 1.0), candidate.name))
+    ranked = sorted(best.items(), key=lambda item: -item[1][0])
+    return [Place("subsystem", None, None, subsystem, share, 1.0,
+                  f"{share:.0%} of the misfit can be explained in the {subsystem} ({name.replace('_', ' ')})")
+            for subsystem, (share, name) in ranked if share > 0.05]
+
+
+def shaded(trace: Trace, record: int, samples: Samples) -> tuple[tuple[float, float], ...]:
+    """Spans of time [s] of one recording in which the local error is largest: those that hold two thirds of it, at most 8."""
+    mask = samples.record == record
+    if not mask.any():
+        return ()
+    edges = np.linspace(trace.t[0], trace.t[-1], 81)
+    error = np.bincount(np.clip(np.digitize(samples.t[mask], edges) - 1, 0, 79), samples.before[mask], 80)
+    order = np.argsort(-error)
+    keep = np.sort(order[:max(1, int(np.searchsorted(np.cumsum(error[order]), 0.66 * error.sum())) + 1)])
+    spans = []
+    for k in keep:
+        if spans and edges[k] - spans[-1][1] < 1e-9:
+            spans[-1][1] = edges[k + 1]
+        else:
+            spans.append([edges[k], edges[k + 1]])
+    spans.sort(key=lambda s: s[0] - s[1])
+    return tuple((float(a), float(b)) for a, b in sorted(spans[:8]))
+
+
+def residual_map(samples: Samples) -> ResidualMap:
+    """Rms local error over angle and speed, before and after."""
+    edges = [np.linspace(*np.quantile(v, [0.001, 0.999]), 25) for v in (samples.angle, samples.speed)]
+    count, *_ = np.histogram2d(samples.angle, samples.speed, edges)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rms = [np.sqrt(np.histogram2d(samples.angle, samples.speed, edges, weights=w)[0] / count) for w in (samples.before, samples.after)]
+    return ResidualMap(edges[0], edges[1], *(np.where(count >= 5, r, np.nan) for r in rms))
