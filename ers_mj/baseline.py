@@ -121,6 +121,8 @@ def _searched(traces, starts, scales, springs, least, scaffolds) -> Fit:
     """The best of the guesses with these spring terms, under the scaffold that serves it best."""
     def prepared(values):
         absent = {name: 0.0 for name in ("a_1", "c_1") if name not in springs}
+        if not springs:
+            absent["theta_0"] = 0.5 * (scales.low + scales.high)
         return {**values, **{name: max(values[name], least[name]) for name in springs}, **absent}
 
     pool = [v for v in starts if (v["c_1"] > 0) == ("c_1" in springs)] or starts

@@ -19,7 +19,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.evaluation import Fold, Score, folds, free_run, neutral, paired_p, pooled, recalibrated, refits, scored
 from ers_mj.evidence import Evidence, RecordView, Rung
 from ers_mj.excitation import next_recording
-from ers_mj.identification import BASE, Fit, Model, fit, fitted_start, residuals, score, with_starts
+from ers_mj.identification import BASE, Fit, Model, fit, fitted_start, polished, residuals, score, with_starts
 from ers_mj.intervals import standard_errors
 from ers_mj.localisation import Place, gather, places, residual_map, shaded
 from ers_mj.recording import Recording
@@ -82,6 +82,8 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     start = baseline(traces, datasheet, first.output_unit == "rad")
     coarse = max(t.quantum for t in traces) > COARSE * 2 * start.fit.model.scales.position
     chosen = select(start.fit, start.traces, anchors=start.anchors, jobs=jobs, progress=progress)
+    start = replace(start, fit=polished(start.fit, start.traces))
+    chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
     progress("judging on held-out data", 0.75)
     held = [_trace(r, datasheet) for r in holdout]
     selection, confirmed = _confirmed(start, chosen, held, jobs)
@@ -340,7 +342,7 @@ class _Case:
         count = len(self.start.traces)
         for name in ("gain", "offset", "friction_level"):
             rest = 0.0 if name == "offset" else 1.0
-            values = [*(states[name] if name in states else [rest] * count), *(s[name] for s in later)]
+            values = [*(states[name] if name in states else [rest] * count), *(s.get(name, rest) for s in later)]
             least = 0.01 * self.start.fit.model.scales.position if name == "offset" else 0.02
             if len(values) > 1 and max(abs(v - values[0]) for v in values) > least:
                 unit = self.output_unit if name == "offset" else "-"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.identification import OBSERVER_RATE, Fit, Model, fit, fitted_start, score
+from ers_mj.identification import OBSERVER_RATE, Model, fit, fitted_start, residuals, score, tau_of
 from ers_mj.traces import Blocks, Trace
 
 RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
@@ -83,20 +83,21 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int, steps: in
 
 
 def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, float]]:
-    """Gain, offset and friction level fitted on the first 30 % of a recording; the score is taken on the rest."""
+    """Gain, friction level and (where the plant feels position) offset fitted on the first 30 % of a recording; the score is
+    taken on the rest. They stay neutral unless they buy their price there."""
     cut = int(RECALIBRATED * trace.t.size)
     head = trace.part(0, cut)
-    still = replace(neutral(model), free=(), frozen=model.names)
-    pair = still.with_state("gain", 2).with_state("friction_level", 2).with_state("offset", 2)
-    found = _state_fit(pair, head)
-    shifted = replace(pair, states={k: np.array([v[0], v[1]]) for k, v in found.model.states.items()})
-    return scored(shifted, trace, 1, cut), {k: float(v[1]) for k, v in found.model.states.items()}
-
-
-def _state_fit(pair: Model, head: Trace) -> Fit:
-    """Fit the second record's state: an empty first trace stands for the training recordings."""
-    blank = replace(head, valid=np.zeros(head.t.size, bool), y=head.y, counts=np.zeros_like(head.counts))
-    return fit(pair, [blank, head], steps=10)
+    pair = replace(neutral(model), free=(), frozen=model.names).with_state("gain", 2).with_state("friction_level", 2)
+    if model.values["a_1"] > 0 or model.values["c_1"] > 0:
+        pair = pair.with_state("offset", 2)
+    blank = replace(head, valid=np.zeros(head.t.size, bool), counts=np.zeros_like(head.counts))
+    misfit = Blocks.of([blank, head]).misfit(residuals(pair, [blank, head], OBSERVER_RATE))
+    tau = tau_of(misfit[blank.counts.size:])
+    found = fit(pair, [blank, head], tau=tau, steps=10)
+    if float(score(misfit, tau).sum() - score(found.misfit, tau).sum()) < 0.5 * found.size:
+        found = replace(found, model=pair)
+    states = {name: float(values[1]) for name, values in found.model.states.items()}
+    return scored(found.model, trace, 1, cut), states
 
 
 def paired_p(better: np.ndarray, worse: np.ndarray) -> float:

@@ -23,6 +23,10 @@ OBSERVER_RATE = 5.0  # [1/s]
 OBSERVER_STEP = 0.005  # [s] between corrections of the observer
 DIFFERENCE = 1e-4  # step of the finite differences in transformed parameters
 BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share")
+STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
+POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
+SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
+HOPELESS = 0.1  # excess of C per block over a nested model at which a search is given up
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
 STATES = ("gain", "offset", "friction_level")
 
@@ -88,8 +92,10 @@ class Model:
                                     max(parameter.lower, least) if parameter.positive else parameter.lower, parameter.upper))
         for state, per_record in (self.states or {}).items():
             for k in range(1, len(per_record)):
-                out.append(Free(state, state, k, state != "offset", self.scales.position, 0.2 if state != "offset" else -np.inf,
-                                5.0 if state != "offset" else np.inf))
+                multiplies = state != "offset"
+                prior = (0.0, STATE_PRIOR) if multiplies else (0.0, 0.1 * STATE_PRIOR)
+                out.append(Free(state, state, k, multiplies, self.scales.position, 0.2 if multiplies else -np.inf,
+                                5.0 if multiplies else np.inf, prior))
         return out
 
     def _tau_bounds(self) -> tuple[float, float]:
@@ -200,8 +206,12 @@ def tau_of(misfit: np.ndarray) -> float:
     return max(1.0, 0.1 * float(np.median(misfit)))
 
 
-def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25) -> Fit:
+def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25,
+        ceiling: np.ndarray | None = None) -> Fit:
     """Minimise C over the model's free numbers, from the model's own values.
+
+    ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
+    given up, since its start was a bad one.
 
     Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the mean
     misfit, where C is nearly a sum of squares, and lowers it to the one that was asked for.
@@ -213,9 +223,20 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
         found = descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3)
-        if last:
+        if last or (ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size):
             return found
         model = found.model
+
+
+def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
+    """The fit carried on in free run by plain least squares, where model error and not noise decides (see POLISHED)."""
+    if float(np.median(found.misfit)) < POLISHED:
+        return found
+    free = Blocks.of(traces).misfit(residuals(found.model, traces, 0.0))
+    if not np.all(np.isfinite(free)):
+        return found
+    better = descend(found.model, traces, 0.0, SQUARES * float(np.mean(free)), 40, 1e-7 * free.size / SQUARES)
+    return replace(found, model=better.model)
 
 
 def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float) -> Fit:

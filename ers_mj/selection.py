@@ -19,6 +19,7 @@ from ers_mj.identification import OBSERVER_RATE, STATES, Fit, fit, jacobian_of, 
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 0.02  # decrease of C per block that an effect must buy: an error of about 0.2 sigma RMS
+LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 2.0  # and the paired z-score of that decrease over the blocks
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
@@ -91,17 +92,17 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     def quick(item):
         name, starts = item
         if name in STATES:
-            return name, fit(base.model.with_state(name, len(traces)), traces, tau=tau, steps=6)
+            return name, fit(base.model.with_state(name, len(traces)), traces, tau=tau, steps=6, ceiling=base.misfit)
         models = [base.model.with_effect(name, start) for start in starts]
         models += [replace(models[0], values={**models[0].values, **values}) for values in anchors]
-        return name, min((fit(model, traces, tau=tau, steps=6) for model in models), key=lambda f: f.cost)
+        return name, min((fit(model, traces, tau=tau, steps=6, ceiling=base.misfit) for model in models), key=lambda f: score(f.misfit, tau).sum())
 
     def finish(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=20)
+        return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
 
     states = [(s, []) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     with ThreadPoolExecutor(jobs) as pool:
-        rough = sorted(pool.map(quick, screen(base, traces, tau, exclude)[:REFITTED] + states), key=lambda item: item[1].cost)
+        rough = sorted(pool.map(quick, screen(base, traces, tau, exclude)[:REFITTED] + states), key=lambda item: score(item[1].misfit, tau).sum())
         done = list(pool.map(finish, rough[:FINISHED])) + rough[FINISHED:]
     out = [Candidate(name, f, reference - float(score(f.misfit, tau).sum()), paired_z(f.misfit, base.misfit, tau)) for name, f in done]
     return sorted(out, key=lambda c: -c.worth)
@@ -126,7 +127,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else ())
         rounds.append(tuple(ranked))
-        if not ranked or ranked[0].gain < LEAST_GAIN * blocks or ranked[0].z < LEAST_Z:
+        least = max(LEAST_GAIN * blocks, LEAST_SHARE * float(score(current.misfit, tau).sum()))
+        if not ranked or ranked[0].gain < least or ranked[0].z < LEAST_Z:
             break
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)

@@ -9,7 +9,7 @@ class AsymmetricFriction(Friction):
     """Coulomb F_c +- dF and viscous B +- dB for motion up and down (worn screws; EMPS)."""
 
     name = "asymmetric_friction"
-    sentence = "friction differs with direction: Coulomb by +-{dF}, viscous by +-{dB}"
+    sentence = "friction differs with direction: Coulomb by {dF} and viscous by {dB} either way of their mean"
     parameters = (
         Parameter("dF", "torque", "half the difference of Coulomb friction, up minus down", positive=False),
         Parameter("dB", "damping", "half the difference of viscous friction, up minus down", positive=False),

@@ -24,7 +24,8 @@ class Backlash(Transmission):
     tries = 3
 
     def starts(self, scales):
-        return [np.array([part * scales.position, 0.6, 0.2, 120.0, 0.2])
+        contact = min(120.0, 0.5 / scales.sample_time)
+        return [np.array([part * scales.position, 0.6, 0.2, contact, 0.2])
                 for part in (0.003, 0.01, 0.03, 0.1)]
 
     def coefficients(self, p, c):

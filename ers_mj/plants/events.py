@@ -335,7 +335,7 @@ def _rate(c, tau, a_emf):
 @njit(nogil=True)
 def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     """The state dt later within the mode."""
-    if not lawful:
+    if not lawful or (m[0] == 0 and c[TWO] <= 0):
         return _linear(c, x, m, drive, tau, a_emf, dt, 1.0)
     n = int(_rate(c, tau, a_emf) * dt / RATE_STEP) + 1
     for k in range(n):
@@ -387,7 +387,7 @@ def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
             x, m = _switch(3, c, on, p, lawful, t, x, m, corner)
     left, events = dt, 0
     while left > 1e-13 * dt:
-        h = min(left, h_max)
+        h = left if m[0] == 0 and c[TWO] <= 0 else min(left, h_max)
         z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, h)
         while h > dt / 40 and _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
             h *= 0.25
