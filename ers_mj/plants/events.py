@@ -319,16 +319,18 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
 
 
 @njit(nogil=True)
-def _rate(c, tau, a_emf):
-    """An upper bound [1/s] of the fastest rate in any mode."""
+def _rate(c, m, tau, a_emf):
+    """An upper bound [1/s] of the fastest rate in a mode."""
     rate = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
     if tau > 0:
         rate = max(rate, 1.0 / tau) + math.sqrt(a_emf / tau)
-    if c[UPPER] < np.inf or c[LOWER] > -np.inf:
+    if m[2] != 0:
         rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
     if c[TWO] > 0:
-        share = c[RHO] * (1.0 - c[RHO])
-        rate = max(rate / min(c[RHO], 1.0 - c[RHO]), math.sqrt(c[K_TWIST] / share) + c[D_TWIST] / share)
+        rate = rate / min(c[RHO], 1.0 - c[RHO])
+        if m[4] != 0:
+            share = c[RHO] * (1.0 - c[RHO])
+            rate = max(rate, math.sqrt(c[K_TWIST] / share) + c[D_TWIST] / share)
     return rate
 
 
@@ -337,7 +339,7 @@ def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     """The state dt later within the mode."""
     if not lawful or (m[0] == 0 and c[TWO] <= 0):
         return _linear(c, x, m, drive, tau, a_emf, dt, 1.0)
-    n = int(_rate(c, tau, a_emf) * dt / RATE_STEP) + 1
+    n = int(_rate(c, m, tau, a_emf) * dt / RATE_STEP) + 1
     for k in range(n):
         x = _runge_kutta(c, on, p, lawful, t + k * dt / n, x, m, drive, tau, a_emf, dt / n)
     return x
