@@ -23,16 +23,16 @@ from ers_mj.identification import BASE, Fit, Model, fit, fitted_start, polished,
 from ers_mj.intervals import standard_errors
 from ers_mj.localisation import Place, gather, places, residual_map, shaded
 from ers_mj.recording import Recording
-from ers_mj.selection import LEAST_GAIN, Candidate, Selection, select
+from ers_mj.selection import Candidate, Selection, select, tie
 from ers_mj.simulation import PER_INERTIA, unit_of
 from ers_mj.traces import Blocks, Trace, make_trace, noise_sigma
 
-COARSE = 1 / 200  # a converter whose step is more than this share of the travel is an effect, not an ordinary one
+COARSE = 1 / 300  # a converter whose step is more than this share of the travel is an effect, not an ordinary one
 CONSISTENT = 0.05  # cost per block up to which a model explains the data within its noise (an error of 0.3 sigma RMS)
 SIGNIFICANT = 0.15  # cost per block from which what is left over is worth a warning
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
+TIED = 0.02  # weight from which a rival is told as an alternative
 HALF = 0.5  # share of the squared held-out error that the named effects must explain
-TIED = 2.0  # z-score below which two candidates cannot be told apart
 
 Progress = Callable[[str, float], None]
 
@@ -186,7 +186,7 @@ class _Case:
             "version": 1, "verdict": verdict, "sentence": self._sentence(verdict, missing, fits, found, explained),
             "where": [] if verdict == "consistent" else [self._place(p) for p in found],
             "missing": missing, "remainder": self._remainder(verdict, explained), "record_state": record_state, "fit": fits,
-            "parameters": self._parameters(), "next_recording": next_recording(self.selection, self.start.traces, self.input_unit),
+            "parameters": self._parameters(), "next_recording": next_recording(self._rivals(), self.start.traces, self.input_unit),
             "data": self._data(), "seed": self.seed, "versions": _versions(),
         }
         if verdict == "unexplained":
@@ -283,13 +283,21 @@ class _Case:
             mine = next((c for c in ranked if c.name == name), None)
             if mine is None or mine is not ranked[0]:
                 continue
-            rivals = [(c, _tie(mine, c)) for c in ranked if c.name != name and c.name in BY_NAME]
-            tied = [(c, weight) for c, weight in rivals if weight > 0.02]
+            rivals = [(c, tie(mine, c)) for c in ranked if c.name != name and c.name in BY_NAME]
+            tied = [(c, weight) for c, weight in rivals if weight > TIED]
             total = 1.0 + sum(w for _, w in tied)
             return [{"effect": c.name, "probability": w / total,
                      "why_not_excluded": f"explains these recordings within {abs(mine.gain - c.gain):.2f} of {mine.gain:.1f}"}
                     for c, w in tied]
         return []
+
+    def _rivals(self) -> tuple[Candidate, Candidate] | None:
+        """The strongest pair of explanations that these recordings cannot tell apart."""
+        for ranked in self.selection.rounds:
+            named = [c for c in ranked if c.name in BY_NAME and c.gain > 0]
+            if len(named) > 1 and named[0].name in self.model.names and tie(named[0], named[1]) > TIED:
+                return named[0], named[1]
+        return None
 
     def _errors(self) -> dict:
         """95 % intervals of every fitted number, by (owner, name)."""
@@ -435,15 +443,6 @@ class _Case:
 
 SHEET_UNITS = {"J": "kg m^2", "B": "N m s/rad", "K_t": "N m/A", "K_e": "V s/rad", "k_s": "N m/rad", "T_LH": "N m", "F_c": "N m",
                "R": "ohm", "L": "H", "n": "-"}
-
-
-def _tie(best: Candidate, other: Candidate) -> float:
-    """How probable the other is against the best (1 = equal): the chance that its score over the blocks is no worse."""
-    d = score(other.fit.misfit, 1.0) - score(best.fit.misfit, 1.0)
-    spread = float(np.std(d, ddof=1)) * math.sqrt(d.size)
-    if spread == 0.0:
-        return 1.0
-    return math.erfc(max(float(np.sum(d)), 0.0) / spread / math.sqrt(2.0))
 
 
 def _shown(value: float | None, unit: str) -> str:

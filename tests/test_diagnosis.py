@@ -1,0 +1,106 @@
+"""The whole way on recordings with known truth: from a wrong datasheet to the right name, number and verdict."""
+
+import json
+
+import numpy as np
+import pytest
+
+from ers_mj.commands.output import plain
+from ers_mj.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.diagnosis import diagnose
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.recording import from_arrays
+
+T = np.arange(0.0, 4.0, 1e-3)
+TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625, "tau_e": 9e-4, "emf_share": 0.94}
+NOISE = 1.5e-4
+
+
+def recordings(effects=(), sensor=lambda y: y, names=("multisine", "steps", "chirp")):
+    """Three recordings of a servo that is not quite Table 1's."""
+    out = []
+    for k, name in enumerate(names):
+        u = np.round(INPUTS[name](T), 4)
+        y = ReducedModel(lumped(TRUTH), effects).simulate(T, u).measured
+        y = sensor(y + NOISE * np.random.default_rng(k).standard_normal(T.size))
+        out.append(from_arrays(T, u, y, name=f"{name}.csv"))
+    return out
+
+
+@pytest.fixture(scope="module")
+def dead_zone():
+    return diagnose(recordings([("drive_dead_zone", np.array([0.25]))]), read_datasheet("table1"), jobs=2)
+
+
+def test_a_concealed_dead_zone_is_named_and_measured(dead_zone):
+    document = dead_zone.document
+    assert document["verdict"] == "missing_physics"
+    first = document["missing"][0]
+    assert first["effect"] == "drive_dead_zone" and first["subsystem"] == "drive"
+    assert first["parameters"]["d"]["value"] == pytest.approx(0.25, abs=0.01)
+    assert first["evidence"]["p_value"] < 0.05
+    assert document["fit"]["heldout_rmse_after_rad"] < 2 * document["fit"]["noise_floor_rad"]
+    assert document["where"][0]["label"] == "drive"
+
+
+def test_the_document_is_whole_and_is_json(dead_zone):
+    keys = {"version", "verdict", "sentence", "where", "missing", "remainder", "record_state", "fit", "parameters", "next_recording", "data",
+            "seed", "versions"}
+    assert keys <= set(json.loads(json.dumps(plain(dead_zone.document), allow_nan=False)))
+    assert {"a_1", "a_2", "b", "c_1", "c_2", "theta_0"} <= set(dead_zone.document["parameters"])
+    assert dead_zone.document["parameters"]["J"]["value"] is None
+
+
+def test_the_model_reproduces_the_recordings(dead_zone, tmp_path):
+    write_model(tmp_path / "model.toml", dead_zone.model)
+    back = read_datasheet(tmp_path / "model.toml")
+    assert back.effects[0][0] == "drive_dead_zone"
+    assert back.lumped["b"] == pytest.approx(TRUTH["b"], rel=0.02)
+
+
+def test_the_answer_does_not_depend_on_the_number_of_jobs(dead_zone):
+    again = diagnose(recordings([("drive_dead_zone", np.array([0.25]))]), read_datasheet("table1"), jobs=1)
+    assert plain(again.document) == plain(dead_zone.document)
+
+
+def test_a_servo_with_other_numbers_is_not_missing_physics():
+    document = diagnose(recordings(), read_datasheet("table1")).document
+    assert document["verdict"] == "parameters_only" and document["missing"] == []
+
+
+def test_a_true_datasheet_is_consistent():
+    sheet = Datasheet(lumped={k: TRUTH[k] for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")})
+    truth = {**TRUTH, "tau_e": 0.0}
+    out = []
+    for k, name in enumerate(("multisine", "steps")):
+        u = INPUTS[name](T)
+        y = ReducedModel(lumped(truth)).simulate(T, u).theta + NOISE * np.random.default_rng(k).standard_normal(T.size)
+        out.append(from_arrays(T, u, y, name=f"{name}.csv"))
+    assert diagnose(out, sheet).document["verdict"] == "consistent"
+
+
+def test_a_coarse_sensor_is_told_from_the_data():
+    step = np.radians(0.4)
+    document = diagnose(recordings(sensor=lambda y: np.round(y / step) * step), read_datasheet("table1")).document
+    assert document["missing"][0]["effect"] == "sensor_quantisation"
+    assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
+
+
+def test_what_the_library_has_no_name_for_is_unexplained():
+    """A torque that hops between two values at random times is no effect of the library."""
+    rng = np.random.default_rng(4)
+    out = []
+    for k, r in enumerate(recordings()):
+        hops = np.repeat(rng.choice([-25.0, 25.0], 40), 100)
+        plant = ReducedModel(lumped(TRUTH))
+        y = plant.theta(T, r.u, (TRUTH["theta_0"], 0.0), load=hops) + NOISE * rng.standard_normal(T.size)
+        out.append(from_arrays(T, r.u, y, name=r.name))
+    document = diagnose(out, read_datasheet("table1")).document
+    assert document["verdict"] == "unexplained" or document["remainder"]["significant"]
+
+
+def test_without_a_datasheet_everything_is_identified():
+    document = diagnose(recordings(names=("multisine", "steps")), None).document
+    assert document["verdict"] != "consistent"
+    assert document["parameters"]["b"]["value"] == pytest.approx(TRUTH["b"], rel=0.1)

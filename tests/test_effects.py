@@ -1,0 +1,46 @@
+"""What every member of the effects folder owes: a complete declaration, parameters within bounds, and nesting."""
+
+import numpy as np
+import pytest
+
+from ers_mj.effects import BY_NAME, EFFECTS, EQUIVALENT
+from ers_mj.simulation import unit_of
+from test_reduced import SCALES, T, table_1
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel
+
+ids = {"ids": lambda e: e.name}
+
+
+@pytest.mark.parametrize("effect", EFFECTS, **ids)
+def test_a_member_declares_itself(effect):
+    assert effect.name and effect.sentence and effect.parameters and type(effect).__doc__
+    assert effect.subsystem in ("drive", "transmission", "load", "sensor")
+    text = effect.describe({p.name: "1" for p in effect.parameters})
+    assert "{" not in text
+    assert all(p.meaning and unit_of(p.kind) for p in effect.parameters)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, **ids)
+def test_starts_lie_within_bounds(effect):
+    for start in effect.starts(SCALES):
+        assert len(start) == len(effect.parameters)
+        for value, p in zip(start, effect.parameters):
+            assert not np.isfinite(value) or p.lower <= value <= p.upper
+            assert not p.positive or value > 0
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e.starts(SCALES) and e.name != "backlash"], **ids)
+def test_an_absent_effect_leaves_the_motion_alone(effect):
+    u = INPUTS["multisine"](T)
+    values = np.where(effect.absent() == 0, 1e-12, effect.absent())
+    if effect.name == "stribeck":
+        values = np.array([1e-12, 0.1, 1.0])
+    motion = ReducedModel(table_1().coefficients, [(effect.name, values)]).simulate(T, u).theta
+    assert np.degrees(np.max(np.abs(motion - table_1().simulate(T, u).theta))) < 2e-4
+
+
+def test_equivalence_classes_hold_known_names_once():
+    names = [n for group in EQUIVALENT for n in group]
+    assert len(names) == len(set(names))
+    assert set(BY_NAME) & set(names)

@@ -1,0 +1,94 @@
+"""The event-exact integrator against an independent scheme, against itself at a finer step, and in the stick band."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ers_mj.datasheet import read_datasheet
+from ers_mj.effects import EFFECTS
+from ers_mj.effects.base import Scales
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel, lumped
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
+TABLE_1 = read_datasheet("table1")
+T = np.arange(0.0, 4.0, 1e-3)
+SCALES = Scales(position=0.4, low=-0.1, high=0.7, speed=4.0, acceleration=110.0, input=10.0, sample_time=1e-3, noise=1e-4, quantum=0.0,
+                is_angle=True)
+
+
+def table_1(**changes):
+    return ReducedModel(lumped({**TABLE_1.to_lumped(), **changes}))
+
+
+@pytest.mark.parametrize("inductance", [1.6e-3, 2e-4])
+@pytest.mark.parametrize("name", ["multisine", "chirp", "ramp", "steps"])
+def test_baseline_equals_an_independent_scheme_at_a_far_smaller_step(name, inductance):
+    plant = pytest.importorskip("independent_plant", reason="analysis/ is not beside the tests")
+    u = INPUTS[name](T)
+    parameters = dict(TABLE_1.parameters) | {"L": inductance}
+    truth = plant.simulate(parameters, [], T, u, step=1e-5, stand=0.0).true
+    ours = table_1(tau_e=inductance / parameters["R"]).simulate(T, u).theta
+    assert np.degrees(np.max(np.abs(ours - truth))) < 1e-3
+
+
+@pytest.mark.parametrize("name", ["multisine", "chirp", "ramp", "steps"])
+def test_eq_5_is_the_limit_of_vanishing_inductance(name):
+    u = INPUTS[name](T)
+    limit, small = (table_1(tau_e=tau).simulate(T, u).theta for tau in (0.0, 1e-6))
+    assert np.degrees(np.max(np.abs(limit - small))) < 1e-3
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e.starts(SCALES)], ids=lambda e: e.name)
+def test_every_effect_moves_the_rudder_and_has_converged(effect):
+    """A step ten times finer moves theta by less than 1e-3 deg, while the effect itself moves it far more."""
+    u = INPUTS["multisine"](T)
+    model = ReducedModel(table_1().coefficients, [(effect.name, effect.starts(SCALES)[0])])
+    coarse, fine = model.simulate(T, u).theta, model.simulate(T, u, refine=10).theta
+    assert np.degrees(np.max(np.abs(coarse - fine))) < 1e-3
+    assert np.degrees(np.max(np.abs(coarse - table_1().simulate(T, u).theta))) > 1e-2
+
+
+def test_nothing_creeps_in_the_stick_band():
+    c = table_1().coefficients
+    u = np.full(T.size, 0.9 * (c.c_1 + c.c_2_plus) / c.b)
+    assert np.ptp(table_1().simulate(T, u).theta) == 0.0
+    away = table_1().simulate(T, 0.9 * c.c_2_plus / c.b * np.ones(T.size) + (c.c_1 + c.a_1 * 0.1) / c.b, start=(c.theta_0 + 0.1, 0.0))
+    assert np.ptp(away.theta) == 0.0
+
+
+def test_it_breaks_away_where_friction_and_preload_end():
+    c = table_1().coefficients
+    for factor, moves in ((0.999, False), (1.001, True)):
+        u = np.full(T.size, factor * (c.c_1 + c.c_2_plus) / c.b)
+        assert (np.ptp(table_1().simulate(T, u).theta) > 0) is moves
+
+
+def test_the_result_is_a_smooth_function_of_the_parameters():
+    """Second differences shrink with the square of the step: no grid effects from event times."""
+    u = INPUTS["multisine"](T)
+
+    def theta(e):
+        return table_1(c_2=TABLE_1.to_lumped()["c_2"] * (1 + e)).simulate(T, u).theta
+
+    bend = [np.max(np.abs(theta(e) - 2 * theta(0.0) + theta(-e))) for e in (1e-4, 5e-5)]
+    assert bend[1] < 0.35 * bend[0]
+
+
+def test_a_delay_of_one_sample_shifts_the_input_by_one_sample():
+    u = INPUTS["chirp"](T)
+    late = ReducedModel(table_1().coefficients, [("input_delay", np.array([1e-3]))]).simulate(T, u).theta
+    shifted = table_1().simulate(T, np.concatenate([u[:1], u[:-1]])).theta
+    assert np.max(np.abs(late - shifted)) < 1e-9
+
+
+def test_a_rigid_play_of_no_width_is_no_play():
+    """Backlash with a tiny gap and a stiff contact tends to the one-body motion."""
+    u = INPUTS["chirp"](T)
+    one = table_1().simulate(T, u).theta
+    two = [ReducedModel(table_1().coefficients, [("backlash", np.array([gap, 0.5, 0.2, 400.0, 1.0]))]).simulate(T, u).theta
+           for gap in (4e-3, 1e-3)]
+    size = [np.sqrt(np.mean((x - one) ** 2)) for x in two]
+    assert size[1] < 0.5 * size[0]
