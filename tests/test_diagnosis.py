@@ -81,7 +81,7 @@ def test_a_true_datasheet_is_consistent():
 
 
 def test_a_coarse_sensor_is_told_from_the_data():
-    step = np.radians(0.4)
+    step = np.radians(0.6)
     document = diagnose(recordings(sensor=lambda y: np.round(y / step) * step), read_datasheet("table1")).document
     assert document["missing"][0]["effect"] == "sensor_quantisation"
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)

@@ -28,6 +28,7 @@ N_PARAMETERS = max(4, max(len(effect.parameters) for effect in EFFECTS))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
+ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
 EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
@@ -397,7 +398,7 @@ def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
         first, event = h, -1
         for e in ORDER:
             g = _violation(e, c, on, p, lawful, t + first, z, m)
-            if g > 0:
+            if g > (ROUNDING if e in (1, 2, 5) else 0.0):
                 first, z = _locate(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, first, g)
                 event = e
         if event < 0:
