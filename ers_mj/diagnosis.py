@@ -118,18 +118,30 @@ def _confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int)
         model = selection.chosen.model
         after_models = refits(model, parts, selection.tau, jobs)
         after = _scores(after_models, parts)
-        without, p = {}, {}
+        without, p, lesser_models = {}, {}, {}
         for name in model.names:
-            less = fit(model.without_effect(name), start.traces, tau=selection.tau, steps=12).model if len(model.names) > 1 else start.fit.model
-            lesser = _scores(refits(less, parts, selection.tau, jobs), parts) if len(model.names) > 1 else _scores(base_models, parts)
-            without[name] = pooled(lesser)
+            if len(model.names) > 1:
+                less = fit(model.without_effect(name), start.traces, tau=selection.tau, steps=12).model
+                lesser_models[name] = refits(less, parts, selection.tau, jobs)
+            else:
+                lesser_models[name] = base_models
+            without[name] = pooled(_scores(lesser_models[name], parts))
             p[name] = paired_p(pooled(after).misfit, without[name].misfit)
-        failed = [n for n in model.names if p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse]
+        failed = [n for n in model.names if (p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse)
+                  and not _helps_recalibrated(after_models, lesser_models[n], parts)]
         if not failed:
             return selection, Confirmed(_scores(base_models, parts), after, without, p, after_models, base_models, parts, sentence)
         worst = max(failed, key=lambda n: p[n])
         reduced = fit(model.without_effect(worst), start.traces, tau=selection.tau, steps=15)
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
+
+
+def _helps_recalibrated(models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold]) -> bool:
+    """Whether the models halve the error of recordings of another day once gain, offset and friction level of that day are known."""
+    if parts[0].training is not None:
+        return False
+    after, before = (pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(some, parts)]).rmse for some in (models, lesser))
+    return after < HALF * before
 
 
 def _scores(models: Sequence[Model], parts: Sequence[Fold]) -> list[Score]:
@@ -210,10 +222,15 @@ class _Case:
                 "selection_cost_before": self.start.fit.cost, "selection_cost_after": self.selection.chosen.cost}
 
     def _explained(self, fits: dict) -> float:
-        """Share of the squared held-out free-run error above the noise that the named effects take away."""
-        above = fits["heldout_rmse_before_rad"] ** 2 - self.noise**2
-        left = fits["heldout_rmse_after_rad"] ** 2 - self.noise**2
-        return min(max(1.0 - left / above, 0.0), 1.0) if above > 0 else 0.0
+        """Share of the squared held-out free-run error above the noise that the named effects take away.
+
+        Where the rig has changed between the days (held-out recordings of their own), raw or recalibrated, whichever tells more.
+        """
+        shares = []
+        for kind in ("heldout", "recalibrated") if self.holdout else ("heldout",):
+            above, left = (fits[f"{kind}_rmse_{when}_rad"] ** 2 - self.noise**2 for when in ("before", "after"))
+            shares.append(min(max(1.0 - left / above, 0.0), 1.0) if above > 0 else 0.0)
+        return max(shares)
 
     def _left(self) -> float:
         """Cost per block of the final model, at the noise."""

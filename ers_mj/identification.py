@@ -27,6 +27,7 @@ STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth
 POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
 HOPELESS = 0.1  # excess of C per block over a nested model at which a search is given up
+NEAR = 0.1  # half travels by which theta_0 may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
 STATES = ("gain", "offset", "friction_level")
 
@@ -74,7 +75,8 @@ class Model:
             positive = name not in ("theta_0", "b") or name == "b"
             lower, upper = (1e-9, np.inf)
             if name == "theta_0":
-                positive, lower, upper = False, self.scales.low - self.scales.position, self.scales.high + self.scales.position
+                near = NEAR * self.scales.position
+                positive, lower, upper = False, self.scales.low - near, self.scales.high + near
             if name == "emf_share":
                 lower, upper = 0.02, 0.999
             if name == "tau_e":

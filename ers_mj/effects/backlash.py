@@ -13,7 +13,7 @@ class Backlash(Transmission):
     """
 
     name = "backlash"
-    sentence = "the rudder has a play of +-{gap} against its drive"
+    sentence = "the rudder has a play of ±{gap} against its drive"
     parameters = (
         Parameter("gap", "position", "half-width of the play"),
         Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.1, upper=0.95, absent=0.5),

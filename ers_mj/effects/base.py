@@ -104,6 +104,7 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
+    follows_current: ClassVar[bool] = False  # its law changes as fast as the current: half the segment length
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
 

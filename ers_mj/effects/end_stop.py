@@ -9,14 +9,14 @@ class EndStop(Load):
     """Stiff spring-dampers beyond ``lower`` and ``upper``; their natural frequency is f_stop (against J)."""
 
     name = "end_stop"
-    sentence = "the travel ends at a stop: {lower} .. {upper}"
+    sentence = "the travel ends at a stop"
     parameters = (
         Parameter("lower", "position", "lower stop", positive=False, absent=-np.inf),
         Parameter("upper", "position", "upper stop", positive=False, absent=np.inf),
         Parameter("f_stop", "frequency", "natural frequency of the contact", lower=5.0, upper=400.0, absent=100.0),
         Parameter("zeta", "ratio", "damping ratio of the contact", lower=0.02, upper=2.0, absent=0.3),
     )
-    tries = 2
+    tries = 3
 
     def starts(self, scales):
         inset = 0.01 * (scales.high - scales.low)
@@ -24,6 +24,10 @@ class EndStop(Load):
         frequency = min(100.0, 0.2 / scales.sample_time)
         ends = ((low, np.inf), (-np.inf, high), (low, high))
         return [np.array([lower, upper, frequency, 0.3]) for lower, upper in ends]
+
+    def describe(self, values):
+        ends = [f"the {end} one at {values[end]}" for end in ("lower", "upper") if values[end] != "none"]
+        return f"the travel ends at a stop, {' and '.join(ends)}" if ends else self.sentence
 
     def coefficients(self, p, c):
         contact = 2 * np.pi * p[2]

@@ -11,6 +11,7 @@ class LoadDependentFriction(Friction):
     name = "load_dependent_friction"
     sentence = "friction grows by {mu} of the torque that the gear transmits"
     parameters = (Parameter("mu", "ratio", "share of the drive torque lost to friction", upper=0.9),)
+    follows_current = True
 
     def starts(self, scales):
         return [np.array([0.05])]

@@ -73,6 +73,7 @@ class ReducedModel:
         out = np.empty((t.size, 4))
         enable = np.ones(t.size, np.bool_) if enable is None else enable
         load = np.zeros(t.size) if load is None else load
+        refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
         simulate_kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p, refine, x0, out)
         return out
