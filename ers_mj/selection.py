@@ -23,7 +23,7 @@ LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 2.0  # and the paired z-score of that decrease over the blocks
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
-FINISHED = 3  # of those, how many are fitted to the end
+FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 MOST_ROUNDS = 4
 
 
@@ -112,7 +112,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     states = [(s, []) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     with ThreadPoolExecutor(jobs) as pool:
         rough = sorted(pool.map(quick, screen(base, traces, tau, exclude)[:REFITTED] + states), key=lambda item: score(item[1].misfit, tau).sum())
-        done = list(pool.map(finish, rough[:FINISHED])) + rough[FINISHED:]
+        gains = [reference - float(score(f.misfit, tau).sum()) for _, f in rough]
+        close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
+        done = list(pool.map(finish, rough[:close])) + rough[close:]
     out = [Candidate(name, f, reference - float(score(f.misfit, tau).sum()), paired_z(f.misfit, base.misfit, tau)) for name, f in done]
     return sorted(out, key=lambda c: -c.worth)
 
