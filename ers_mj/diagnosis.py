@@ -388,7 +388,11 @@ class _Case:
             names = "; ".join(m["sentence"] for m in missing)
             if not self.model.names:
                 return f"Only the sensor shows: {names}."
-            return f"The model leaves out this: {names}. With it the held-out error falls from {before} to {after}."
+            told = "held-out error"
+            if fits["heldout_rmse_after_rad"] > math.sqrt(HALF) * fits["heldout_rmse_before_rad"] and self.holdout:
+                told = "held-out error, once gain, offset and friction level of that day are known,"
+                before, after = (_shown(fits[f"recalibrated_rmse_{w}_rad"], self.output_unit) for w in ("before", "after"))
+            return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
         place = next((p.sentence for p in found if p.axis != "subsystem"), "")
         return (f"Something acts here that no effect of the library accounts for (the best explains {explained:.0%} of the held-out "
                 f"error); {place or 'it is spread over the whole record'}.")

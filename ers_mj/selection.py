@@ -24,7 +24,7 @@ LEAST_Z = 2.0  # and the paired z-score of that decrease over the blocks
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
-MOST_ROUNDS = 4
+MOST_ROUNDS = 2
 
 
 @dataclass(frozen=True)
