@@ -26,6 +26,7 @@ BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share")
 STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
 POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
+FLOOR = 1e-4  # gain in C of one step below which a fit stands on its valley's floor
 HOPELESS = 0.02  # excess of C per block over a nested model at which a search is given up
 NEAR = 0.1  # half travels by which theta_0 may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
@@ -230,6 +231,16 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
         if last or (ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size):
             return found
         model = found.model
+
+
+def converged(found: Fit, rivals: Sequence[Fit], traces: Sequence[Trace], tau: float) -> Fit:
+    """The fit carried on to its valley's floor, from its own values and from the baseline values of its rivals.
+
+    Where stick and slip fork, the cost has dents of about one block's cost, in which a single descent may rest.
+    """
+    starts = [replace(found.model, values=rival.model.values) for rival in rivals]
+    ends = [descend(model, traces, OBSERVER_RATE, tau, 40, FLOOR) for model in (found.model, *starts)]
+    return min(ends, key=lambda f: f.cost)
 
 
 def polished(found: Fit, traces: Sequence[Trace]) -> Fit:

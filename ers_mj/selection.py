@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
-from ers_mj.identification import OBSERVER_RATE, STATES, Fit, fit, jacobian_of, residuals, score, tau_of
+from ers_mj.identification import OBSERVER_RATE, STATES, Fit, converged, fit, jacobian_of, residuals, score, tau_of
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 0.02  # decrease of C per block that an effect must buy: an error of about 0.2 sigma RMS
@@ -24,6 +24,7 @@ LEAST_Z = 2.0  # and the paired z-score of that decrease over the blocks
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
+NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 MOST_ROUNDS = 2
 
 
@@ -109,14 +110,22 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
 
+    def judged(item):
+        name, found = item
+        return Candidate(name, found, reference - float(score(found.misfit, tau).sum()), paired_z(found.misfit, base.misfit, tau))
+
     states = [(s, []) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     with ThreadPoolExecutor(jobs) as pool:
         rough = sorted(pool.map(quick, screen(base, traces, tau, exclude)[:REFITTED] + states), key=lambda item: score(item[1].misfit, tau).sum())
         gains = [reference - float(score(f.misfit, tau).sum()) for _, f in rough]
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
-        done = list(pool.map(finish, rough[:close])) + rough[close:]
-    out = [Candidate(name, f, reference - float(score(f.misfit, tau).sum()), paired_z(f.misfit, base.misfit, tau)) for name, f in done]
-    return sorted(out, key=lambda c: -c.worth)
+        ranked = sorted(map(judged, list(pool.map(finish, rough[:close])) + rough[close:]), key=lambda c: -c.worth)
+        least = ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain) if ranked else 0.0
+        rivals = sum(c.worth > max(least, 0.0) for c in ranked)
+        if rivals > 1:
+            close = [c.fit for c in ranked[:rivals]]
+            ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, [f for f in close if f is not c.fit], traces, tau))), ranked[:rivals])
+    return sorted(ranked, key=lambda c: -c.worth)
 
 
 @dataclass(frozen=True)

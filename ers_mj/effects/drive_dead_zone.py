@@ -4,16 +4,30 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter
 
+SLOPE = 30.0  # at which a drive that wakes up with the whole command returns to it
+
 
 class DriveDeadZone(Drive):
-    """The terminals see u - d Sgn(u) outside +-d and nothing inside (dead time of a bridge)."""
+    """The terminals see nothing within +-d and u - lost Sgn(u) outside: the dead time of a bridge (lost = d, where it is not
+    given) or a threshold below which the drive sleeps (lost = 0).
+
+    With ``lost`` the way back is a line of slope SLOPE and not a jump, so that the misfit stays continuous in d.
+    """
 
     name = "drive_dead_zone"
-    sentence = "the drive swallows the first {d} of every command"
-    parameters = (Parameter("d", "input", "half-width of the dead zone"),)
+    sentence = "the drive swallows commands up to {d}"
+    parameters = (
+        Parameter("d", "input", "half-width of the dead zone"),
+        Parameter("lost", "input", "what is still missing outside it (all of d where none is given)", positive=False, lower=0.0, absent=np.inf),
+    )
+    tries = 3
 
     def starts(self, scales):
-        return [np.array([0.02 * scales.input])]
+        widths = np.array([0.01, 0.02, 0.04, 0.08, 0.16]) * scales.input
+        return [np.array([0.02 * scales.input, np.inf]), *(np.array([d, 0.05 * d]) for d in widths)]
 
     def command(self, p, u):
-        return u - np.clip(u, -p[0], p[0])
+        size, lost = np.abs(u), min(p[1], p[0])
+        if lost == p[0]:
+            return u - np.clip(u, -p[0], p[0])
+        return np.sign(u) * np.clip(SLOPE * (size - p[0]), 0.0, np.maximum(size - lost, 0.0))
