@@ -24,6 +24,7 @@ LEAST_Z = 2.0  # and the paired z-score of that decrease over the blocks
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
+AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 MOST_ROUNDS = 2
 
@@ -99,25 +100,38 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first."""
     reference = float(score(base.misfit, tau).sum())
 
-    def quick(item):
+    def total(found):
+        return float(score(found.misfit, tau).sum())
+
+    def quick(models):
+        return min((fit(model, traces, tau=tau, steps=6, ceiling=base.misfit) for model in models), key=total)
+
+    def first(item):
         name, starts = item
         if name in STATES:
-            return name, fit(base.model.with_state(name, len(traces)), traces, tau=tau, steps=6, ceiling=base.misfit)
-        models = [base.model.with_effect(name, start) for start in starts]
-        models += [replace(models[0], values={**models[0].values, **values}) for values in anchors]
-        return name, min((fit(model, traces, tau=tau, steps=6, ceiling=base.misfit) for model in models), key=lambda f: score(f.misfit, tau).sum())
+            return name, quick([base.model.with_state(name, len(traces))])
+        model = base.model.with_effect(name, starts[0])
+        return name, quick([model, *(replace(model, values={**model.values, **values}) for values in anchors)])
+
+    def further(item):
+        (name, starts), (_, found) = item
+        others = [base.model.with_effect(name, start) for start in starts[1:]]
+        return name, min(found, quick(others), key=total) if others and reference - total(found) >= AGAIN * most else found
 
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
 
     def judged(item):
         name, found = item
-        return Candidate(name, found, reference - float(score(found.misfit, tau).sum()), paired_z(found.misfit, base.misfit, tau))
+        return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau))
 
     states = [(s, []) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     with ThreadPoolExecutor(jobs) as pool:
-        rough = sorted(pool.map(quick, screen(base, traces, tau, exclude)[:REFITTED] + states), key=lambda item: score(item[1].misfit, tau).sum())
-        gains = [reference - float(score(f.misfit, tau).sum()) for _, f in rough]
+        screened = screen(base, traces, tau, exclude)[:REFITTED] + states
+        once = list(pool.map(first, screened))
+        most = max((reference - total(f) for _, f in once), default=0.0)
+        rough = sorted(pool.map(further, zip(screened, once)), key=lambda item: total(item[1]))
+        gains = [reference - total(f) for _, f in rough]
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         ranked = sorted(map(judged, list(pool.map(finish, rough[:close])) + rough[close:]), key=lambda c: -c.worth)
         least = ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain) if ranked else 0.0

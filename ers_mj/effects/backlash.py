@@ -16,10 +16,10 @@ class Backlash(Transmission):
     sentence = "the rudder has a play of ±{gap} against its drive"
     parameters = (
         Parameter("gap", "position", "half-width of the play"),
-        Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.1, upper=0.95, absent=0.5),
-        Parameter("phi", "ratio", "motor side's share of the friction", lower=1e-3, upper=0.9, absent=0.1),
+        Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.1, upper=0.9, absent=0.5),
+        Parameter("phi", "ratio", "motor side's share of the friction", lower=0.01, upper=0.9, absent=0.1),
         Parameter("f_contact", "frequency", "contact's natural frequency", lower=40.0, upper=400.0, absent=120.0),
-        Parameter("zeta", "ratio", "contact's damping ratio", lower=0.02, upper=2.0, absent=0.2),
+        Parameter("zeta", "ratio", "contact's damping ratio", lower=0.05, upper=2.0, absent=0.2),
     )
     tries = 3
 

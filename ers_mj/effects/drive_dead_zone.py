@@ -27,7 +27,7 @@ class DriveDeadZone(Drive):
         return [np.array([0.02 * scales.input, np.inf]), *(np.array([d, 0.05 * d]) for d in widths)]
 
     def command(self, p, u):
-        size, lost = np.abs(u), min(p[1], p[0])
+        size, lost = np.abs(u), min(p[-1], p[0])
         if lost == p[0]:
             return u - np.clip(u, -p[0], p[0])
         return np.sign(u) * np.clip(SLOPE * (size - p[0]), 0.0, np.maximum(size - lost, 0.0))

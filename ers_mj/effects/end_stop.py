@@ -13,7 +13,7 @@ class EndStop(Load):
     parameters = (
         Parameter("lower", "position", "lower stop", positive=False, absent=-np.inf),
         Parameter("upper", "position", "upper stop", positive=False, absent=np.inf),
-        Parameter("f_stop", "frequency", "natural frequency of the contact", lower=5.0, upper=400.0, absent=100.0),
+        Parameter("f_stop", "frequency", "natural frequency of the contact", lower=10.0, upper=400.0, absent=100.0),
         Parameter("zeta", "ratio", "damping ratio of the contact", lower=0.02, upper=2.0, absent=0.3),
     )
     tries = 3
