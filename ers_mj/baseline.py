@@ -38,7 +38,10 @@ def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bo
 
 @dataclass(frozen=True)
 class Start:
-    """The refitted baseline, the traces with their fitted initial states, and other values that fits may start from."""
+    """The refitted baseline, the traces with their fitted initial states, and other values that fits may start from.
+
+    A refitted baseline has swallowed what it could of a missing effect; the datasheet's values, or those found under a scaffold, have not.
+    """
 
     fit: Fit
     traces: list[Trace]
@@ -53,7 +56,9 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
     """
     known = datasheet.to_lumped() if datasheet is not None else {}
     if {"a_2", "b"} <= known.keys():
-        found = Start(*_refined(_from_datasheet(traces, known, is_angle), traces))
+        sheet = _from_datasheet(traces, known, is_angle)
+        refitted, traces = _refined(sheet, traces)
+        found = Start(refitted, traces, ({**sheet.values, "theta_0": refitted.model.values["theta_0"]},))
     else:
         found = _from_scratch(traces, known, is_angle)
     if not np.isfinite(found.fit.cost):

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from .errors import InputError
-from .recording import write_whole
+from .tables import write_whole
 
 # Table 1 of the paper (Energies 2020): the values of its joint simulation model, as printed but for the units
 # of L and theta_0. K_t and K_e differ (ratio 1.69) although they are one constant in SI: both are kept. The

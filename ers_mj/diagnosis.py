@@ -19,7 +19,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.evaluation import Fold, Score, folds, free_run, neutral, paired_p, pooled, recalibrated, refits, scored
 from ers_mj.evidence import Evidence, RecordView, Rung
 from ers_mj.excitation import next_recording
-from ers_mj.identification import BASE, Fit, Model, fit, fitted_start, polished, residuals, score, with_starts
+from ers_mj.identification import BASE, Model, fit, polished, residuals, score, with_starts
 from ers_mj.intervals import standard_errors
 from ers_mj.localisation import Place, gather, places, residual_map, shaded
 from ers_mj.recording import Recording

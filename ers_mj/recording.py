@@ -7,34 +7,23 @@ told in `Recording.problems`. Time is axis 0, every array is (N,).
 """
 
 import hashlib
-import io
 import os
 import re
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.csv
-import pyarrow.parquet
 
 from .errors import InputError
+from .symptoms import at_extreme, converter_step, decimal_grain, frozen_spans, held_spans, varied
+from .tables import cell_of, listed, numbers, parse_table, read_content, select_run, split_spec, write_whole
 
 FEWEST_SAMPLES = 100
 MOST_MISSING = 0.20  # share of a required column
 GAP = 3.0  # a step of time longer than this many median steps is a gap
 LEAST_JITTER = 0.01  # rms share of the step from which jitter is worth a sentence
-FEWEST_LEVELS = 3  # distinct values below which no lattice can be told
-FEWEST_REVISITED = 0.05  # share of the distinct values that a converter shows twice or more
-COARSE = 200  # levels of travel below which even a decimal grid acts as a converter
-NEIGHBOURS = 20  # samples on either side of a held span that say how the signal usually moves
-SHORTEST_HELD = 5  # samples
-LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
-BLANK = ("", "nan", "na", "n/a", "null", "none")  # a missing value in CSV, in any case
 
 
 class Role(NamedTuple):
@@ -152,12 +141,12 @@ def read_recording(path_or_spec: str | os.PathLike, mapping: Mapping[str, str] |
     Raises:
         InputError: whatever makes the file unusable, in one sentence that names it.
     """
-    path, run = _split(os.fspath(path_or_spec))
+    path, run = split_spec(os.fspath(path_or_spec))
     name = path.name if run is None else f"{path.name}#run={run}"
-    content = _content(path)
-    table = _select_run(_table(content, path.suffix.lower(), name), run, name)
+    content = read_content(path)
+    table = select_run(parse_table(content, path.suffix.lower(), name), run, name)
     chosen = _choose(table.column_names, dict(mapping or {}), name)
-    raw = {contract: _numbers(table[column], column, name) for contract, column in chosen.items()}
+    raw = {contract: numbers(table[column], column, name) for contract, column in chosen.items()}
     roles = {COLUMNS[contract].field: COLUMNS[contract] for contract in chosen}
     labels = {COLUMNS[contract].field: column for contract, column in chosen.items()}
     printed = {COLUMNS[contract].field: x for contract, x in raw.items()}
@@ -180,7 +169,7 @@ def write_recording(path: str | os.PathLike, columns: Mapping[str, Sequence[floa
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) != 1:
         raise InputError(f"{path}: columns of one length are expected, these have {lengths}")
-    cells = [[_cell(x) for x in np.asarray(column, float).tolist()] for column in columns.values()]
+    cells = [[cell_of(x) for x in np.asarray(column, float).tolist()] for column in columns.values()]
     lines = [",".join(columns), *map(",".join, zip(*cells, strict=True))]
     write_whole(Path(path), "\n".join(lines) + "\n")
 
@@ -205,7 +194,7 @@ def from_arrays(
         InputError: as `read_recording` does.
     """
     if unknown := set(optional) - set(OPTIONAL):
-        raise InputError(f"{name}: there is no field {_listed(unknown)}; there are {_listed(OPTIONAL)}")
+        raise InputError(f"{name}: there is no field {listed(unknown)}; there are {listed(OPTIONAL)}")
     _refuse_unknown_unit("input", input_unit, "u", name)
     _refuse_unknown_unit("output", output_unit, "y", name)
     given = {"t": t, "u": u, "y": y, **{field: x for field, x in optional.items() if x is not None}}
@@ -222,7 +211,7 @@ def from_arrays(
 def _refuse_unknown_unit(noun: str, unit: str, field: str, name: str) -> None:
     known = dict.fromkeys(role.unit for role in COLUMNS.values() if role.field == field)
     if unit not in known:
-        raise InputError(f"{name}: the {noun} has the unknown unit {unit!r}; known are {_listed(known)}")
+        raise InputError(f"{name}: the {noun} has the unknown unit {unit!r}; known are {listed(known)}")
 
 
 def _array(x: Sequence[float], field: str, name: str) -> np.ndarray:
@@ -236,128 +225,30 @@ def _array(x: Sequence[float], field: str, name: str) -> np.ndarray:
     return array
 
 
-def _cell(x: float) -> str:
-    return "" if x != x else repr(x)
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write text to a neighbour of path, then put it in path's place: a reader never sees half of it.
+def read_input(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and voltage [V], each (N,), of a CSV or Parquet file with the columns t_s and u_V.
 
     Raises:
-        InputError: the path cannot be written.
+        InputError: the file is no such thing, or has holes, in one sentence.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({_reason(error)})") from None
-    finally:
-        part.unlink(missing_ok=True)
+    file = Path(path)
+    table = parse_table(read_content(file), file.suffix.lower(), file.name)
+    columns = []
+    for label in ("t_s", "u_V"):
+        if label not in table.column_names:
+            raise InputError(f"{file.name}: there is no column {label}, the columns are {listed(table.column_names)}")
+        x = numbers(table[label], label, file.name)
+        if not np.isfinite(x).all():
+            row = 1 + int(np.argmax(~np.isfinite(x)))
+            raise InputError(f"{file.name}: {label} is missing or infinite in data row {row}, an input has no holes")
+        columns.append(x)
+    if columns[0].size < 2:
+        raise InputError(f"{file.name}: has {columns[0].size} samples, at least 2 are needed")
+    _refuse_time(columns[0], "t_s", file.name)
+    return columns[0], columns[1]
 
 
-# -- from a file to columns ------------------------------------------------------------------------------
-
-
-def _split(spec: str) -> tuple[Path, str | None]:
-    """Path and run of "FILE#run=17"; a file that is really called so comes first."""
-    path, mark, run = spec.rpartition("#run=")
-    return (Path(path), run) if mark and not Path(spec).is_file() else (Path(spec), None)
-
-
-def _content(path: Path) -> bytes:
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({_reason(error)})") from None
-    if not content.strip():
-        raise InputError(f"{path}: the file is empty")
-    return content
-
-
-def _table(content: bytes, suffix: str, name: str) -> pa.Table:
-    readers = {".csv": _csv, ".parquet": _parquet}
-    if suffix not in readers:
-        raise InputError(f"{name}: the file name ends in {suffix!r}, recordings end in {_listed(readers)}")
-    return readers[suffix](content, name)
-
-
-def _parquet(content: bytes, name: str) -> pa.Table:
-    try:
-        table = pa.parquet.read_table(pa.BufferReader(content))
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(f"{name}: is not a readable Parquet file ({_reason(error)})") from None
-    _refuse_twice(table.column_names, name)
-    return table
-
-
-def _csv(content: bytes, name: str) -> pa.Table:
-    """The cells as text, under the names of the first line; semicolons bring decimal commas."""
-    header, body = _header_and_body(content, name)
-    delimiter = max(",;\t", key=header.count)
-    columns = [column.strip(" \t\"") for column in header.split(delimiter)]
-    _refuse_twice(columns, name)
-    table = _cells(body, columns, delimiter, name)
-    if delimiter == ",":
-        return table
-    return pa.table([pc.replace_substring(cells, ",", ".") for cells in table.columns], names=columns)
-
-
-def _header_and_body(content: bytes, name: str) -> tuple[str, str]:
-    try:
-        text = content.decode("utf-8-sig").lstrip()
-    except UnicodeDecodeError as error:
-        raise InputError(f"{name}: is not a text file in UTF-8 (byte {error.start} is no character)") from None
-    if "\0" in text:
-        raise InputError(f"{name}: is a binary file, CSV was expected")
-    header, *body = re.split(r"\r\n|\n|\r", text, maxsplit=1)
-    return header, "".join(body)
-
-
-def _cells(body: str, columns: list[str], delimiter: str, name: str) -> pa.Table:
-    ragged = []
-    if not body.strip():
-        raise InputError(f"{name}: has a header and no samples, at least {FEWEST_SAMPLES} are needed")
-    try:
-        return pa.csv.read_csv(
-            io.BytesIO(body.encode()),
-            read_options=pa.csv.ReadOptions(column_names=columns, use_threads=False),
-            parse_options=pa.csv.ParseOptions(
-                delimiter=delimiter, invalid_row_handler=lambda row: ragged.append(row) or "error"
-            ),
-            convert_options=pa.csv.ConvertOptions(column_types=dict.fromkeys(columns, pa.string())),
-        )
-    except pa.ArrowException as error:
-        raise InputError(f"{name}: {_told_ragged(ragged, error)}") from None
-
-
-def _told_ragged(ragged: list, error: Exception) -> str:
-    if not ragged:
-        return f"is not a readable CSV file ({_reason(error)})"
-    row = ragged[0]
-    return f"data row {row.number} has {row.actual_columns} cells, the header has {row.expected_columns}"
-
-
-def _refuse_twice(columns: list[str], name: str) -> None:
-    if twice := [column for column, count in Counter(columns).items() if count > 1]:
-        raise InputError(f"{name}: the column {_listed(twice)} stands there more than once")
-
-
-def _select_run(table: pa.Table, run: str | None, name: str) -> pa.Table:
-    """The rows of one run; the whole table where it holds one and none is asked for."""
-    if "run" not in table.column_names:
-        if run is None:
-            return table
-        raise InputError(f"{name}: the file has no column run, its columns are {_listed(table.column_names)}")
-    labels = _texts(table["run"])
-    runs = labels.unique().to_pylist()
-    if run is None and len(runs) > 1:
-        raise InputError(f"{name}: the file holds the runs {_listed(runs)}, choose one as in {name}#run={runs[0]}")
-    if run is not None and run not in runs:
-        raise InputError(f"{name}: there is no run {run!r}, the runs are {_listed(runs)}")
-    return table if run is None else table.filter(pc.equal(labels, run))
+# -- from a table's columns to roles -------------------------------------------------------------------------
 
 
 def _choose(columns: list[str], mapping: dict[str, str], name: str) -> dict[str, str]:
@@ -369,7 +260,7 @@ def _choose(columns: list[str], mapping: dict[str, str], name: str) -> dict[str,
     by_field = {field: [c for c in chosen if COLUMNS[c].field == field] for field in (*REQUIRED, *OPTIONAL)}
     for field, found in by_field.items():
         if len(found) > 1:
-            raise InputError(f"{name}: {_listed(found)} are all columns of one quantity, drop one or choose with --map")
+            raise InputError(f"{name}: {listed(found)} are all columns of one quantity, drop one or choose with --map")
         if not found and field in REQUIRED:
             raise InputError(f"{name}: {_told_missing(field, columns)}")
     unit = COLUMNS[by_field["y"][0]].unit
@@ -379,46 +270,16 @@ def _choose(columns: list[str], mapping: dict[str, str], name: str) -> dict[str,
 def _refuse_mistyped(columns: list[str], mapping: dict[str, str], name: str) -> None:
     for contract, column in mapping.items():
         if contract not in COLUMNS:
-            raise InputError(f"{name}: --map gives {contract!r}, the names it knows are {_listed(COLUMNS)}")
+            raise InputError(f"{name}: --map gives {contract!r}, the names it knows are {listed(COLUMNS)}")
         if column not in columns:
-            raise InputError(f"{name}: --map asks for the column {column!r}, the columns are {_listed(columns)}")
+            raise InputError(f"{name}: --map asks for the column {column!r}, the columns are {listed(columns)}")
 
 
 def _told_missing(field: str, columns: list[str]) -> str:
     noun, known = REQUIRED[field], [contract for contract, role in COLUMNS.items() if role.field == field]
     if alike := [c for c in columns if c not in COLUMNS and re.match(LOOKS_LIKE[field], c)]:
-        return f"the {noun} {_listed(alike)} has an unknown unit, known are {_listed(known)} (or choose with --map)"
-    return f"there is no {noun}, {_listed(known)} was expected and the columns are {_listed(columns)}"
-
-
-# -- from columns to numbers ------------------------------------------------------------------------------
-
-
-def _texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """The cells as text without surrounding spaces."""
-    return pc.utf8_trim_whitespace(column.cast(pa.string()))
-
-
-def _numbers(column: pa.ChunkedArray, label: str, name: str) -> np.ndarray:
-    """The cells as floats (N,), NaN where they are blank."""
-    try:
-        if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
-            column = pc.replace_substring_regex(_texts(column), r"^\+", "")
-            column = pc.if_else(pc.is_in(pc.utf8_lower(column), pa.array(BLANK)), None, column)
-        return np.array(column.cast(pa.float64(), safe=False).to_numpy(), float)
-    except pa.ArrowException:
-        raise InputError(f"{name}: the column {label} {_told_text(column)}") from None
-
-
-def _told_text(column: pa.ChunkedArray) -> str:
-    if not pa.types.is_string(column.type):
-        return f"holds {column.type}, numbers were expected"
-    for row, text in enumerate(column, start=1):
-        try:
-            text.cast(pa.float64())
-        except pa.ArrowException:
-            return f"has the text {text.as_py()[:40]!r} in data row {row}, a number was expected"
-    return "holds text, numbers were expected"
+        return f"the {noun} {listed(alike)} has an unknown unit, known are {listed(known)} (or choose with --map)"
+    return f"there is no {noun}, {listed(known)} was expected and the columns are {listed(columns)}"
 
 
 # -- what is refused ----------------------------------------------------------------------------------------
@@ -493,14 +354,14 @@ def _problems(
 ) -> list[str]:
     """A sentence for each; `printed` are the columns as they stand in the file, `step` the converter's there."""
     t, u, y = fields["t"], fields["u"], printed["y"]
-    frozen = _frozen(y, step or _decimal_grain(y[np.isfinite(y)]))
+    frozen = frozen_spans(y, step or decimal_grain(y[np.isfinite(y)]))
     return [
         *(_told_blanks(x, labels[field], field) for field, x in printed.items() if np.isnan(x).any()),
         *_told_gaps(t),
         *_told_jitter(t),
-        *_told_clipped(u, labels["u"], [s for s in _held_spans(u) if _at_extreme(u, s) and _varied(u, s)]),
-        *_told_clipped(y, labels["y"], [s for s in frozen if _at_extreme(y, s)]),
-        *_told_stuck(t, labels["y"], [s for s in frozen if not _at_extreme(y, s) and np.ptp(u[s]) > 0]),
+        *_told_clipped(u, labels["u"], [s for s in held_spans(u) if at_extreme(u, s) and varied(u, s)]),
+        *_told_clipped(y, labels["y"], [s for s in frozen if at_extreme(y, s)]),
+        *_told_stuck(t, labels["y"], [s for s in frozen if not at_extreme(y, s) and np.ptp(u[s]) > 0]),
         *([f"the input {labels['u']} is constant at {u[0]:.6g}"] if np.ptp(u) == 0 else []),
         *([f"the output {labels['y']} moves in steps of {step:.4g}, those of its converter"] if step else []),
     ]
@@ -532,7 +393,7 @@ def _told_jitter(t: np.ndarray) -> list[str]:
 def _told_clipped(x: np.ndarray, label: str, spans: list[slice]) -> list[str]:
     if not spans:
         return []
-    limits = _listed(f"{limit:.6g}" for limit in sorted({float(x[span.start]) for span in spans}))
+    limits = listed(f"{limit:.6g}" for limit in sorted({float(x[span.start]) for span in spans}))
     return [f"{label} looks clipped at {limits}: {_told_spans(spans, len(x))}"]
 
 
@@ -552,118 +413,4 @@ def _told_spans(spans: list[slice], total: int) -> str:
 def _ignored(columns: list[str], labels: dict[str, str]) -> list[str]:
     """Tell the columns that were not taken in; `run` chose the rows."""
     ignored = [column for column in columns if column not in labels.values() and column != "run"]
-    return [f"columns that mean nothing here are ignored: {_listed(ignored)}"] if ignored else []
-
-
-# -- held spans ------------------------------------------------------------------------------------------------
-
-
-def _frozen(y: np.ndarray, grid: float) -> list[slice]:
-    """Spans of exact repeats too long for chance, amid noise that should have varied them.
-
-    A grid (of the converter or of the print) coarser than the noise, and a rudder at rest without noise,
-    repeat by themselves: there the samples around do not dither and nothing can be told.
-    """
-    if _noise(y) < grid:
-        return []
-    by_chance = 0.3 if grid else 1 / len(y)  # a grid below the noise repeats up to 28 % of the samples at rest
-    repeats = np.clip(np.mean(np.diff(y) == 0), by_chance, 0.9)
-    shortest = max(SHORTEST_HELD, int(np.ceil(2 * np.log(len(y)) / -np.log(repeats))))
-    return [s for s in _held_spans(y, shortest) if _dithered(y, s)]
-
-
-def _held_spans(x: np.ndarray, shortest: int = SHORTEST_HELD) -> list[slice]:
-    """Runs of at least `shortest` equal samples."""
-    starts = np.flatnonzero(np.r_[True, np.diff(x) != 0])
-    stops = np.r_[starts[1:], len(x)]
-    long = stops - starts >= shortest
-    return [slice(int(a), int(b)) for a, b in zip(starts[long], stops[long], strict=True)]
-
-
-def _at_extreme(x: np.ndarray, span: slice) -> bool:
-    return bool(x[span.start] in (np.nanmin(x), np.nanmax(x)))
-
-
-def _around(x: np.ndarray, span: slice) -> tuple[np.ndarray, np.ndarray]:
-    """The changes from sample to sample just before and just after a span."""
-    return np.diff(x[max(0, span.start - NEIGHBOURS) : span.start]), np.diff(x[span.stop : span.stop + NEIGHBOURS])
-
-
-def _varied(x: np.ndarray, span: slice) -> bool:
-    """Whether x changes at most samples around a span, as no step sequence does."""
-    changes = np.concatenate(_around(x, span))
-    return bool(np.count_nonzero(changes) > 0.5 * len(changes))
-
-
-def _dithered(x: np.ndarray, span: slice) -> bool:
-    """Whether x jerks to and fro on both sides of a span, as noise does whatever the motion under it (4 in 5 turns)."""
-    jerks = [np.diff(change, n=2) for change in _around(x, span)]
-    return all(np.count_nonzero(jerk[:-1] * jerk[1:] < 0) > 0.4 * max(len(jerk) - 1, 1) for jerk in jerks)
-
-
-def _noise(y: np.ndarray) -> float:
-    """Rms noise, from the lower quartile of the third differences: where y rests for that long, the noise at rest."""
-    return float(np.nanquantile(np.abs(np.diff(y, n=3)), 0.25) / (0.3186 * np.sqrt(20)))
-
-
-# -- the converter's step ------------------------------------------------------------------------------------
-
-
-def converter_step(y: np.ndarray) -> float:
-    """The step of the lattice that y (N,) lies on, in y's unit; 0.0 when there is none.
-
-    The differences between neighbouring distinct values must be whole multiples of one step, exactly or,
-    where values were rounded in print, within an eighth of it. The decimal grid of the print is a
-    lattice too: it counts only where the travel has fewer than 200 of its steps, for then it hides as
-    much as a converter would. Pass values in the unit they were printed in.
-    """
-    levels, counts = np.unique(y[np.isfinite(y)], return_counts=True)
-    if len(levels) < FEWEST_LEVELS or np.mean(counts > 1) < FEWEST_REVISITED:
-        return 0.0
-    grain = _decimal_grain(levels)
-    multiple = np.gcd.reduce(np.rint(np.diff(levels) / grain).astype(np.int64)) if grain else 1
-    if multiple > 1:
-        return float(multiple * grain)
-    return _rounded_lattice(levels, grain) or (grain if np.ptp(levels) < COARSE * grain else 0.0)
-
-
-def _decimal_grain(levels: np.ndarray) -> float:
-    """The coarsest power of ten that all levels are multiples of; 0.0 when there is none above 1e-12."""
-    for decimals in range(int(np.clip(12 - np.log10(np.abs(levels).max()), 0, 13))):
-        scaled = levels * 10.0**decimals
-        if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
-            return 10.0**-decimals
-    return 0.0
-
-
-def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
-    """The largest step that nine in ten differences of the levels are multiples of, within an eighth."""
-    finest = 8 * max(grain, float(np.finfo(np.float32).eps) * np.abs(levels).max())
-    gaps = np.diff(levels)
-    gaps = gaps[gaps > finest / 8]
-    steps = [_refined(gaps, step) for step in np.quantile(gaps, LATTICE_QUANTILES) if step >= finest]
-    return max((step for step in steps if np.mean(_on_lattice(gaps, step)) >= 0.9), default=0.0)
-
-
-def _on_lattice(gaps: np.ndarray, step: float) -> np.ndarray:
-    return np.abs(gaps / step - np.rint(gaps / step)) < 0.125
-
-
-def _refined(gaps: np.ndarray, step: float) -> float:
-    """The step by least squares over the gaps that are multiples of it."""
-    gaps = gaps[_on_lattice(gaps, step)]
-    multiples = np.rint(gaps / step)
-    return float(gaps @ multiples / (multiples @ multiples))
-
-
-# -- words -----------------------------------------------------------------------------------------------------
-
-
-def _listed(names: Iterable, most: int = 24) -> str:
-    """Names with commas; of many, the first ones, the last, and how many there are."""
-    words = [str(name)[:40] for name in names]
-    return ", ".join(words) if len(words) <= most else f"{', '.join(words[:8])} ... {words[-1]} ({len(words)} in all)"
-
-
-def _reason(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0][:120]
+    return [f"columns that mean nothing here are ignored: {listed(ignored)}"] if ignored else []

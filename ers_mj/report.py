@@ -5,12 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
 from ers_mj import figures
-from ers_mj.display import NONE, Unit, figure, interval, missing, pretty, shown, spoken
+from ers_mj.display import NONE, Unit, figure, interval, missing, pretty, shown 
 from ers_mj.evidence import Evidence, RecordView, Rung
 
 VERDICTS = {

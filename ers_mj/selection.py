@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.effects import BY_NAME, EFFECTS
-from ers_mj.identification import OBSERVER_RATE, STATES, Fit, converged, fit, jacobian_of, residuals, score, tau_of
+from ers_mj.effects import EFFECTS
+from ers_mj.identification import OBSERVER_RATE, STATES, Fit, Model, converged, fit, jacobian_of, residuals, score, tau_of
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 0.02  # decrease of C per block that an effect must buy: an error of about 0.2 sigma RMS
@@ -24,6 +24,7 @@ LEAST_Z = 2.0  # and the paired z-score of that decrease over the blocks
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
+LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 MOST_ROUNDS = 2
@@ -60,39 +61,66 @@ def tie(best: Candidate, other: Candidate) -> float:
     return math.erfc(max(float(np.sum(d)), 0.0) / spread / math.sqrt(2.0))
 
 
-def screen(base: Fit, traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[np.ndarray]]]:
-    """Effects with their most promising starts, by the share of the weighted residual that the start's secant explains.
+def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Model]]]]:
+    """Effects, the most promising first, each with the models to refit: for every place, those of its best starts.
 
-    The secant e(with effect) - e(without) is taken at the start's visible size, and what the baseline's own parameters
-    could do as well is projected out.
+    From each place (the refitted baseline, and where else a fit may start from) the secant e(with effect) - e(without) is taken at
+    the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
+    largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
+    a small effect beside the noise, the second a large one that the baseline could not swallow.
     """
-    model, blocks = base.model, Blocks.of(traces)
-    layout = model.layout()
-    z = model.vector(layout)
-    e = residuals(model, traces, OBSERVER_RATE)
-    m = blocks.misfit(e)
-    root = np.sqrt(2.0 / ((tau + m) * blocks.counts))[blocks.index]
-    basis, _ = np.linalg.qr(jacobian_of(model, layout, z, e, traces, OBSERVER_RATE) * root[:, None])
-    target = root * e
-    target = target - basis @ (basis.T @ target)
-    found = []
-    for effect in EFFECTS:
-        if effect.name in exclude:
+    found: dict[str, list[list[tuple[float, Model]]]] = {}
+    for place in places:
+        e = residuals(place, traces, OBSERVER_RATE)
+        if not np.all(np.isfinite(e)):
             continue
-        tried = []
-        for start in effect.starts(model.scales):
-            secant = residuals(model.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
-            if not np.all(np.isfinite(secant)):
-                continue
-            secant = root * secant
-            secant = secant - basis @ (basis.T @ secant)
-            size, pull = float(secant @ secant), -float(secant @ target)
-            tried.append((math.copysign(pull**2 / size, pull) if size > 1e-12 else 0.0, start))
-        if tried:
-            tried.sort(key=lambda item: -item[0])
-            found.append((effect.name, tried))
-    found.sort(key=lambda item: -item[1][0][0])
-    return [(name, [start for _, start in tried[:BY_NAME[name].tries]]) for name, tried in found]
+        targets = _targets(place, e, traces, tau)
+        for effect in EFFECTS:
+            if effect.name not in exclude:
+                tried = [t for start in effect.starts(place.scales) if (t := _promise(place, effect, start, e, targets, traces))]
+                found.setdefault(effect.name, []).append(sorted(tried, key=lambda t: -t[0])[:effect.tries])
+    ranked = sorted(((name, [p for p in per_place if p]) for name, per_place in found.items()),
+                    key=lambda item: -max((tried[0][0] for tried in item[1]), default=0.0))
+    return [(name, [[model for _, model in tried] for tried in per_place]) for name, per_place in ranked if per_place]
+
+
+def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """(weights (N,), orthonormal basis (N, k) of the place's own parameters, weighted residual (N,) beside it) at either weighting."""
+    blocks, layout = Blocks.of(traces), place.layout()
+    m = blocks.misfit(e)
+    jacobian = jacobian_of(place, layout, place.vector(layout), e, traces, OBSERVER_RATE)
+    out = []
+    for level in (tau, max(tau, float(np.mean(m)))):
+        root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
+        basis, _ = np.linalg.qr(jacobian * root[:, None])
+        out.append((root, basis, _beside(basis, root * e)))
+    return out
+
+
+def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
+    """Share of the residual that the start's secant explains, and the model with the start as large as the secant asks for."""
+    secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
+    if not np.all(np.isfinite(secant)):
+        return None
+    best, factor = 0.0, LEAST_SIZE
+    for root, basis, target in targets:
+        free = _beside(basis, root * secant)
+        size, pull = float(free @ free), -float(free @ target)
+        if size > 1e-12 and (pull > 0 or effect.signed) and pull**2 / size > best * float(target @ target):
+            best, factor = pull**2 / size / float(target @ target), pull / size
+    return best, place.with_effect(effect.name, _resized(start, effect.sized, factor))
+
+
+def _beside(basis: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """What of x (N,) is orthogonal to the basis (N, k)."""
+    return x - basis @ (basis.T @ x)
+
+
+def _resized(start: np.ndarray, sized: int, factor: float) -> np.ndarray:
+    """The start with the effect as large as its secant asks for, so that the refit begins near the model it extends."""
+    start = start.copy()
+    start[:sized] *= math.copysign(min(max(abs(factor), LEAST_SIZE), MOST_SIZE), factor)
+    return start
 
 
 def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str],
@@ -107,15 +135,12 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         return min((fit(model, traces, tau=tau, steps=6, ceiling=base.misfit) for model in models), key=total)
 
     def first(item):
-        name, starts = item
-        if name in STATES:
-            return name, quick([base.model.with_state(name, len(traces))])
-        model = base.model.with_effect(name, starts[0])
-        return name, quick([model, *(replace(model, values={**model.values, **values}) for values in anchors)])
+        name, per_place = item
+        return name, quick([models[0] for models in per_place])
 
     def further(item):
-        (name, starts), (_, found) = item
-        others = [base.model.with_effect(name, start) for start in starts[1:]]
+        (name, per_place), (_, found) = item
+        others = [model for models in per_place for model in models[1:]]
         return name, min(found, quick(others), key=total) if others and reference - total(found) >= AGAIN * most else found
 
     def finish(item):
@@ -125,9 +150,10 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         name, found = item
         return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau))
 
-    states = [(s, []) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
+    states = [(s, [[base.model.with_state(s, len(traces))]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
+    places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
-        screened = screen(base, traces, tau, exclude)[:REFITTED] + states
+        screened = screen(places, traces, tau, exclude)[:REFITTED] + states
         once = list(pool.map(first, screened))
         most = max((reference - total(f) for _, f in once), default=0.0)
         rough = sorted(pool.map(further, zip(screened, once)), key=lambda item: total(item[1]))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
-ORDER = ["errors", "recording", "datasheet", "effects", "plants", "simulation", "traces", "identification", "guess", "baseline", "selection",
+ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "simulation", "traces", "identification", "guess", "baseline", "selection",
          "intervals", "evaluation", "evidence", "excitation", "localisation", "diagnosis", "display", "figures", "report", "commands", "cli"]
 SILENT = {"identification", "guess", "baseline", "selection", "intervals", "evaluation", "localisation", "diagnosis", "effects", "plants"}
 

@@ -88,47 +88,21 @@ def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
     import numpy as np
 
     from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
+    from ers_mj.recording import read_input
 
     if arguments.input not in INPUTS:
         for option, value in (("--rate-hz", arguments.rate_hz), ("--duration", arguments.duration)):
             if value is not None and Path(arguments.input).exists():
                 raise InputError(f"{option} is for named inputs ({', '.join(INPUTS)}), the file brings its own times")
-        return read_input(arguments.input)
+        file = Path(arguments.input)
+        if not file.exists() and not file.suffix:
+            raise InputError(f"--input {file}: there is no such file and no input of that name; there are {', '.join(INPUTS)}")
+        return read_input(file)
     rate, duration = arguments.rate_hz or RATE_HZ, arguments.duration or DURATION
     if not 2 <= rate * duration <= MOST_SAMPLES:
         raise InputError(f"{duration:g} s at {rate:g} Hz are {rate * duration:.3g} samples, 2 to {MOST_SAMPLES:.0e} were expected")
     t = np.arange(round(rate * duration)) / rate
     return t, INPUTS[arguments.input](t)
-
-
-def read_input(path: str) -> tuple[np.ndarray, np.ndarray]:
-    """Time [s] and voltage [V], each (N,), of a CSV or Parquet file with the columns t_s and u_V.
-
-    Raises:
-        InputError: the file is no such thing, in one sentence.
-    """
-    import numpy as np
-
-    from ers_mj import recording
-    from ers_mj.plants.inputs import INPUTS
-
-    file = Path(path)
-    if not file.exists() and not file.suffix:
-        raise InputError(f"--input {path}: there is no such file and no input of that name; there are {', '.join(INPUTS)}")
-    table = recording._table(recording._content(file), file.suffix.lower(), file.name)
-    columns = []
-    for label in ("t_s", "u_V"):
-        if label not in table.column_names:
-            raise InputError(f"{file.name}: there is no column {label}, the columns are {', '.join(table.column_names)[:400]}")
-        x = recording._numbers(table[label], label, file.name)
-        if not np.isfinite(x).all():
-            row = 1 + int(np.argmax(~np.isfinite(x)))
-            raise InputError(f"{file.name}: {label} is missing or infinite in data row {row}, an input has no holes")
-        columns.append(x)
-    if columns[0].size < 2:
-        raise InputError(f"{file.name}: has {columns[0].size} samples, at least 2 are needed")
-    recording._refuse_time(columns[0], "t_s", file.name)
-    return columns[0], columns[1]
 
 
 def _summary(arguments: argparse.Namespace, columns: dict, effects: list) -> dict:

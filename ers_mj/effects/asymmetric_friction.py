@@ -14,10 +14,11 @@ class AsymmetricFriction(Friction):
         Parameter("dF", "torque", "half the difference of Coulomb friction, up minus down", positive=False),
         Parameter("dB", "damping", "half the difference of viscous friction, up minus down", positive=False),
     )
+    sized = 2
 
     def starts(self, scales):
         return [np.array([0.1 * scales.acceleration * a, 0.05 * scales.acceleration / scales.speed * b])
-                for a, b in ((1, 1), (-1, 1), (1, -1), (-1, -1))]
+                for a, b in ((1, 1), (1, -1))]
 
     def coefficients(self, p, c):
         return c._replace(c_2_plus=max(c.c_2_plus + p[0], 0.0), c_2_minus=max(c.c_2_minus - p[0], 0.0),

@@ -104,9 +104,15 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
+    sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
     follows_current: ClassVar[bool] = False  # its law changes as fast as the current: half the segment length
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
+
+    @property
+    def signed(self) -> bool:
+        """Whether the effect may act either way along a start."""
+        return self.sized > 0 and not any(p.positive for p in self.parameters[:self.sized])
 
     def absent(self) -> np.ndarray:
         """Parameter values (k,) at which the effect vanishes, so that models nest."""

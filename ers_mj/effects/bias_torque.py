@@ -11,9 +11,10 @@ class BiasTorque(Load):
     name = "bias_torque"
     sentence = "a constant torque of {tau_0} pushes the rudder to one side"
     parameters = (Parameter("tau_0", "torque", "constant torque, positive towards growing angle", positive=False),)
+    sized = 1
 
     def starts(self, scales):
-        return [np.array([sign * 0.1 * scales.acceleration]) for sign in (1, -1)]
+        return [np.array([0.1 * scales.acceleration])]
 
     def coefficients(self, p, c):
         return c._replace(bias=c.bias + p[0])

@@ -23,7 +23,7 @@ class DriveDeadZone(Drive):
     tries = 3
 
     def starts(self, scales):
-        widths = np.array([0.01, 0.02, 0.04, 0.08, 0.16]) * scales.input
+        widths = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32]) * scales.input
         return [np.array([0.02 * scales.input, np.inf]), *(np.array([d, 0.05 * d]) for d in widths)]
 
     def command(self, p, u):

@@ -16,10 +16,15 @@ class GravityImbalance(Load):
         Parameter("g_s", "torque", "m g l cos(phase)", positive=False),
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),
     )
+    sized, tries = 2, 3
 
     def starts(self, scales):
-        size = 0.2 * scales.acceleration
-        return [np.array([a * size, b * size]) for a, b in ((1, 0.3), (-1, 0.3))] if scales.is_angle else []
+        """At the middle of the travel: a torque, a stiffness, and both either way."""
+        if not scales.is_angle:
+            return []
+        size, middle = 0.2 * scales.acceleration, 0.5 * (scales.low + scales.high)
+        turns = middle + np.pi / 2 * np.array([0.0, 1.0, 0.5, -0.5])
+        return [size * np.array([np.cos(turn), -np.sin(turn)]) for turn in turns]
 
     @law
     def torque(p, theta, w, j, t):

@@ -11,9 +11,10 @@ class HingeMomentCubic(Load):
     name = "hinge_moment_cubic"
     sentence = "a hinge moment of {k_3} times angle cubed acts on the rudder"
     parameters = (Parameter("k_3", "cubic", "torque per angle cubed", positive=False),)
+    sized = 1
 
     def starts(self, scales):
-        return [np.array([sign * 0.2 * scales.acceleration / scales.position**3]) for sign in (1, -1)]
+        return [np.array([0.2 * scales.acceleration / scales.position**3])]
 
     def constants(self, p, c):
         return np.array([p[0], c.theta_0])

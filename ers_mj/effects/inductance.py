@@ -12,6 +12,7 @@ class Inductance(Drive):
     sentence = "the motor current lags by an extra {tau_L}, more winding inductance than the datasheet has"
     parameters = (Parameter("tau_L", "time", "electrical time constant beyond the baseline's"),)
     absorbs = ("tau_e",)
+    sized = 1
 
     def starts(self, scales):
         return [np.array([2 * scales.sample_time])]

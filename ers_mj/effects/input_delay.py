@@ -11,6 +11,7 @@ class InputDelay(Drive):
     name = "input_delay"
     sentence = "the command reaches the motor {T_d} late"
     parameters = (Parameter("T_d", "time", "dead time of the command"),)
+    sized = 1
 
     def starts(self, scales):
         return [np.array([2 * scales.sample_time])]

@@ -12,6 +12,7 @@ class LoadDependentFriction(Friction):
     sentence = "friction grows by {mu} of the torque that the gear transmits"
     parameters = (Parameter("mu", "ratio", "share of the drive torque lost to friction", upper=0.9),)
     follows_current = True
+    sized = 1
 
     def starts(self, scales):
         return [np.array([0.05])]

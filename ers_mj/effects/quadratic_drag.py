@@ -11,6 +11,7 @@ class QuadraticDrag(Friction):
     name = "quadratic_drag"
     sentence = "a drag of {c} times speed squared brakes fast motion"
     parameters = (Parameter("c", "drag", "torque per speed squared"),)
+    sized = 1
 
     def starts(self, scales):
         return [np.array([0.1 * scales.acceleration / scales.speed**2])]

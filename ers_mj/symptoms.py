@@ -1,0 +1,108 @@
+"""What a signal shows of the instrument that took it: held spans, noise, and the step of its converter."""
+
+import numpy as np
+
+NEIGHBOURS = 20  # samples on either side of a held span that say how the signal usually moves
+SHORTEST_HELD = 5  # samples
+FEWEST_LEVELS = 3  # distinct values below which no lattice can be told
+FEWEST_REVISITED = 0.05  # share of the distinct values that a converter shows twice or more
+COARSE = 200  # levels of travel below which even a decimal grid acts as a converter
+LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
+
+
+def frozen_spans(y: np.ndarray, grid: float) -> list[slice]:
+    """Spans of exact repeats too long for chance, amid noise that should have varied them.
+
+    A grid (of the converter or of the print) coarser than the noise, and a rudder at rest without noise,
+    repeat by themselves: there the samples around do not dither and nothing can be told.
+    """
+    if _noise(y) < grid:
+        return []
+    by_chance = 0.3 if grid else 1 / len(y)  # a grid below the noise repeats up to 28 % of the samples at rest
+    repeats = np.clip(np.mean(np.diff(y) == 0), by_chance, 0.9)
+    shortest = max(SHORTEST_HELD, int(np.ceil(2 * np.log(len(y)) / -np.log(repeats))))
+    return [s for s in held_spans(y, shortest) if _dithered(y, s)]
+
+
+def held_spans(x: np.ndarray, shortest: int = SHORTEST_HELD) -> list[slice]:
+    """Runs of at least `shortest` equal samples."""
+    starts = np.flatnonzero(np.r_[True, np.diff(x) != 0])
+    stops = np.r_[starts[1:], len(x)]
+    long = stops - starts >= shortest
+    return [slice(int(a), int(b)) for a, b in zip(starts[long], stops[long], strict=True)]
+
+
+def at_extreme(x: np.ndarray, span: slice) -> bool:
+    return bool(x[span.start] in (np.nanmin(x), np.nanmax(x)))
+
+
+def _around(x: np.ndarray, span: slice) -> tuple[np.ndarray, np.ndarray]:
+    """The changes from sample to sample just before and just after a span."""
+    return np.diff(x[max(0, span.start - NEIGHBOURS) : span.start]), np.diff(x[span.stop : span.stop + NEIGHBOURS])
+
+
+def varied(x: np.ndarray, span: slice) -> bool:
+    """Whether x changes at most samples around a span, as no step sequence does."""
+    changes = np.concatenate(_around(x, span))
+    return bool(np.count_nonzero(changes) > 0.5 * len(changes))
+
+
+def _dithered(x: np.ndarray, span: slice) -> bool:
+    """Whether x jerks to and fro on both sides of a span, as noise does whatever the motion under it (4 in 5 turns)."""
+    jerks = [np.diff(change, n=2) for change in _around(x, span)]
+    return all(np.count_nonzero(jerk[:-1] * jerk[1:] < 0) > 0.4 * max(len(jerk) - 1, 1) for jerk in jerks)
+
+
+def _noise(y: np.ndarray) -> float:
+    """Rms noise, from the lower quartile of the third differences: where y rests for that long, the noise at rest."""
+    return float(np.nanquantile(np.abs(np.diff(y, n=3)), 0.25) / (0.3186 * np.sqrt(20)))
+
+
+# -- the converter's step ------------------------------------------------------------------------------------
+
+
+def converter_step(y: np.ndarray) -> float:
+    """The step of the lattice that y (N,) lies on, in y's unit; 0.0 when there is none.
+
+    The differences between neighbouring distinct values must be whole multiples of one step, exactly or,
+    where values were rounded in print, within an eighth of it. The decimal grid of the print is a
+    lattice too: it counts only where the travel has fewer than 200 of its steps, for then it hides as
+    much as a converter would. Pass values in the unit they were printed in.
+    """
+    levels, counts = np.unique(y[np.isfinite(y)], return_counts=True)
+    if len(levels) < FEWEST_LEVELS or np.mean(counts > 1) < FEWEST_REVISITED:
+        return 0.0
+    grain = decimal_grain(levels)
+    multiple = np.gcd.reduce(np.rint(np.diff(levels) / grain).astype(np.int64)) if grain else 1
+    if multiple > 1:
+        return float(multiple * grain)
+    return _rounded_lattice(levels, grain) or (grain if np.ptp(levels) < COARSE * grain else 0.0)
+
+
+def decimal_grain(levels: np.ndarray) -> float:
+    """The coarsest power of ten that all levels are multiples of; 0.0 when there is none above 1e-12."""
+    for decimals in range(int(np.clip(12 - np.log10(np.abs(levels).max()), 0, 13))):
+        scaled = levels * 10.0**decimals
+        if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
+            return 10.0**-decimals
+    return 0.0
+
+
+def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
+    """The largest step that nine in ten differences of the levels are multiples of, within an eighth."""
+    finest = 8 * max(grain, float(np.finfo(np.float32).eps) * np.abs(levels).max())
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > finest / 8]
+    steps = [_refined(gaps, step) for step in np.quantile(gaps, LATTICE_QUANTILES) if step >= finest]
+    return max((step for step in steps if np.mean(_on_lattice(gaps, step)) >= 0.9), default=0.0)
+
+
+def _on_lattice(gaps: np.ndarray, step: float) -> np.ndarray:
+    return np.abs(gaps / step - np.rint(gaps / step)) < 0.125
+
+
+def _refined(gaps: np.ndarray, step: float) -> float:
+    """The step by least squares over the gaps that are multiples of it."""
+    gaps = gaps[_on_lattice(gaps, step)]
+    multiples = np.rint(gaps / step)
+    return float(gaps @ multiples / (multiples @ multiples))
