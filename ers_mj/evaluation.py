@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.identification import OBSERVER_RATE, Model, fit, fitted_start, residuals, score, tau_of
+from ers_mj.intervals import standard_errors
 from ers_mj.traces import Blocks, Trace
 
 RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
@@ -82,9 +83,9 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int, steps: in
         return list(pool.map(one, parts))
 
 
-def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, float]]:
+def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[float, float, float]]]:
     """Gain, friction level and (where the plant feels position) offset fitted on the first 30 % of a recording; the score is
-    taken on the rest. They stay neutral unless they buy their price there."""
+    taken on the rest. They stay neutral unless they buy their price there. Each is (value, lower, upper end of 95 %)."""
     cut = int(RECALIBRATED * trace.t.size)
     head = trace.part(0, cut)
     pair = replace(neutral(model), free=(), frozen=model.names).with_state("gain", 2).with_state("friction_level", 2)
@@ -96,8 +97,10 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, float]]:
     found = fit(pair, [blank, head], tau=tau, steps=10)
     if float(score(misfit, tau).sum() - score(found.misfit, tau).sum()) < 0.5 * found.size:
         found = replace(found, model=pair)
-    states = {name: float(values[1]) for name, values in found.model.states.items()}
-    return scored(found.model, trace, 1, cut), states
+    layout = found.model.layout()
+    error, factor = standard_errors(found.model, [blank, head], (), tau)
+    ends = {f.name: f.ends(q, factor * s) for f, q, s in zip(layout, found.model.vector(layout), error)}
+    return scored(found.model, trace, 1, cut), {name: (float(v[1]), *ends[name]) for name, v in found.model.states.items()}
 
 
 def paired_p(better: np.ndarray, worse: np.ndarray) -> float:

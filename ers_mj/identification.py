@@ -46,6 +46,12 @@ class Free:
     upper: float
     prior: tuple[float, float] | None = None
 
+    def ends(self, z: float, half: float) -> tuple[float, float]:
+        """The interval z -+ half of the transformed number, in the number's own unit."""
+        if self.positive:
+            return math.exp(min(z - half, 700)), math.exp(min(z + half, 700))
+        return (z - half) * self.scale, (z + half) * self.scale
+
 
 @dataclass(frozen=True)
 class Model:

@@ -23,6 +23,7 @@ LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 2.0  # and the paired z-score of that decrease over the blocks
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
+ELSEWHERE = 3  # and those that another place than the refitted baseline finds most promising
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
@@ -62,26 +63,31 @@ def tie(best: Candidate, other: Candidate) -> float:
 
 
 def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Model]]]]:
-    """Effects, the most promising first, each with the models to refit: for every place, those of its best starts.
+    """The promising effects, each with the models to refit: for every place, those of its best starts.
 
     From each place (the refitted baseline, and where else a fit may start from) the secant e(with effect) - e(without) is taken at
     the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
     largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
-    a small effect beside the noise, the second a large one that the baseline could not swallow.
+    a small effect beside the noise, the second a large one that the baseline could not swallow. The baseline sends REFITTED
+    effects on, every other place ELSEWHERE.
     """
-    found: dict[str, list[list[tuple[float, Model]]]] = {}
-    for place in places:
+    tried: dict[str, list[list[Model]]] = {}
+    sent: list[str] = []
+    for place, most in zip(places, (REFITTED, *[ELSEWHERE] * len(places))):
         e = residuals(place, traces, OBSERVER_RATE)
         if not np.all(np.isfinite(e)):
             continue
         targets = _targets(place, e, traces, tau)
+        promises = {}
         for effect in EFFECTS:
             if effect.name not in exclude:
-                tried = [t for start in effect.starts(place.scales) if (t := _promise(place, effect, start, e, targets, traces))]
-                found.setdefault(effect.name, []).append(sorted(tried, key=lambda t: -t[0])[:effect.tries])
-    ranked = sorted(((name, [p for p in per_place if p]) for name, per_place in found.items()),
-                    key=lambda item: -max((tried[0][0] for tried in item[1]), default=0.0))
-    return [(name, [[model for _, model in tried] for tried in per_place]) for name, per_place in ranked if per_place]
+                found = [p for start in effect.starts(place.scales) if (p := _promise(place, effect, start, e, targets, traces))]
+                found.sort(key=lambda p: -p[0])
+                if found:
+                    promises[effect.name] = found[0][0]
+                    tried.setdefault(effect.name, []).append([model for _, model in found[:effect.tries]])
+        sent += sorted(promises, key=promises.get, reverse=True)[:most]
+    return [(name, tried[name]) for name in dict.fromkeys(sent)]
 
 
 def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -98,17 +104,30 @@ def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float) -
 
 
 def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
-    """Share of the residual that the start's secant explains, and the model with the start as large as the secant asks for."""
-    secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
-    if not np.all(np.isfinite(secant)):
-        return None
-    best, factor = 0.0, LEAST_SIZE
-    for root, basis, target in targets:
-        free = _beside(basis, root * secant)
-        size, pull = float(free @ free), -float(free @ target)
-        if size > 1e-12 and (pull > 0 or effect.signed) and pull**2 / size > best * float(target @ target):
-            best, factor = pull**2 / size / float(target @ target), pull / size
-    return best, place.with_effect(effect.name, _resized(start, effect.sized, factor))
+    """Share of the residual that the start's secant explains, and the model with the start as large as the secant asks for.
+
+    A secant across a large step bends; where the effect is proportional to its leading parameters it is taken again at that size.
+    """
+    best = None
+    for _ in range(2 if effect.sized else 1):
+        secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
+        if not np.all(np.isfinite(secant)):
+            break
+        share, factor = max(_explained(secant, target, effect.signed) for target in targets)
+        start = _resized(start, effect.sized, factor)
+        if best is None or share > best[0]:
+            best = share, place.with_effect(effect.name, start)
+    return best
+
+
+def _explained(secant: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray], signed: bool) -> tuple[float, float]:
+    """Share of a target that a secant (N,) explains, and the multiple of the secant that does."""
+    root, basis, residual = target
+    free = _beside(basis, root * secant)
+    size, pull = float(free @ free), -float(free @ residual)
+    if size <= 1e-12 or (pull <= 0 and not signed):
+        return 0.0, LEAST_SIZE
+    return pull**2 / size / float(residual @ residual), pull / size
 
 
 def _beside(basis: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -153,7 +172,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     states = [(s, [[base.model.with_state(s, len(traces))]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
-        screened = screen(places, traces, tau, exclude)[:REFITTED] + states
+        screened = screen(places, traces, tau, exclude) + states
         once = list(pool.map(first, screened))
         most = max((reference - total(f) for _, f in once), default=0.0)
         rough = sorted(pool.map(further, zip(screened, once)), key=lambda item: total(item[1]))

@@ -1,0 +1,67 @@
+"""Which of the selected effects does held-out data confirm?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ers_mj.baseline import Start
+from ers_mj.evaluation import Fold, Score, folds, paired_p, pooled, recalibrated, refits, scored
+from ers_mj.identification import Model, fit
+from ers_mj.selection import Selection
+from ers_mj.traces import Trace
+
+LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
+HALF = 0.5  # share of its error that recalibration must take away
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """What held-out data says: scores before and after, without each effect, and the p-value of each effect."""
+
+    before: list[Score]
+    after: list[Score]
+    without: dict[str, Score]
+    p: dict[str, float]
+    models: list[Model]
+    base_models: list[Model]
+    parts: list[Fold]
+    sentence: str
+
+
+def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) -> tuple[Selection, Confirmed]:
+    """Judge each effect on held-out data; those that do not improve it beyond chance are taken out again."""
+    parts, sentence = folds(start.traces, held)
+    base_models = refits(start.fit.model, parts, selection.tau, jobs)
+    while True:
+        model = selection.chosen.model
+        after_models = refits(model, parts, selection.tau, jobs)
+        after = _scores(after_models, parts)
+        without, p, lesser_models = {}, {}, {}
+        for name in model.names:
+            if len(model.names) > 1:
+                less = fit(model.without_effect(name), start.traces, tau=selection.tau, steps=12).model
+                lesser_models[name] = refits(less, parts, selection.tau, jobs)
+            else:
+                lesser_models[name] = base_models
+            without[name] = pooled(_scores(lesser_models[name], parts))
+            p[name] = paired_p(pooled(after).misfit, without[name].misfit)
+        failed = [n for n in model.names if (p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse)
+                  and not _helps_recalibrated(after_models, lesser_models[n], parts)]
+        if not failed:
+            return selection, Confirmed(_scores(base_models, parts), after, without, p, after_models, base_models, parts, sentence)
+        worst = max(failed, key=lambda n: p[n])
+        reduced = fit(model.without_effect(worst), start.traces, tau=selection.tau, steps=15)
+        selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
+
+
+def _helps_recalibrated(models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold]) -> bool:
+    """Whether the models halve the error of recordings of another day once gain, offset and friction level of that day are known."""
+    if parts[0].training is not None:
+        return False
+    after, before = (pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(some, parts)]).rmse for some in (models, lesser))
+    return after < HALF * before
+
+
+def _scores(models: Sequence[Model], parts: Sequence[Fold]) -> list[Score]:
+    return [scored(model, fold.held_out) for model, fold in zip(models, parts)]
