@@ -10,6 +10,7 @@ class DriveDeadZone(Drive):
 
     name = "drive_dead_zone"
     sentence = "the drive swallows the first {d} of every command"
+    mjcf = "none: the command is processed before it reaches ctrl"
     parameters = (Parameter("d", "input", "half-width of the dead zone"),)
 
     def starts(self, scales):
