@@ -85,7 +85,8 @@ class Stepper:
     def _divide(self, sample: float) -> tuple[float, int]:
         """(step [s], steps) of a sample: the longest step that is no longer than the timestep and divides it."""
         steps = max(1, math.ceil(sample / self.timestep - 1e-6))
-        return sample / steps, steps
+        h = sample / steps
+        return (self.timestep if abs(h - self.timestep) < 1e-9 * h else h), steps
 
     def _connect(self, closed: bool) -> None:
         """Close or open the motor's circuit; an open one carries no current."""
