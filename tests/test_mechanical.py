@@ -1,5 +1,6 @@
 """The MuJoCo plant against the reduced model, against two rigid masses, and against itself."""
 
+import pickle
 import sys
 from pathlib import Path
 
@@ -132,3 +133,15 @@ def test_the_export_says_what_it_does_not_carry():
     plant = rudder(effects=[("load_dependent_friction", np.array([0.05])), ("drive_dead_zone", np.array([0.2]))])
     assert plant.stepped == ("load_dependent_friction",)
     assert "drive_dead_zone, load_dependent_friction" in plant.xml().splitlines()[0]
+
+
+def test_a_plant_survives_the_way_to_another_process():
+    u, plant = INPUTS["chirp"](T[:200]), rudder(gap=0.01, effects=[("load_dependent_friction", np.array([0.05]))])
+    again = pickle.loads(pickle.dumps(plant))
+    assert np.array_equal(again.simulate(T[:200], u).theta, plant.simulate(T[:200], u).theta)
+
+
+def test_a_motion_that_runs_away_is_not_a_number():
+    softening = [("hinge_moment_cubic", np.array([-400.0]))]
+    theta = rudder(effects=softening).simulate(T, INPUTS["steps"](T) + 4.0).theta
+    assert np.isnan(theta[-1]) and np.isfinite(theta[0])

@@ -153,7 +153,10 @@ class Effect:
         return y
 
     def edit_spec(self, p: np.ndarray, c: Coefficients, twin: Twin) -> bool:
-        """Write the effect's elements into the MJCF; False where the stepping has to apply its law instead."""
+        """Write the effect's elements into the MJCF; False where the stepping has to apply its law instead.
+
+        ``p`` is what the law receives (``constants``), ``c`` the coefficients with every effect in place.
+        """
         return not (self.torque or self.friction)
 
     def describe(self, values: dict[str, str]) -> str:

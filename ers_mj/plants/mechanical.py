@@ -63,6 +63,11 @@ class MechanicalPlant:
         object.__setattr__(self, "_laws", laws)
         object.__setattr__(self, "model", skeleton.spec.compile())
 
+    def __reduce__(self) -> tuple:
+        """Travel to another process as its settings; the model is built again there."""
+        parameters = None if self.parameters is None else dict(self.parameters)
+        return type(self), (self.coefficients, tuple(self.effects), parameters, self.linkage, self.gap, self.is_angle, self.timestep)
+
     def simulate(self, t, u, start=None, *, enable=None, load=None) -> Motion:
         """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples.
 

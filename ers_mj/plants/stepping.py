@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import mujoco
@@ -13,6 +15,17 @@ import numpy as np
 from ers_mj.effects.base import Coefficients
 
 MOTOR_GROUP = 1  # actuator group that an open circuit disables
+
+
+@contextmanager
+def unlogged() -> Iterator[None]:
+    """Keep MuJoCo from printing and from writing MUJOCO_LOG.TXT where a motion runs away: NaN says it."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 @dataclass(frozen=True)
@@ -27,7 +40,7 @@ class Law:
 
 @dataclass
 class Stepper:
-    """One run of one plant.
+    """One run of one plant, on a copy of its model.
 
     ``inertia``, ``ratio`` and ``motor_joint`` are the skeleton's; ``activation`` turns the motor's activation into a drive
     acceleration.
@@ -44,6 +57,7 @@ class Stepper:
     data: mujoco.MjData = field(init=False)
 
     def __post_init__(self):
+        self.model = copy.copy(self.model)
         self.data = mujoco.MjData(self.model)
         self.motor, self.load = (self.model.actuator(name).id for name in ("motor", "load"))
         self.tendon = self.model.tendon("rudder_angle").id
@@ -64,6 +78,7 @@ class Stepper:
         if self.model.na:
             self.data.act[0] = self.drive / self.activation
 
+    @unlogged()
     def run(self, t: np.ndarray, u: np.ndarray, delay: float, enable=None, load=None) -> np.ndarray:
         """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration."""
         model, data, rows = self.model, self.data, np.full((t.size, 5), np.nan)
@@ -79,7 +94,6 @@ class Stepper:
             inputs = [(u[k], steps)] if late is None else [(v, 1) for v in late(t[k] + h * np.arange(steps + 1))]
             for v, count in inputs:
                 self._advance(v, known, count)
-        model.opt.timestep = self.timestep
         return rows
 
     def _divide(self, sample: float) -> tuple[float, int]:
@@ -145,6 +159,7 @@ def _delayed(t: np.ndarray, u: np.ndarray, delay: float) -> Callable[[np.ndarray
     return lambda ends: np.diff(np.interp(ends - delay, at, area)) / np.diff(ends)
 
 
+@unlogged()
 def step_many(steppers: Sequence[Stepper], t: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Rows (M, N, 5) as Stepper.run's, of plants without laws or delay and of one layout, on all cores; u is (M, N)."""
     first = steppers[0]
@@ -165,8 +180,6 @@ def step_many(steppers: Sequence[Stepper], t: np.ndarray, u: np.ndarray) -> np.n
         if k < t.size - 1:
             ctrl[:, first.motor] = u[:, k]
             batch.step(nstep=steps)
-    for stepper in steppers:
-        stepper.model.opt.timestep = stepper.timestep
     return np.array([_rows(stepper, states[:, i], u[i]) for i, stepper in enumerate(steppers)])
 
 
