@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.base import Coefficients, Effect, Twin
+from ers_mj.effects.base import Coefficients, Twin
 from ers_mj.errors import InputError
 from ers_mj.plants.reduced import Motion
 from ers_mj.plants.skeletons import MOTOR_SHARE, Skeleton, lumped_skeleton, rudder_skeleton
@@ -85,7 +85,7 @@ class MechanicalPlant:
         stepper = self._stepper()
         stepper.reset(self._start(start))
         rows = stepper.run(t, u, self._lowered.delay, enable, load)
-        return self._motion(t, u, rows, enable)
+        return self._motion(t, rows)
 
     def terminal(self, u: np.ndarray) -> np.ndarray:
         """The input (N,) that is left of the command u (N,) after the drive's static effects."""
@@ -149,7 +149,7 @@ class MechanicalPlant:
         for name, values in self.effects:
             effect, constants = BY_NAME[name], BY_NAME[name].constants(values, c)
             if not effect.edit_spec(constants, c, twin):
-                laws.append(_law(effect, constants))
+                laws.append(Law(name, constants, effect.torque, effect.friction))
         if c.a_mech_plus != c.a_mech_minus:
             laws.append(_viscous_asymmetry(c))
         return skeleton, tuple(laws)
@@ -175,17 +175,13 @@ class MechanicalPlant:
         joints["lever_down"] = (min(theta, c.theta_0), omega if theta < c.theta_0 else min(omega, 0.0) * (theta == c.theta_0))
         return joints | {"drive": (drive, 0.0)}
 
-    def _motion(self, t: np.ndarray, u: np.ndarray, rows: np.ndarray, enable) -> Motion:
+    def _motion(self, t: np.ndarray, rows: np.ndarray) -> Motion:
         """Rows (N, 5) of theta, omega, theta_m, motor speed over n, drive -> Motion."""
-        theta = rows[:, 0].copy()
+        theta, omega, theta_m, _, drive = rows.T.copy()
         measured = theta
         for name, values in self.effects:
             measured = BY_NAME[name].measure(values, measured)
-        return Motion(t, theta, rows[:, 1].copy(), rows[:, 4].copy(), rows[:, 2].copy(), measured)
-
-
-def _law(effect: Effect, constants: np.ndarray) -> Law:
-    return Law(effect.name, constants, effect.torque, effect.friction)
+        return Motion(t, theta, omega, drive, theta_m, measured)
 
 
 def _viscous_asymmetry(c: Coefficients) -> Law:
@@ -219,8 +215,8 @@ def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarra
         for stepper, k in zip(steppers, group, strict=True):
             stepper.reset(plants[k]._start(None))
         terminal = np.array([plants[k].terminal(u[k]) for k in group])
-        for k, ui, rows in zip(group, terminal, step_many(steppers, t, terminal), strict=True):
-            motions[k] = plants[k]._motion(t, ui, rows, None)
+        for k, rows in zip(group, step_many(steppers, t, terminal), strict=True):
+            motions[k] = plants[k]._motion(t, rows)
     for k, plant in enumerate(plants):
         if motions[k] is None:
             motions[k] = plant.simulate(t, u[k])
