@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-from ers_mj.effects.base import Coefficients, Drive, Effect, Friction, Load, Parameter, Scales, Sensor, Transmission
+from ers_mj.effects.base import Coefficients, Drive, Effect, Friction, Load, Parameter, Scales, Sensor, Transmission, Twin
 
 
 def _members() -> tuple[Effect, ...]:
@@ -30,4 +30,4 @@ EQUIVALENT: tuple[frozenset[str], ...] = (
 )
 
 __all__ = ["BY_NAME", "EFFECTS", "EQUIVALENT", "Coefficients", "Drive", "Effect", "Friction", "Load", "Parameter",
-           "Scales", "Sensor", "Transmission"]
+           "Scales", "Sensor", "Transmission", "Twin"]

@@ -10,6 +10,8 @@ class AsymmetricFriction(Friction):
 
     name = "asymmetric_friction"
     sentence = "friction differs with direction: Coulomb by {dF} and viscous by {dB} either way of their mean"
+    mjcf = ("the mean as frictionloss and damping, half the Coulomb difference as a constant torque "
+            "(exact); a viscous difference step by step")
     parameters = (
         Parameter("dF", "torque", "half the difference of Coulomb friction, up minus down", positive=False),
         Parameter("dB", "damping", "half the difference of viscous friction, up minus down", positive=False),

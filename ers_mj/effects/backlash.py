@@ -14,6 +14,8 @@ class Backlash(Transmission):
 
     name = "backlash"
     sentence = "the rudder has a play of ±{gap} against its drive"
+    mjcf = ("the joint gap, its limit a spring-damper (negative solref) that does not pull; the "
+            "shares of inertia, damping and friction on the rocker")
     parameters = (
         Parameter("gap", "position", "half-width of the play"),
         Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.1, upper=0.9, absent=0.5),

@@ -10,9 +10,12 @@ is carried as an acceleration [output unit / s^2] and only turned into N m for t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Callable, ClassVar, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import mujoco
 
 
 class Coefficients(NamedTuple):
@@ -91,16 +94,33 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Twin:
+    """Where an effect writes its MJCF realisation.
+
+    ``spec`` is the model so far; ``inertia`` the J [kg m^2, or 1 where lumped] that turns an acceleration into a torque;
+    ``is_angle`` whether the output turns (hinges) or slides. Named alike in every model: body ``rudder``, tendon
+    ``rudder_angle`` (the absolute output), actuators ``motor`` (ctrl in input units) and ``load``.
+    """
+
+    spec: mujoco.MjSpec
+    inertia: float
+    is_angle: bool
+
+
+@dataclass(frozen=True)
 class Effect:
     """Abstract base: a piece of physics that the reduced model of Eq. (6) leaves out.
 
     ``torque(p, theta, w, j, t)`` and ``friction(p, level, theta, w, j, direction)`` are compiled laws (or None);
     ``coefficients``, ``command`` and ``measure`` act outside the integrator. All are the identity unless overridden.
+    ``mjcf`` says in a sentence how a MuJoCo model shows the effect; ``edit_spec`` does it. What acts through
+    ``coefficients`` needs no more: the model is written from them. A law without a twin is applied step by step.
     """
 
     name: ClassVar[str] = ""
     sentence: ClassVar[str] = ""
     subsystem: ClassVar[str] = ""
+    mjcf: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
@@ -137,6 +157,13 @@ class Effect:
     def measure(self, p: np.ndarray, y: np.ndarray) -> np.ndarray:
         """What the sensor reads (N,) of the true output y (N,)."""
         return y
+
+    def edit_spec(self, p: np.ndarray, c: Coefficients, twin: Twin) -> bool:
+        """Write the effect's elements into the MJCF; False where the stepping has to apply its law instead.
+
+        ``p`` is what the law receives (``constants``), ``c`` the coefficients with every effect in place.
+        """
+        return not (self.torque or self.friction)
 
     def describe(self, values: dict[str, str]) -> str:
         """The sentence with its numbers; ``values`` holds name -> formatted value with unit."""

@@ -10,6 +10,7 @@ class BiasTorque(Load):
 
     name = "bias_torque"
     sentence = "a constant torque of {tau_0} pushes the rudder to one side"
+    mjcf = "an actuator of constant force on the rudder"
     parameters = (Parameter("tau_0", "torque", "constant torque, positive towards growing angle", positive=False),)
     sized = 1
 

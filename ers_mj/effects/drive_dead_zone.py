@@ -16,6 +16,7 @@ class DriveDeadZone(Drive):
 
     name = "drive_dead_zone"
     sentence = "the drive swallows commands up to {d}"
+    mjcf = "none: the command is processed before it reaches ctrl"
     parameters = (
         Parameter("d", "input", "half-width of the dead zone"),
         Parameter("lost", "input", "what is still missing outside it (all of d where none is given)", positive=False, lower=0.0, absent=np.inf),

@@ -10,6 +10,7 @@ class EndStop(Load):
 
     name = "end_stop"
     sentence = "the travel ends at a stop"
+    mjcf = "the range of the absolute angle, its limit a spring-damper (negative solref) that does not pull"
     parameters = (
         Parameter("lower", "position", "lower stop", positive=False, absent=-np.inf),
         Parameter("upper", "position", "upper stop", positive=False, absent=np.inf),

@@ -6,12 +6,16 @@ import numpy as np
 
 from ers_mj.effects.base import Load, Parameter, law
 
+G = 9.81  # [m/s^2]
+IMBALANCE_SHARE = 0.01  # the point mass takes this share of the rudder's inertia; any small share gives the same torque
+
 
 class GravityImbalance(Load):
     """theta'' -= (g_s sin theta + g_c cos theta) / J = m g l sin(theta + phase) / J. Needs an angle in rad."""
 
     name = "gravity_imbalance"
     sentence = "gravity pulls at an off-centre mass: {g_s} sin(angle) + {g_c} cos(angle)"
+    mjcf = "an off-axis point mass under gravity, every other part weightless; its inertia is taken from the rudder"
     parameters = (
         Parameter("g_s", "torque", "m g l cos(phase)", positive=False),
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),
@@ -29,3 +33,18 @@ class GravityImbalance(Load):
     @law
     def torque(p, theta, w, j, t):
         return -p[0] * math.sin(theta) - p[1] * math.cos(theta)
+
+    def edit_spec(self, p, c, twin):
+        size = math.hypot(p[0], p[1])
+        if not twin.is_angle or size == 0:
+            return size == 0
+        rudder = twin.spec.body("rudder")
+        inertia = IMBALANCE_SHARE * rudder.inertia[1]
+        arm = inertia * G / (twin.inertia * size)
+        for body in twin.spec.bodies[1:]:
+            body.gravcomp = 1.0
+        twin.spec.option.gravity = [0.0, 0.0, -G]
+        rudder.inertia = rudder.inertia - inertia
+        rudder.add_body(name="imbalance", pos=[arm * p[1] / size, 0.0, -arm * p[0] / size], explicitinertial=True,
+                        mass=inertia / arm**2, ipos=[0.0, 0.0, 0.0], inertia=[1e-9 * inertia] * 3)
+        return True

@@ -10,6 +10,7 @@ class HingeMomentCubic(Load):
 
     name = "hinge_moment_cubic"
     sentence = "a hinge moment of {k_3} times angle cubed acts on the rudder"
+    mjcf = "a cubic term in the stiffness polynomial"
     parameters = (Parameter("k_3", "cubic", "torque per angle cubed", positive=False),)
     sized = 1
 
@@ -22,3 +23,8 @@ class HingeMomentCubic(Load):
     @law
     def torque(p, theta, w, j, t):
         return -p[0] * (theta - p[1]) ** 3
+
+    def edit_spec(self, p, c, twin):
+        tendon = twin.spec.tendon("rudder_angle")
+        tendon.stiffness = [tendon.stiffness[0], 0.0, twin.inertia * p[0]]
+        return True

@@ -10,6 +10,7 @@ class Inductance(Drive):
 
     name = "inductance"
     sentence = "the motor current lags by an extra {tau_L}, more winding inductance than the datasheet has"
+    mjcf = "the inductance of the dcmotor"
     parameters = (Parameter("tau_L", "time", "electrical time constant beyond the baseline's"),)
     absorbs = ("tau_e",)
     sized = 1

@@ -10,6 +10,7 @@ class InputDelay(Drive):
 
     name = "input_delay"
     sentence = "the command reaches the motor {T_d} late"
+    mjcf = "the delay of the motor actuator"
     parameters = (Parameter("T_d", "time", "dead time of the command"),)
     sized = 1
 

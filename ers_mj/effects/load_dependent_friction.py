@@ -10,6 +10,7 @@ class LoadDependentFriction(Friction):
 
     name = "load_dependent_friction"
     sentence = "friction grows by {mu} of the torque that the gear transmits"
+    mjcf = "none: frictionloss is set step by step from the current"
     parameters = (Parameter("mu", "ratio", "share of the drive torque lost to friction", upper=0.9),)
     follows_current = True
     sized = 1

@@ -10,6 +10,7 @@ class QuadraticDrag(Friction):
 
     name = "quadratic_drag"
     sentence = "a drag of {c} times speed squared brakes fast motion"
+    mjcf = "a quadratic term in the damping polynomial"
     parameters = (Parameter("c", "drag", "torque per speed squared"),)
     sized = 1
 
@@ -19,3 +20,8 @@ class QuadraticDrag(Friction):
     @law
     def torque(p, theta, w, j, t):
         return -p[0] * w * abs(w)
+
+    def edit_spec(self, p, c, twin):
+        tendon = twin.spec.tendon("rudder_angle")
+        tendon.damping = [tendon.damping[0], twin.inertia * p[0], 0.0]
+        return True

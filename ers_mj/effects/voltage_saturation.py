@@ -10,6 +10,7 @@ class VoltageSaturation(Drive):
 
     name = "voltage_saturation"
     sentence = "the drive gives no more than {u_max}, whatever is commanded"
+    mjcf = "the ctrlrange of the motor"
     parameters = (Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),)
 
     def starts(self, scales):
@@ -17,3 +18,8 @@ class VoltageSaturation(Drive):
 
     def command(self, p, u):
         return np.clip(u, -p[0], p[0])
+
+    def edit_spec(self, p, c, twin):
+        if np.isfinite(p[0]):
+            twin.spec.actuator("motor").ctrlrange = [-p[0], p[0]]
+        return True

@@ -1,0 +1,196 @@
+"""Stepping a MuJoCo plant from sample to sample, alone or many at once."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import mujoco
+import mujoco.batch
+import numpy as np
+
+from ers_mj.effects.base import Coefficients
+
+MOTOR_GROUP = 1  # actuator group that an open circuit disables
+
+
+@contextmanager
+def unlogged() -> Iterator[None]:
+    """Keep MuJoCo from printing and from writing MUJOCO_LOG.TXT where a motion runs away: NaN says it."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law that the stepping evaluates: an effect's torque or friction (see effects/base.py) and its constants p."""
+
+    name: str
+    p: np.ndarray
+    torque: Callable | None
+    friction: Callable | None
+
+
+@dataclass
+class Stepper:
+    """One run of one plant, on a copy of its model.
+
+    ``inertia``, ``ratio`` and ``motor_joint`` are the skeleton's; ``activation`` turns the motor's activation into a drive
+    acceleration.
+    """
+
+    model: mujoco.MjModel
+    c: Coefficients
+    laws: Sequence[Law]
+    timestep: float
+    inertia: float
+    ratio: float
+    motor_joint: str
+    activation: float
+    data: mujoco.MjData = field(init=False)
+
+    def __post_init__(self):
+        self.model = copy.copy(self.model)
+        self.data = mujoco.MjData(self.model)
+        self.motor, self.load = (self.model.actuator(name).id for name in ("motor", "load"))
+        self.tendon = self.model.tendon("rudder_angle").id
+        self.rocker, self.rotor = (self._address(name) for name in ("rocker", self.motor_joint))
+        self.gap = self._address("gap") if self.c.two_body > 0 else None
+        self.torques = [(law.torque, law.p) for law in self.laws if law.torque]
+        self.frictions = [(law.friction, law.p) for law in self.laws if law.friction]
+
+    def _address(self, joint: str) -> int:
+        return int(self.model.jnt_qposadr[self.model.joint(joint).id])
+
+    def reset(self, start: Mapping[str, tuple[float, float]]) -> None:
+        """Put every joint at its (position, velocity), and the drive at its acceleration."""
+        mujoco.mj_resetData(self.model, self.data)
+        for k in range(self.model.njnt):
+            self.data.qpos[k], self.data.qvel[k] = start.get(self.model.joint(k).name, (0.0, 0.0))
+        self.drive = start["drive"][0]
+        if self.model.na:
+            self.data.act[0] = self.drive / self.activation
+
+    @unlogged()
+    def run(self, t: np.ndarray, u: np.ndarray, delay: float, enable=None, load=None) -> np.ndarray:
+        """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration."""
+        model, data, rows = self.model, self.data, np.full((t.size, 5), np.nan)
+        late = _delayed(t, u, delay) if delay > 0 else None
+        for k in range(t.size):
+            rows[k] = self._observe()
+            if k == t.size - 1 or not abs(rows[k, 0]) < 1e12:
+                break
+            h, steps = self._divide(t[k + 1] - t[k])
+            model.opt.timestep = h
+            self._connect(enable is None or bool(enable[k]))
+            known = 0.0 if load is None else load[k]
+            inputs = [(u[k], steps)] if late is None else [(v, 1) for v in late(t[k] + h * np.arange(steps + 1))]
+            for v, count in inputs:
+                self._advance(v, known, count)
+        return rows
+
+    def _divide(self, sample: float) -> tuple[float, int]:
+        """(step [s], steps) of a sample: the longest step that is no longer than the timestep and divides it."""
+        steps = max(1, math.ceil(sample / self.timestep - 1e-6))
+        h = sample / steps
+        return (self.timestep if abs(h - self.timestep) < 1e-9 * h else h), steps
+
+    def _connect(self, closed: bool) -> None:
+        """Close or open the motor's circuit; an open one carries no current."""
+        self.closed = closed
+        self.model.opt.disableactuator = 0 if closed else 1 << MOTOR_GROUP
+        if not closed:
+            self.drive = 0.0
+            self.data.act[:] = 0.0
+
+    def _advance(self, v: float, load: float, steps: int) -> None:
+        data = self.data
+        data.ctrl[self.motor], data.ctrl[self.load] = v, self.inertia * load
+        if self.laws:
+            for _ in range(steps):
+                self._apply_laws(v, load)
+                mujoco.mj_step(self.model, data)
+        else:
+            mujoco.mj_step(self.model, data, steps)
+        self.drive = self._drive(v)
+
+    def _drive(self, v: float) -> float:
+        """Drive acceleration under the input v."""
+        if not self.closed:
+            return 0.0
+        if self.model.na:
+            return self.activation * self.data.act[0]
+        return self.c.b * v - self.c.a_emf * self.data.qvel[self.rotor] / self.ratio
+
+    def _observe(self) -> tuple[float, float, float, float, float]:
+        q, v = self.data.qpos, self.data.qvel
+        theta, omega = q[self.rocker], v[self.rocker]
+        if self.gap is not None:
+            return theta + q[self.gap], omega + v[self.gap], theta, v[self.rotor] / self.ratio, self.drive
+        return theta, omega, theta, v[self.rotor] / self.ratio, self.drive
+
+    def _apply_laws(self, v: float, load: float) -> None:
+        """Set load torque and frictionloss from the laws at the present state, per step."""
+        theta, w, _, _, _ = self._observe()
+        j, t, c = self._drive(v), self.data.time, self.c
+        force = load + sum(torque(p, theta, w, j, t) for torque, p in self.torques)
+        if self.frictions:
+            share = 1.0 - c.phi if c.two_body > 0 else 1.0
+            up, down = c.c_2_plus, c.c_2_minus
+            for friction, p in self.frictions:
+                up, down = friction(p, up, theta, w, j, 1.0), friction(p, down, theta, w, j, -1.0)
+            self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
+            force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
+        self.data.ctrl[self.load] = self.inertia * force
+
+
+def _delayed(t: np.ndarray, u: np.ndarray, delay: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Mean of u(t - delay) between given instants: the impulse of a switch inside a step is exact."""
+    before = t[0] - delay - 1.0
+    at = np.concatenate([[before], t])
+    area = np.concatenate([[0.0], np.cumsum(np.concatenate([u[:1], u[:-1]]) * np.diff(at))])
+    return lambda ends: np.diff(np.interp(ends - delay, at, area)) / np.diff(ends)
+
+
+@unlogged()
+def step_many(steppers: Sequence[Stepper], t: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Rows (M, N, 5) as Stepper.run's, of plants without laws or delay and of one layout, on all cores; u is (M, N)."""
+    first = steppers[0]
+    batch = mujoco.batch.Batch(first.model, len(steppers))
+    h, steps = first._divide(t[1] - t[0])
+    for stepper in steppers:
+        stepper.model.opt.timestep = h
+    batch.set_models([stepper.model for stepper in steppers])
+    q, v, ctrl = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
+    act = batch.bind("act") if first.model.na else None
+    states = np.empty((t.size, len(steppers), q.shape[1] + v.shape[1] + (0 if act is None else 1)))
+    for i, stepper in enumerate(steppers):
+        q[i], v[i], ctrl[i] = stepper.data.qpos, stepper.data.qvel, 0.0
+        if act is not None:
+            act[i] = stepper.data.act
+    for k in range(t.size):
+        states[k] = np.concatenate([q, v] if act is None else [q, v, act], axis=1)
+        if k < t.size - 1:
+            ctrl[:, first.motor] = u[:, k]
+            batch.step(nstep=steps)
+    return np.array([_rows(stepper, states[:, i], u[i]) for i, stepper in enumerate(steppers)])
+
+
+def _rows(stepper: Stepper, states: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Rows (N, 5) from the states (N, qpos + qvel + act) of one plant."""
+    nq = stepper.model.nq
+    theta_m, omega_m = states[:, stepper.rocker], states[:, nq + stepper.rocker]
+    twist, spread = (0.0, 0.0) if stepper.gap is None else (states[:, stepper.gap], states[:, nq + stepper.gap])
+    speed = states[:, nq + stepper.rotor] / stepper.ratio
+    if stepper.model.na:
+        drive = stepper.activation * states[:, -1]
+    else:
+        drive = np.concatenate([[stepper.drive], stepper.c.b * u[:-1] - stepper.c.a_emf * speed[1:]])
+    return np.column_stack([theta_m + twist, omega_m + spread, theta_m, speed, drive])

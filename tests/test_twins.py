@@ -1,0 +1,57 @@
+"""Two roads, one answer: every effect's law in the reduced model and its MJCF realisation give the same motion."""
+
+import numpy as np
+import pytest
+
+from ers_mj.effects import EFFECTS
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.reduced import ReducedModel
+from test_mechanical import EQ_1, EQ_5, SHEET, T, rms_deg
+from test_reduced import SCALES
+
+TOLERANCE = 0.05  # of the effect's own size
+VISIBLE = 0.2  # [deg] RMS
+SIZES = {  # where the first start of an effect is too small to be seen beside the two plants' own difference
+    "inductance": [0.004], "input_delay": [0.0043], "backlash": [0.012, 0.6, 0.2, 120.0, 0.2], "stribeck": [40.0, 0.6, 1.4],
+    "end_stop": [0.15, 0.35, 100.0, 0.3], "sensor_quantisation": [0.0213], "voltage_saturation": [5.0],
+}
+
+
+def values(effect):
+    return np.array(SIZES[effect.name]) if effect.name in SIZES else effect.starts(SCALES)[0]
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+@pytest.mark.parametrize("road", ["rudder", "lumped"])
+def test_law_and_twin_agree(effect, road):
+    assert effect.mjcf, "how a MuJoCo model shows the effect"
+    u = INPUTS["steps" if effect.name == "stribeck" else "multisine"](T)
+    chosen = [(effect.name, values(effect))]
+    law, without = ReducedModel(EQ_5, chosen).simulate(T, u), ReducedModel(EQ_5).simulate(T, u)
+    parameters = SHEET.parameters if road == "rudder" else None
+    twin = MechanicalPlant(EQ_5, chosen, parameters=parameters).simulate(T, u)
+    size = rms_deg(law.measured - without.measured)
+    assert size > VISIBLE
+    if effect.subsystem == "sensor":  # what the sensor does to one and the same angle
+        assert np.array_equal(twin.measured, effect.measure(chosen[0][1], twin.theta))
+    else:
+        assert rms_deg(twin.measured - law.measured) < TOLERANCE * size
+
+
+def test_several_effects_at_once_agree():
+    chosen = [(e.name, values(e)) for e in EFFECTS if e.name in (
+        "voltage_saturation", "quadratic_drag", "asymmetric_friction", "load_dependent_friction", "gravity_imbalance", "end_stop")]
+    u = INPUTS["multisine"](T)
+    law, without = ReducedModel(EQ_1, chosen).simulate(T, u), ReducedModel(EQ_1).simulate(T, u)
+    twin = MechanicalPlant(EQ_1, chosen, parameters=SHEET.parameters).simulate(T, u)
+    assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - without.theta)
+
+
+def test_a_broken_twin_is_noticed():
+    """A drag that is a tenth too strong in one of the two plants fails the bar above."""
+    drag = next(e for e in EFFECTS if e.name == "quadratic_drag")
+    u, p = INPUTS["multisine"](T), values(drag)
+    law, without = ReducedModel(EQ_5, [(drag.name, p)]).simulate(T, u), ReducedModel(EQ_5).simulate(T, u)
+    twin = MechanicalPlant(EQ_5, [(drag.name, 1.1 * p)], parameters=SHEET.parameters).simulate(T, u)
+    assert rms_deg(twin.theta - law.theta) > TOLERANCE * rms_deg(law.theta - without.theta)
