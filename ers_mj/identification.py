@@ -96,7 +96,7 @@ class Model:
             for k, parameter in enumerate(BY_NAME[effect_name].parameters):
                 if np.isfinite(values[k]):
                     scale = max(abs(values[k]), 1e-12) if not parameter.positive else 1.0
-                    most = 0.5 / self.scales.sample_time if parameter.kind == "frequency" else np.inf
+                    most = 1.0 / self.scales.sample_time if parameter.kind == "frequency" else np.inf
                     least = SMALLEST * self.scales.noise if parameter.kind == "position" else 1e-12
                     out.append(Free(effect_name, parameter.name, row * 16 + k, parameter.positive, scale,
                                     max(parameter.lower, least) if parameter.positive else parameter.lower,

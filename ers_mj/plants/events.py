@@ -30,6 +30,7 @@ CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h e
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
 ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
 EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows
+CALM = 0.2  # share of a speed, or of a twist's distance to the ends of the play, that a leap over a whole sample must leave
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
@@ -248,6 +249,18 @@ def _linear(c, x, m, drive, tau, a_emf, dt, scale):
 
 
 @njit(nogil=True, inline="always")
+def _push(depth, rate, stiffness, damping):
+    """A contact's force over its stiffness: the contact pushes where this is positive, and never pulls."""
+    return depth + damping / stiffness * rate if stiffness > 0 else depth
+
+
+@njit(nogil=True, inline="always")
+def _touch(depth, rate, stiffness, damping):
+    """Positive where two bodies that are apart touch: one is inside the other and does not leave it faster than the spring follows."""
+    return min(depth, _push(depth, rate, stiffness, damping))
+
+
+@njit(nogil=True, inline="always")
 def _violation(e, c, on, p, lawful, t, x, m):
     """Event function e: positive where the mode's inequality fails."""
     theta, w, j, theta_m, w_m = x
@@ -257,8 +270,8 @@ def _violation(e, c, on, p, lawful, t, x, m):
         return -m[1] * (theta - c[THETA_0]) if m[0] != 0 else -1.0
     if e == 2:
         if m[2] == 0:
-            return max(theta - c[UPPER], c[LOWER] - theta)
-        return c[UPPER] - theta if m[2] > 0 else theta - c[LOWER]
+            return max(_touch(theta - c[UPPER], w, c[K_STOP], c[D_STOP]), _touch(c[LOWER] - theta, -w, c[K_STOP], c[D_STOP]))
+        return -_push(theta - c[UPPER] if m[2] > 0 else c[LOWER] - theta, m[2] * w, c[K_STOP], c[D_STOP])
     if e == 3:
         if m[0] != 0:
             return -1.0
@@ -269,8 +282,11 @@ def _violation(e, c, on, p, lawful, t, x, m):
     if e == 4:
         return -m[3] * w_m if m[3] != 0 and _motor_friction(c) > 0 else -1.0
     if e == 5:
-        twist = theta_m - theta
-        return abs(twist) - c[GAP] if m[4] == 0 else c[GAP] - m[4] * twist
+        side = m[4] if m[4] != 0 else (1 if theta_m > theta else -1)
+        depth, rate = side * (theta_m - theta) - c[GAP], side * (w_m - w)
+        if m[4] == 0:
+            return _touch(depth, rate, c[K_TWIST], c[D_TWIST])
+        return -_push(depth, rate, c[K_TWIST], c[D_TWIST])
     if m[3] != 0:
         return -1.0
     a, level = _held_motor(c, x, m)
@@ -594,6 +610,32 @@ def _cuts(c, h0, tau, a_emf, lawful, refine):
     return ends, fresh, skip
 
 
+@njit(nogil=True)
+def _clean(c, on, p, lawful, t, x, z, m, tau, load, h):
+    """Whether the state z, h after x, lies within the mode of two bodies."""
+    bias = c[BIAS]
+    c[BIAS] = bias + load
+    clean = True
+    for event in range(7):
+        clean = clean and _violation(event, c, on, p, lawful, t + h, z, m) <= 0
+    if tau <= 0:
+        clean = clean and _violation(3, c, on, p, lawful, t, x, m) <= 0
+    c[BIAS] = bias
+    return clean
+
+
+@njit(nogil=True)
+def _calm(c, x, h):
+    """Whether the twist of two bodies is further from the ends of the play than it moves within h."""
+    return abs(x[4] - x[1]) * h <= CALM * abs(abs(x[3] - x[0]) - c[GAP])
+
+
+@njit(nogil=True)
+def _steady(x, z):
+    """Whether neither body comes near rest between the states x and z."""
+    return abs(z[1]) >= CALM * abs(x[1]) and abs(z[4]) >= CALM * abs(x[4])
+
+
 def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
 
@@ -610,6 +652,8 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     first = ends[0]
     last = ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
     late, early = _maps(c, tau, a_emf, last), _maps(c, tau, a_emf, first)
+    leaps = two and not lawful and ends.size > 1 and fresh[0] == 1
+    whole = _maps(c, tau, a_emf, h0) if leaps else early
     h_max = np.inf
     if c[UPPER] < np.inf or c[LOWER] > -np.inf:
         h_max = CONTACT_STEP / (math.sqrt(c[K_STOP]) + c[D_STOP])
@@ -628,6 +672,16 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
         uniform = abs(t[k + 1] - t[k] - h0) < 1e-6 * h0
         stretch = 1.0 if uniform else (t[k + 1] - t[k]) / h0
         start = 0.0
+        if leaps and uniform and enable[k] and m[2] == 0 and _calm(c, x, h0):
+            drive = c[B] * u[max(k - skip, 0)]
+            if tau <= 0:
+                x = (x[0], x[1], drive - a_emf * x[4], x[3], x[4])
+            z = _segment(whole, c, on, p, lawful, t[k], x, m, drive, load[k], h0)
+            if tau <= 0:
+                z = (z[0], z[1], drive - a_emf * z[4], z[3], z[4])
+            if _calm(c, z, h0) and _steady(x, z) and _clean(c, on, p, lawful, t[k], x, z, m, tau, load[k], h0):
+                x = z
+                continue
         for i in range(ends.size):
             h = (ends[i] - start) * stretch
             now = t[k] + start * stretch
@@ -663,14 +717,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                     z = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h)
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * z[4], z[3], z[4])
-                    c[BIAS] = bias + load[k]
-                    clean = True
-                    for event in range(7):
-                        clean = clean and _violation(event, c, on, p, lawful, now + h, z, m) <= 0
-                    if tau <= 0:
-                        clean = clean and _violation(3, c, on, p, lawful, now, x, m) <= 0
-                    c[BIAS] = bias
-                    if clean:
+                    if _clean(c, on, p, lawful, now, x, z, m, tau, load[k], h):
                         x = z
                         continue
             c[BIAS] = bias + load[k]

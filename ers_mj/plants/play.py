@@ -6,7 +6,7 @@ from ers_mj.effects.base import Coefficients
 
 MOTOR_SHARE = 0.64  # of J on the motor's side, where no effect says otherwise: n^2 J_m = 0.00198 of 0.0031 kg m^2
 CONTACT_HZ = 2000.0  # of the reduced model's contact, against the total inertia: 0.01 deg RMS from two rigid masses
-CONTACT_DAMPING = 0.5  # its damping ratio, critical for the two bodies against each other: they meet without a bounce
+CONTACT_DAMPING = 1.0  # its damping ratio, twice critical for the two bodies against each other: they meet all but without a bounce
 
 
 def rigid_play(c: Coefficients, gap: float) -> Coefficients:
