@@ -159,7 +159,7 @@ def test_bad_input_is_one_sentence_code_2_and_nothing_written(argv, place, monke
     ("simulate --input steps --out n.csv --effect bias_torque:tau=1", "tau_0 (constant torque"),
     ("simulate --input stepz --out n.csv", "multisine, chirp, ramp, steps, square"),
     ("simulate --input steps --out n.csv --plant mujoco", "the one plant is reduced"),
-    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate"),
+    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate, view"),
     ("diagnose good.csv --map t_s=Time", "the columns are t_s, u_V, theta_rad"),
     ("diagnose good.csv metres.csv", "in m and that of good.csv in rad"),
     ("diagnose good.csv --holdout copy.csv", "copy.csv: is held out and also among the training recordings (as good.csv)"),
@@ -319,7 +319,7 @@ def read_text_of_table1() -> str:
 # -- the program itself -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate"])
+@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate", "view"])
 def test_help_has_an_example(command, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main([*command.split(), "--help"])
