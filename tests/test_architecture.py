@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
-ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "simulation", "replay", "rendering", "traces", "identification", "guess", "baseline", "selection",
-         "intervals", "evaluation", "evidence", "excitation", "localisation", "confirmation", "document", "diagnosis", "display", "figures", "report", "commands", "cli"]
-SILENT = {"identification", "guess", "baseline", "selection", "intervals", "evaluation", "localisation", "confirmation", "document", "diagnosis", "effects", "plants", "replay", "rendering"}
+ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "simulation", "replay", "rendering", "traces",
+         "identification", "guess", "baseline", "selection", "intervals", "evaluation", "evidence", "excitation", "localisation",
+         "confirmation", "multibody", "document", "diagnosis", "display", "figures", "report", "commands", "cli"]
+SILENT = {"identification", "guess", "baseline", "selection", "intervals", "evaluation", "localisation", "confirmation", "multibody",
+          "document", "diagnosis", "effects", "plants", "replay", "rendering"}
 
 
 def room(path: Path) -> str:
