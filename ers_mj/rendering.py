@@ -5,8 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -16,21 +15,12 @@ from ers_mj.errors import InputError
 from ers_mj.plants.staging import CAMERAS
 from ers_mj.replay import Replay
 
-Colour = tuple[float, float, float, float]
-MEASURED: Colour = (1.0, 0.80, 0.25, 0.45)  # translucent: what was measured lies over what was simulated
+MEASURED = (1.0, 0.72, 0.10, 0.50)  # of the ghost, translucent: what was measured lies over what was simulated
+INK, AMBER = (31, 42, 55), (140, 84, 0)  # of the words: simulated, measured
 INFLATED = 3e-4  # [m] by which a ghost is thicker than the rudder, so that both are seen where they coincide
 MOST_SHAPES = 2000
 INSTALL = ("install EGL (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), "
            "or libosmesa6 and set MUJOCO_GL=osmesa")
-
-
-@dataclass(frozen=True)
-class Ghost:
-    """A second rudder at another output [output unit], in a colour of its own."""
-
-    output: float
-    colour: Colour = MEASURED
-    inflated: float = INFLATED
 
 
 class Painter:
@@ -60,14 +50,13 @@ class Painter:
         self.target.free()
         self.context.free()
 
-    def draw(self, qpos: np.ndarray, ghosts: Iterable[Ghost] = (), camera: mujoco.MjvCamera | None = None) -> np.ndarray:
-        """The model with its joints at qpos (nq,) and ghosts of its rudder -> (H, W, 3) uint8."""
+    def draw(self, qpos: np.ndarray, measured: float | None = None) -> np.ndarray:
+        """The model with its joints at qpos (nq,) and a ghost of its rudder at the measured output -> (H, W, 3) uint8."""
         self.data.qpos = qpos
         mujoco.mj_forward(self.model, self.data)
-        camera = default_camera(self.model) if camera is None else camera
-        mujoco.mjv_updateScene(self.model, self.data, self.option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, self.scene)
-        for ghost in ghosts:
-            add_ghost(self.model, self.other, self.scene, ghost)
+        mujoco.mjv_updateScene(self.model, self.data, self.option, None, default_camera(self.model), mujoco.mjtCatBit.mjCAT_ALL, self.scene)
+        if measured is not None:
+            add_ghost(self.model, self.other, self.scene, measured)
         image, whole = np.empty((self.height, self.width, 3), np.uint8), mujoco.MjrRect(0, 0, self.width, self.height)
         mujoco.mjr_render(whole, self.scene, self.target)
         mujoco.mjr_readPixels(image, None, whole, self.target)
@@ -96,41 +85,41 @@ def default_camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
     return camera
 
 
-def add_ghost(model: mujoco.MjModel, data: mujoco.MjData, scene: mujoco.MjvScene, ghost: Ghost) -> None:
-    """Put the shapes of the rudder, at the ghost's output, into a scene; `data` is scratch. A NaN puts nothing."""
-    if not np.isfinite(ghost.output):
+def add_ghost(model: mujoco.MjModel, data: mujoco.MjData, scene: mujoco.MjvScene, measured: float) -> None:
+    """Put the shapes of the rudder, at the measured output, into a scene; `data` is scratch. A NaN puts nothing."""
+    if not np.isfinite(measured):
         return
     data.qpos = 0.0
-    data.qpos[model.joint("rocker").qposadr[0]] = ghost.output
+    data.qpos[model.joint("rocker").qposadr[0]] = measured
     mujoco.mj_kinematics(model, data)
     first, count = model.body("rudder").geomadr[0], model.body("rudder").geomnum[0]
     for k in range(first, first + count):
         shape = scene.geoms[scene.ngeom]
-        size = model.geom_size[k] + ghost.inflated * (model.geom_size[k] > 0)
-        mujoco.mjv_initGeom(shape, model.geom_type[k], size, data.geom_xpos[k], data.geom_xmat[k], np.array(ghost.colour, np.float32))
+        size = model.geom_size[k] + INFLATED * (model.geom_size[k] > 0)
+        mujoco.mjv_initGeom(shape, model.geom_type[k], size, data.geom_xpos[k], data.geom_xmat[k], np.array(MEASURED, np.float32))
         scene.ngeom += 1
 
 
-def replay_frames(replay: Replay, width: int, height: int, *, labelled: bool = False) -> Iterator[np.ndarray]:
-    """Every moment of a replay as (H, W, 3) uint8, the measured rudder as a translucent ghost.
+def replay_frames(replay: Replay, width: int, height: int) -> Iterator[np.ndarray]:
+    """Every moment of a replay as (H, W, 3) uint8, labelled where there is something to tell; the ghost is what was measured.
 
     Raises:
         InputError: this machine cannot draw without a window.
     """
+    tells = replay.t.size > 1 or replay.measured is not None
     with Painter(replay.model, width, height) as painter:
         for k in range(replay.t.size):
-            ghosts = [] if replay.measured is None else [Ghost(float(replay.measured[k]))]
-            image = painter.draw(replay.qpos[k], ghosts)
-            yield _labelled(image, replay, k) if labelled else image
+            image = painter.draw(replay.qpos[k], None if replay.measured is None else float(replay.measured[k]))
+            yield _labelled(image, replay, k) if tells else image
 
 
 def _labelled(image: np.ndarray, replay: Replay, k: int) -> np.ndarray:
     """Time and outputs written into the upper left corner."""
-    lines = [(f"{replay.t[k]:.2f} s", (255, 255, 255))]
+    lines = [(f"{replay.t[k]:.2f} s", INK)]
     if np.isfinite(replay.theta[k]):
-        lines.append((f"simulated {told_output(replay.theta[k], replay.output_unit)}", (255, 255, 255)))
+        lines.append((f"simulated {told_output(replay.theta[k], replay.output_unit)}", INK))
     if replay.measured is not None:
-        lines.append((f"measured {told_output(replay.measured[k], replay.output_unit)}", tuple(int(255 * x) for x in MEASURED[:3])))
+        lines.append((f"measured {told_output(replay.measured[k], replay.output_unit)}", AMBER))
     size = max(10, image.shape[0] // 22)
     picture = Image.fromarray(image)
     for row, (text, colour) in enumerate(lines):

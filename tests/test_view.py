@@ -11,14 +11,16 @@ from PIL import Image
 from ers_mj import cli, rendering
 from ers_mj.datasheet import Datasheet, read_datasheet, write_model
 from ers_mj.errors import InputError
+from ers_mj.model_file import read_plant, recorded_file
 from ers_mj.plants.mjcf import mjcf_folder
-from ers_mj.recording import write_recording
-from ers_mj.rendering import Ghost, Painter
+from ers_mj.recording import from_arrays, write_recording
+from ers_mj.rendering import Painter
 from ers_mj.replay import moments_of, plant_of, posed, recorded, simulated
+from ers_mj.traces import trace_of
 
 SHEET = read_datasheet("table1")
 PLAY = Datasheet(parameters=SHEET.parameters, effects=(("backlash", {"gap": 0.02}),))
-SMALL = "--width 96 --height 72 --fps 10 --duration 0.3"
+SMALL = "--width 96 --duration 0.15"
 T = np.arange(300) * 1e-3
 
 
@@ -39,7 +41,7 @@ def place(tmp_path, monkeypatch):
     """A folder with one model of every kind, a recording, and files that are none."""
     monkeypatch.chdir(tmp_path)
     write_model("play.toml", PLAY)
-    write_model("lumped.toml", Datasheet(lumped=SHEET.to_lumped() | {"b": -90.0}))
+    write_model("lumped.toml", Datasheet(lumped={"a_1": 27.0, "a_2": 70.0, "b": -90.0, "c_1": 129.0, "c_2": 105.0, "theta_0": 0.26}))
     (tmp_path / "plant.xml").write_text(plant_of(PLAY).xml())
     write_recording("run.csv", {"t_s": T, "u_V": 4 * np.sin(20 * T), "theta_rad": 0.3 + 0.2 * np.sin(20 * T)})
     write_recording("slide.csv", {"t_s": T, "u_V": 4 * np.sin(20 * T), "x_m": 0.02 * np.sin(20 * T)})
@@ -63,7 +65,7 @@ def pictures(path) -> list[np.ndarray]:
 @pytest.mark.parametrize("model", ["table1", "table1 --linkage rod --gap 1", "play.toml", "lumped.toml", "plant.xml",
                                    *(str(mjcf_folder() / f"{name}.xml") for name in ("scene", "rudder_rod", "rudder_constant"))])
 def test_every_model_is_drawn_still_and_moving(model, place, capsys):
-    assert cli.main(f"view {model} --render still.png --width 96 --height 72 --json".split()) == 0
+    assert cli.main(f"view {model} --render still.png --width 96 --json".split()) == 0
     assert json.loads(capsys.readouterr().out)["frames"] == 1
     (still,) = pictures("still.png")
     assert still.shape == (72, 96, 3) and still.std() > 15
@@ -74,12 +76,12 @@ def test_every_model_is_drawn_still_and_moving(model, place, capsys):
 
 
 @draws
-@pytest.mark.parametrize("argv", ["play.toml --recording run.csv", "plant.xml --recording run.csv", "lumped.toml --recording slide.csv"])
+@pytest.mark.parametrize("argv", ["play.toml --replay run.csv", "plant.xml --replay run.csv", "lumped.toml --replay slide.csv"])
 def test_a_recording_is_replayed(argv, place, capsys):
     assert cli.main(f"view {argv} --render film.gif {SMALL}".split()) == 0
     assert len(pictures("film.gif")) == 4
     capsys.readouterr()
-    assert cli.main(f"view {argv} --render still.png --width 96 --height 72 --json".split()) == 0
+    assert cli.main(f"view {argv} --render still.png --width 96 --json".split()) == 0
     assert json.loads(capsys.readouterr().out)["frames"] == 1
 
 
@@ -88,8 +90,8 @@ def test_the_ghost_stands_where_the_measurement_is():
     """A ghost at the simulated angle covers the rudder, one elsewhere adds a second rudder."""
     film = posed(plant_of(SHEET), np.zeros(1), np.array([0.2]))
     with Painter(film.model, 160, 120) as painter:
-        plain, same, other, none = (painter.draw(film.qpos[0], ghosts).astype(int) for ghosts in
-                                    ([], [Ghost(0.2)], [Ghost(-0.4)], [Ghost(np.nan)]))
+        plain, same, other, none = (painter.draw(film.qpos[0], measured).astype(int) for measured in
+                                    (None, 0.2, -0.4, np.nan))
     changed = [(np.abs(x - plain).max(axis=2) > 20) for x in (same, other, none)]
     assert changed[2].sum() == 0 < changed[0].sum()
     assert (changed[1] & ~changed[0]).sum() > 200
@@ -105,11 +107,21 @@ def test_a_replay_follows_the_simulation():
 
 
 def test_a_recording_starts_where_it_was_measured():
-    from ers_mj.recording import from_arrays
-
     y = 0.5 + 0.1 * T
-    film = recorded(plant_of(SHEET), from_arrays(T, 0 * T, y), moments_of(T, 10, 1.0))
-    assert film.theta[0] == pytest.approx(0.5) and film.measured[-1] == pytest.approx(y[200])
+    film = recorded(plant_of(SHEET), trace_of(from_arrays(T, 0 * T, y), None), moments_of(T, 10, 1.0))
+    assert film.theta[0] == pytest.approx(0.5) and film.measured[-1] == pytest.approx(y[-1])
+
+
+@pytest.mark.parametrize("sheet", [SHEET, Datasheet(lumped={"a_1": 27.0, "a_2": 70.0, "b": 90.0, "c_1": 129.0, "c_2": 105.0, "theta_0": 0.2})])
+def test_a_plant_file_replays_as_the_plant_does(sheet, tmp_path):
+    """From the same start, with speed, under the same input."""
+    plant = plant_of(sheet)
+    (tmp_path / "plant.xml").write_text(plant.xml())
+    trace = trace_of(from_arrays(T, 5 * np.sin(30 * T), 0.5 - 2.0 * T), None)
+    moments = moments_of(T, 50, 1.0)
+    film = recorded_file(read_plant(tmp_path / "plant.xml"), trace, moments)
+    np.testing.assert_allclose(film.theta, recorded(plant, trace, moments).theta, atol=2e-4)
+    assert np.ptp(film.theta) > 0.05
 
 
 def test_frames_are_evenly_spaced_and_no_longer_than_the_recording():
@@ -121,14 +133,14 @@ def test_frames_are_evenly_spaced_and_no_longer_than_the_recording():
 BAD = {
     "no display": "", "no such xml": "none.xml --render a.png", "cut": "cut.xml --render a.png", "robot": "robot.xml --render a.png",
     "words": "words.xml --render a.png", "empty": "empty.xml --render a.png", "odd": "odd.xml --render a.png", "folder": ". --render a.png",
-    "no actuator": "still.xml --input steps --render a.gif", "no rudder": "still.xml --recording run.csv --render a.gif",
+    "no actuator": "still.xml --input steps --render a.gif", "no rudder": "still.xml --replay run.csv --render a.gif",
     "linkage of xml": "plant.xml --linkage rod --render a.png", "gap of xml": "plant.xml --gap 1 --render a.png",
     "rod of lumped": "lumped.toml --linkage rod --render a.png", "two plays": "play.toml --gap 1 --render a.png",
     "no model": "none.toml --render a.png", "strange": "strange.toml --render a.png", "no b": "no_b.toml --render a.png",
     "suffix": "--render a.jpg", "exists": "--render kept.png", "under a file": "--render kept.png/a.png", "input": "--input stepz --render a.gif",
-    "both": "--input steps --recording run.csv --render a.gif", "no recording": "--recording none.csv --render a.gif",
+    "both": "--input steps --replay run.csv --render a.gif", "no recording": "--replay none.csv --render a.gif",
     "map": "--map t_s=Time --render a.gif", "too long": "--duration 1e6 --render a.gif", "wide": "--width 99999 --render a.png",
-    "narrow": "--width 1 --render a.png", "fps": "--fps 0 --render a.gif", "linkage": "--linkage rope --render a.png",
+    "narrow": "--width 1 --render a.png", "linkage": "--linkage rope --render a.png",
 }
 
 

@@ -19,6 +19,7 @@ from ers_mj.errors import InputError
 from ers_mj.plants.mjcf import read_mjcf
 
 LINKAGES = ("constant", "rod")
+BODILY = ("J", "n", "K_t")  # what a datasheet must give for the rudder system in three dimensions
 MOTOR_SHARE = 0.64  # of J on the motor's side of the play, where no effect says otherwise: n^2 J_m = 0.00198 of 0.0031 kg m^2
 LEVER_SHARE = 1e-6 / 0.0031  # of J in either lever of the preload
 ARM = 0.01417  # [m] rocker arm, n times the lead of 4 mm over 2 pi
@@ -55,6 +56,17 @@ class Skeleton:
 # -- three dimensions --------------------------------------------------------------------------------------
 
 
+def bodily(parameters: Mapping[str, float], is_angle: bool, b: float) -> Mapping[str, float] | None:
+    """The datasheet's parameters where they make the rudder system, None where the plant is one lumped joint.
+
+    Args:
+        parameters: of the datasheet, SI.
+        is_angle: whether the output turns.
+        b: Eq. (6)'s gain; a negative one turns the output against the motor, which the linkages cannot.
+    """
+    return parameters if is_angle and b > 0 and all(parameters.get(name, 0.0) > 0 for name in BODILY) else None
+
+
 def rudder_skeleton(c: Coefficients, parameters: Mapping[str, float], linkage: str) -> Skeleton:
     """The rudder system of mjcf/ with the inertia J, the ratio n and the torque constant K_t of a datasheet.
 
@@ -65,7 +77,7 @@ def rudder_skeleton(c: Coefficients, parameters: Mapping[str, float], linkage: s
     """
     if linkage not in LINKAGES:
         raise InputError(f"the linkage is {linkage!r}, constant or rod was expected")
-    missing = [key for key in ("J", "n", "K_t") if not parameters.get(key, 0.0) > 0]
+    missing = [key for key in BODILY if not parameters.get(key, 0.0) > 0]
     if missing:
         raise InputError(f"the three-dimensional plant needs {' and '.join(missing)} above zero in the datasheet")
     J, n = parameters["J"], parameters["n"]
