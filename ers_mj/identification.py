@@ -230,7 +230,7 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
     now = math.inf
     while True:
         misfit = Blocks.of(traces).misfit(residuals(model, traces, rate))
-        level = float(np.mean(misfit)) if np.all(np.isfinite(misfit)) else math.inf
+        level = float(np.mean(misfit)) if np.all(np.isfinite(misfit)) else 0.0  # a runaway has one descent to find a motion
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
         found = descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3)

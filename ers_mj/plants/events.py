@@ -30,6 +30,7 @@ CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h e
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
 ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
 EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows
+RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
 ORDER = (0, 4, 1, 2, 3, 5, 6)  # speeds first: between their zeros angles are monotone, so that later events have one root
@@ -382,6 +383,12 @@ def _locate(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, g1):
 
 
 @njit(nogil=True)
+def _bounded(x):
+    """Whether the motion has not run away."""
+    return abs(x[0]) < RUNAWAY and abs(x[1]) < RUNAWAY
+
+
+@njit(nogil=True)
 def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
     """Integrate over dt under a constant drive, through every event on the way. Returns (x, m, number of events)."""
     if tau <= 0:
@@ -416,6 +423,8 @@ def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
                 m = m_new
             if events > 4 * RELEASE_LIMIT:
                 return (x[0], 0.0, x[2], x[3], 0.0), (0, m[1], m[2], 0, m[4]), events
+        if not _bounded(x):
+            return x, m, events
         t += first
         left -= first
     return x, m, events
@@ -666,7 +675,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                                         corner)
             c[BIAS] = bias
             budget -= events
-        if not (abs(x[0]) < 1e12) or budget < 0:
+        if not _bounded(x) or budget < 0:
             out[k + 1:, :] = np.nan
             return
 
