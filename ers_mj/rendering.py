@@ -17,7 +17,7 @@ from ers_mj.replay import Replay
 
 MEASURED = (1.0, 0.72, 0.10, 0.50)  # of the ghost, translucent: what was measured lies over what was simulated
 INK, AMBER = (31, 42, 55), (140, 84, 0)  # of the words: simulated, measured
-INFLATED = 3e-4  # [m] by which a ghost is thicker than the rudder, so that both are seen where they coincide
+INFLATED = 6e-4  # [m] by which a ghost is thicker than the rudder, so that both are seen where they coincide
 MOST_SHAPES = 2000
 INSTALL = ("install EGL (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), "
            "or libosmesa6 and set MUJOCO_GL=osmesa")

@@ -120,7 +120,7 @@ def test_a_plant_file_replays_as_the_plant_does(sheet, tmp_path):
     trace = trace_of(from_arrays(T, 5 * np.sin(30 * T), 0.5 - 2.0 * T), None)
     moments = moments_of(T, 50, 1.0)
     film = recorded_file(read_plant(tmp_path / "plant.xml"), trace, moments)
-    np.testing.assert_allclose(film.theta, recorded(plant, trace, moments).theta, atol=2e-4)
+    np.testing.assert_allclose(film.theta, recorded(plant, trace, moments).theta, atol=5e-4)
     assert np.ptp(film.theta) > 0.05
 
 

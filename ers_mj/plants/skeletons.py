@@ -154,7 +154,7 @@ def lumped_skeleton(c: Coefficients, is_angle: bool) -> Skeleton:
 
 
 def _lumped_body(parent: mujoco.MjsBody, name: str, inertia: float, is_angle: bool, joint: str) -> mujoco.MjsBody:
-    body = parent.add_body(name=name, explicitinertial=True, mass=inertia, inertia=[inertia] * 3)
+    body = parent.add_body(name=name, explicitinertial=True, mass=inertia, ipos=[0, 0, 0], inertia=[inertia] * 3)
     if joint:
         kind = mujoco.mjtJoint.mjJNT_HINGE if is_angle else mujoco.mjtJoint.mjJNT_SLIDE
         body.add_joint(name=joint, type=kind, axis=[0, -1, 0] if is_angle else [1, 0, 0])

@@ -52,7 +52,7 @@ def _surround(spec: mujoco.MjSpec, scale: float) -> None:
     spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [0.35, 0.35, 0.35]
     spec.visual.headlight.specular = [0.1, 0.1, 0.1]
     spec.visual.quality.shadowsize = 2048
-    spec.visual.map.znear = 0.02
+    spec.visual.map.znear = 0.1
     spec.visual.global_.azimuth, spec.visual.global_.elevation = 62, -22
     spec.stat.center, spec.stat.extent = [0.0, 0.06 * scale, 0.0], 0.34 * scale
 
