@@ -1,5 +1,6 @@
 """The plant in pictures: every model that the package accepts is drawn, and what cannot be drawn is told."""
 
+import io
 import json
 import sys
 
@@ -11,11 +12,14 @@ from PIL import Image
 from ers_mj import cli, rendering
 from ers_mj.datasheet import Datasheet, read_datasheet, write_model
 from ers_mj.errors import InputError
+from ers_mj.evidence import Evidence, RecordView
+from ers_mj.frames import frames_of
 from ers_mj.model_file import read_plant, recorded_file
 from ers_mj.plants.mjcf import mjcf_folder
 from ers_mj.recording import from_arrays, write_recording
 from ers_mj.rendering import Painter
 from ers_mj.replay import moments_of, plant_of, posed, recorded, simulated
+from ers_mj.report import report_page
 from ers_mj.traces import trace_of
 
 SHEET = read_datasheet("table1")
@@ -153,6 +157,36 @@ def test_bad_input_is_one_sentence_and_nothing_written(argv, place, monkeypatch,
     out, err = capsys.readouterr()
     assert out == "" and err.startswith("ers: ") and err.count("\n") == 1 and len(err) > 25
     assert {path.name: path.read_bytes() for path in place.iterdir()} == before
+
+
+def evidence(off: float, unit: str = "rad") -> Evidence:
+    """One held-out recording, from which the model before is off by a bump and the model after is not."""
+    y = 0.3 + 0.2 * np.sin(20 * T)
+    bump = off * np.exp(-(((T - 0.2) / 0.02) ** 2))
+    return Evidence((RecordView("held.csv", True, T, 0 * T, y, y + bump, y),), (), None, 1e-4, unit, "V")
+
+
+@draws
+@pytest.mark.parametrize("sheet", [SHEET, Datasheet(lumped={"a_2": 70.0, "b": 90.0})])
+def test_a_report_shows_the_worst_moment_before_and_after(sheet):
+    frames = frames_of(plant_of(sheet), evidence(0.02))
+    worst = max(frames.moments, key=lambda frame: abs(frame.before - frame.measured))
+    assert worst.t == pytest.approx(0.2, abs=1e-3) and frames.enlarged == 10 and len(frames.moments) == 3
+    before, after = (np.asarray(Image.open(io.BytesIO(x))).astype(int) for x in (worst.picture_before, worst.picture_after))
+    assert before.shape == (360, 480, 3) and (np.abs(before - after).max(axis=2) > 60).sum() > 500
+    page = report_page({}, evidence(0.02), frames)
+    assert page.count("data:image/jpeg;base64,") == 6 and "10 times as large" in page
+
+
+def test_frames_are_left_out_where_they_would_tell_nothing():
+    plant = plant_of(SHEET)
+    assert frames_of(plant, evidence(1e-4)) is None and frames_of(plant, evidence(0.02, "m")) is None
+
+
+def test_a_report_without_egl_says_so(monkeypatch):
+    lack_egl(monkeypatch)
+    frames = frames_of(plant_of(SHEET), evidence(0.02))
+    assert frames.moments == () and "libegl1" in report_page({}, evidence(0.02), frames)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL is Linux's")
