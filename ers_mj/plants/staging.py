@@ -10,7 +10,7 @@ from ers_mj.plants.mjcf import read_mjcf
 
 PREFIX = "stage_"
 CAMERAS = (f"{PREFIX}side", "side")  # put here, or the model's own
-REACH = 0.13  # [m] from the shaft to the trailing edge: what the lights and the camera of scene.xml are set for
+REACH = 0.11  # [m] to either side of the shaft: what the camera of scene.xml sees, with room for a carriage
 STOP_RADIUS, STOP_OFFSET = 0.0328, 0.027  # [m] of the levers' stop about the shaft, and along it
 STEEL, WHITE, BLUE, RED = (0.45, 0.47, 0.50, 1), (0.82, 0.83, 0.82, 1), (0.17, 0.38, 0.68, 1), (0.80, 0.18, 0.14, 1)
 LARGEST = 4096  # [pixels] of a picture, either way
@@ -89,7 +89,7 @@ def _shape_blade(spec: mujoco.MjSpec) -> None:
 def _shape_slide(spec: mujoco.MjSpec, scale: float) -> None:
     """A lumped position: a carriage on a rail."""
     box = mujoco.mjtGeom.mjGEOM_BOX
-    for size, pos, rgba in (((0.18, 0.012, 0.006), (0, 0.03, -0.045), WHITE), ((0.18, 0.004, 0.006), (0, 0.03, -0.033), STEEL)):
+    for size, pos, rgba in (((0.15, 0.012, 0.006), (0, 0.03, -0.045), WHITE), ((0.15, 0.004, 0.006), (0, 0.03, -0.033), STEEL)):
         _add(spec.worldbody, box, _times(scale, size), _times(scale, pos), rgba)
     rudder = _bare(spec, "rudder")
     for size, pos, rgba in (((0.030, 0.025, 0.010), (0, 0.03, -0.017), BLUE), ((0.004, 0.025, 0.004), (0, 0.03, -0.003), RED)):
