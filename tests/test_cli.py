@@ -134,7 +134,7 @@ def stub(monkeypatch, **changes) -> list:
         document = {"version": 1, "verdict": "parameters_only", "sentence": "Only the parameters were off.", "missing": [], "where": [],
                     "fit": {"heldout_rmse_before_rad": np.float64(0.1), "heldout_rmse_after_rad": float("nan")}, "seed": seed,
                     "data": {"output_unit": "rad", "input_unit": "V", "files": [r.name for r in recordings], "sha256": [], "problems": []}}
-        return SimpleNamespace(document=document, evidence=Evidence((), (), None, 1e-3, "rad", "V"), plant="<mujoco/>", model=changes.get("model", Datasheet(lumped={"b": 1.0})))
+        return SimpleNamespace(document=document, evidence=Evidence((), (), None, 1e-3, "rad", "V"), plant=SimpleNamespace(xml=lambda: "<mujoco/>"), model=changes.get("model", Datasheet(lumped={"b": 1.0})))
 
     monkeypatch.setitem(sys.modules, "ers_mj.diagnosis", SimpleNamespace(diagnose=diagnose))
     import ers_mj
