@@ -16,7 +16,7 @@ from ers_mj.identification import polished
 from ers_mj.multibody import Rig
 from ers_mj.recording import Recording
 from ers_mj.selection import select
-from ers_mj.traces import Trace, make_trace, noise_sigma
+from ers_mj.traces import trace_of
 
 COARSE = 1 / 300  # a converter whose step is more than this share of the travel is an effect, not an ordinary one
 
@@ -40,7 +40,8 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     """
     jobs = jobs or _cores()
     first = recordings[0]
-    traces = [_trace(r, datasheet) for r in recordings]
+    inertia = datasheet.parameters.get("J") if datasheet is not None else None
+    traces = [trace_of(r, inertia) for r in recordings]
     progress("fitting the baseline", 0.03)
     start = baseline(traces, datasheet, first.output_unit == "rad")
     coarse = max(t.quantum for t in traces) > COARSE * 2 * start.fit.model.scales.position
@@ -48,7 +49,7 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     start = replace(start, fit=polished(start.fit, start.traces))
     chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
     progress("judging on held-out data", 0.75)
-    held = [_trace(r, datasheet) for r in holdout]
+    held = [trace_of(r, inertia) for r in holdout]
     selection, judged = confirmed(start, chosen, held, jobs)
     progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
@@ -62,12 +63,3 @@ def _cores() -> int:
     import os
 
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _trace(recording: Recording, datasheet: Datasheet | None) -> Trace:
-    """A recording as the fit sees it; a known load torque needs J to become an acceleration."""
-    inertia = (datasheet.parameters.get("J") if datasheet is not None else None)
-    load = -recording.load / inertia if recording.load is not None and inertia else None
-    valid = recording.valid
-    return make_trace(recording.name, recording.t, recording.u, recording.y, valid, recording.enable, load,
-                      noise_sigma(recording.y[valid], recording.quantum), recording.quantum)

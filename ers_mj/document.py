@@ -21,6 +21,7 @@ from ers_mj.identification import BASE, STATES, Model, residuals, score, with_st
 from ers_mj.intervals import standard_errors
 from ers_mj.localisation import Place, gather, places, residual_map, shaded
 from ers_mj.multibody import Rig
+from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.recording import Recording
 from ers_mj.selection import Candidate, Selection, tie
 from ers_mj.simulation import PER_INERTIA, unit_of
@@ -35,12 +36,12 @@ HALF = 0.5  # share of the squared held-out error that the named effects must ex
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The document (diagnosis.json, version 1), what the report draws, the improved model, and the same as MJCF (plant.xml)."""
+    """The document (diagnosis.json, version 1), what the report draws, the improved model, and the same in MuJoCo (plant.xml)."""
 
     document: dict
     evidence: Evidence
     model: Datasheet
-    plant: str
+    plant: MechanicalPlant
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class Case:
         evidence = Evidence(tuple(views), tuple(self._ladder()), residual_map(samples), self.noise, self.output_unit,
                             self.recordings[0].input_unit)
         plant = self.rig.plant(model if verdict == "missing_physics" else base)
-        return Diagnosis(document, evidence, self._improved(verdict), plant.xml())
+        return Diagnosis(document, evidence, self._improved(verdict), plant)
 
     # numbers
 

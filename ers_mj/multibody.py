@@ -13,9 +13,8 @@ from ers_mj.evaluation import Fold, neutral
 from ers_mj.identification import Model, fitted_start
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped
+from ers_mj.plants.skeletons import bodily
 from ers_mj.traces import Trace
-
-BODILY = ("J", "n", "K_t")  # what a datasheet must give for the rudder system in three dimensions
 
 
 @dataclass(frozen=True)
@@ -27,9 +26,8 @@ class Rig:
 
     def plant(self, model: Model) -> MechanicalPlant:
         """The identified model as a MuJoCo plant: the rudder system where the datasheet tells its inertia, one lumped joint else."""
-        bodily = self.is_angle and all(self.parameters.get(name, 0.0) > 0 for name in BODILY) and model.values["b"] > 0
-        return MechanicalPlant(lumped(model.values), neutral(model).effects, parameters=self.parameters if bodily else None,
-                               is_angle=self.is_angle)
+        shape = bodily(self.parameters, self.is_angle, model.values["b"])
+        return MechanicalPlant(lumped(model.values), neutral(model).effects, parameters=shape, is_angle=self.is_angle)
 
     def free_run(self, model: Model, trace: Trace) -> np.ndarray:
         """Output (N,) of the MuJoCo plant under a recording's input, from the initial state that the reduced model fits."""

@@ -1,10 +1,11 @@
 """The report: one self-contained page from a diagnosis and its evidence.
 
-    verdict -> curves -> where -> what -> map -> ladder -> fit -> parameters -> recordings -> data -> next -> footer
+    verdict -> curves -> frames -> where -> what -> map -> ladder -> fit -> parameters -> recordings -> data -> next -> footer
 """
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -12,6 +13,7 @@ from importlib.resources import files
 from ers_mj import figures
 from ers_mj.display import NONE, Unit, figure, interval, missing, pretty, shown 
 from ers_mj.evidence import Evidence, RecordView, Rung
+from ers_mj.frames import Frame, Frames
 
 VERDICTS = {
     "consistent": "The datasheet’s model explains the data",
@@ -30,11 +32,11 @@ SHORT_HASH = 12
 Cell = tuple[str, str]  # html, class
 
 
-def report_page(document: Mapping, evidence: Evidence) -> str:
+def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = None) -> str:
     """The page as HTML: no script, no font, no address outside it."""
     figures.restart_ids()
     verdict = str(document.get("verdict") or "")
-    parts = (_header, _curves, _where, _missing, _residuals, _ladder, _fit, _parameters, _record_state, _data, _next)
+    parts = (_header, _curves, lambda *_: _frames(frames), _where, _missing, _residuals, _ladder, _fit, _parameters, _record_state, _data, _next)
     body = "\n".join(part(document, evidence) for part in parts)
     style = files("ers_mj").joinpath("report.css").read_text(encoding="utf-8")
     return (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -150,6 +152,29 @@ def _record(view: RecordView, evidence: Evidence, titled: bool = True, with_clos
     if with_close_up and (enlarged := figures.close_up(view, evidence)):
         content += _figure(enlarged, "The span in which the model before does worst, enlarged.")
     return content
+
+
+def _frames(frames: Frames | None) -> str:
+    """Moments of a recording on the plant in three dimensions; a sentence where they cannot be drawn."""
+    if frames is None:
+        return ""
+    title = "The rudder at the worst moments"
+    if frames.why_not:
+        return _section(title, "", f'<p class="note">No frames are shown: {_text(frames.why_not)}.</p>')
+    lead = (f"{_text(frames.name)} on the plant in three dimensions, when the model before is furthest off. "
+            "White is the simulated rudder, translucent amber the measured one.")
+    if frames.enlarged > 1:
+        lead += f" The difference between them is drawn {frames.enlarged} times as large as it is."
+    cells = "\n".join(f"<div>{_frame(f, 'before', f.before, f.picture_before)}{_frame(f, 'after', f.after, f.picture_after)}</div>"
+                      for f in frames.moments)
+    return _section(title, lead, f'<div class="frames">{cells}</div>')
+
+
+def _frame(frame: Frame, when: str, simulated: float, picture: bytes) -> str:
+    unit = shown("rad")
+    told = f'{frame.t:.2f} s, <span class="{when[0]}">{when}</span> {unit(simulated)}, measured {unit(frame.measured)}'
+    data = b64encode(picture).decode("ascii")
+    return f'<figure><img alt="the rudder {when}" src="data:image/jpeg;base64,{data}"><figcaption>{told}</figcaption></figure>'
 
 
 def _where(document: Mapping, evidence: Evidence) -> str:

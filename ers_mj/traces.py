@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ers_mj.recording import Recording
+
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
 START_SAMPLES = 10
@@ -41,6 +43,14 @@ class Trace:
         pick = lambda a: None if a is None else a[cut]  # noqa: E731
         return make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
                           pick(self.load), self.sigma, self.quantum)
+
+
+def trace_of(recording: Recording, inertia: float | None) -> Trace:
+    """A recording as a trace; its known load torque becomes an acceleration where the inertia [kg m^2] is known, else nothing."""
+    load = -recording.load / inertia if recording.load is not None and inertia else None
+    valid = recording.valid
+    return make_trace(recording.name, recording.t, recording.u, recording.y, valid, recording.enable, load,
+                      noise_sigma(recording.y[valid], recording.quantum), recording.quantum)
 
 
 def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:

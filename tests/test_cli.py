@@ -134,7 +134,7 @@ def stub(monkeypatch, **changes) -> list:
         document = {"version": 1, "verdict": "parameters_only", "sentence": "Only the parameters were off.", "missing": [], "where": [],
                     "fit": {"heldout_rmse_before_rad": np.float64(0.1), "heldout_rmse_after_rad": float("nan")}, "seed": seed,
                     "data": {"output_unit": "rad", "input_unit": "V", "files": [r.name for r in recordings], "sha256": [], "problems": []}}
-        return SimpleNamespace(document=document, evidence=Evidence((), (), None, 1e-3, "rad", "V"), plant="<mujoco/>", model=changes.get("model", Datasheet(lumped={"b": 1.0})))
+        return SimpleNamespace(document=document, evidence=Evidence((), (), None, 1e-3, "rad", "V"), plant=SimpleNamespace(xml=lambda: "<mujoco/>"), model=changes.get("model", Datasheet(lumped={"b": 1.0})))
 
     monkeypatch.setitem(sys.modules, "ers_mj.diagnosis", SimpleNamespace(diagnose=diagnose))
     import ers_mj
@@ -159,7 +159,7 @@ def test_bad_input_is_one_sentence_code_2_and_nothing_written(argv, place, monke
     ("simulate --input steps --out n.csv --effect bias_torque:tau=1", "tau_0 (constant torque"),
     ("simulate --input stepz --out n.csv", "multisine, chirp, ramp, steps, square"),
     ("simulate --input steps --out n.csv --plant mujoco", "the one plant is reduced"),
-    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate"),
+    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate, view"),
     ("diagnose good.csv --map t_s=Time", "the columns are t_s, u_V, theta_rad"),
     ("diagnose good.csv metres.csv", "in m and that of good.csv in rad"),
     ("diagnose good.csv --holdout copy.csv", "copy.csv: is held out and also among the training recordings (as good.csv)"),
@@ -319,7 +319,7 @@ def read_text_of_table1() -> str:
 # -- the program itself -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate"])
+@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate", "view"])
 def test_help_has_an_example(command, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main([*command.split(), "--help"])

@@ -65,15 +65,16 @@ def diagnose_and_tell(recordings: list[Recording], holdout: list[Recording], dat
 
 def _write(folder: Path, document: dict, found: object, progress: Progress) -> list[Path]:
     from ers_mj.datasheet import write_model
+    from ers_mj.frames import frames_of
     from ers_mj.report import report_page
 
     progress("drawing the report", 1.0)
-    page = report_page(document, found.evidence)
+    page = report_page(document, found.evidence, frames_of(found.plant, found.evidence))
     return write_results(folder, {
         "diagnosis.json": lambda path: _text(path, as_json(document) + "\n"),
         "report.html": lambda path: _text(path, page),
         "model.toml": lambda path: write_model(path, found.model),
-        "plant.xml": lambda path: _text(path, found.plant),
+        "plant.xml": lambda path: _text(path, found.plant.xml()),
     })
 
 

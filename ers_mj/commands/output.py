@@ -58,6 +58,23 @@ def write_results(folder: Path, writers: Mapping[str, Callable[[Path], None]]) -
     return [folder / name for name in writers]
 
 
+def write_whole(path: Path, content: bytes) -> None:
+    """One file, whole or not at all.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.chmod(part, 0o644)
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+
+
 class Progress:
     """A bar on standard error where that is a terminal, silence elsewhere: `progress(text, fraction)`."""
 

@@ -120,6 +120,12 @@ class MechanicalPlant:
         note = f"effects that MJCF does not carry here: {', '.join(absent) or 'none'}"
         return f"<!-- ers-mj plant; load the keyframe home to start at rest. {note} -->\n{spec.to_xml()}"
 
+    def positions(self, theta: float, theta_m: float) -> np.ndarray:
+        """Joint positions (nq,) of the model with the output at theta and the drive before the play at theta_m."""
+        start = self._start((theta, 0.0)) | {name: (q, 0.0) for name, (q, _) in self._skeleton.pose(theta_m).items()}
+        start["gap"] = (theta - theta_m, 0.0)
+        return np.array([start.get(self.model.joint(k).name, (0.0, 0.0))[0] for k in range(self.model.njnt)])
+
     # -- building --
 
     def _refuse_contradictions(self) -> None:

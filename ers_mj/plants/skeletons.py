@@ -20,6 +20,7 @@ from ers_mj.plants.mjcf import read_mjcf
 from ers_mj.plants.play import MOTOR_SHARE
 
 LINKAGES = ("constant", "rod")
+BODILY = ("J", "n", "K_t")  # what a datasheet must give for the rudder system in three dimensions
 LEVER_SHARE = 1e-6 / 0.0031  # of J in either lever of the preload
 ARM = 0.01417  # [m] rocker arm, n times the lead of 4 mm over 2 pi
 ROD = 0.042  # [m] length of the rod between its pins
@@ -55,6 +56,17 @@ class Skeleton:
 # -- three dimensions --------------------------------------------------------------------------------------
 
 
+def bodily(parameters: Mapping[str, float], is_angle: bool, b: float) -> Mapping[str, float] | None:
+    """The datasheet's parameters where they make the rudder system, None where the plant is one lumped joint.
+
+    Args:
+        parameters: of the datasheet, SI.
+        is_angle: whether the output turns.
+        b: Eq. (6)'s gain; a negative one turns the output against the motor, which the linkages cannot.
+    """
+    return parameters if is_angle and b > 0 and all(parameters.get(name, 0.0) > 0 for name in BODILY) else None
+
+
 def rudder_skeleton(c: Coefficients, parameters: Mapping[str, float], linkage: str) -> Skeleton:
     """The rudder system of mjcf/ with the inertia J, the ratio n and the torque constant K_t of a datasheet.
 
@@ -65,7 +77,7 @@ def rudder_skeleton(c: Coefficients, parameters: Mapping[str, float], linkage: s
     """
     if linkage not in LINKAGES:
         raise InputError(f"the linkage is {linkage!r}, constant or rod was expected")
-    missing = [key for key in ("J", "n", "K_t") if not parameters.get(key, 0.0) > 0]
+    missing = [key for key in BODILY if not parameters.get(key, 0.0) > 0]
     if missing:
         raise InputError(f"the three-dimensional plant needs {' and '.join(missing)} above zero in the datasheet")
     J, n = parameters["J"], parameters["n"]
@@ -142,7 +154,7 @@ def lumped_skeleton(c: Coefficients, is_angle: bool) -> Skeleton:
 
 
 def _lumped_body(parent: mujoco.MjsBody, name: str, inertia: float, is_angle: bool, joint: str) -> mujoco.MjsBody:
-    body = parent.add_body(name=name, explicitinertial=True, mass=inertia, inertia=[inertia] * 3)
+    body = parent.add_body(name=name, explicitinertial=True, mass=inertia, ipos=[0, 0, 0], inertia=[inertia] * 3)
     if joint:
         kind = mujoco.mjtJoint.mjJNT_HINGE if is_angle else mujoco.mjtJoint.mjJNT_SLIDE
         body.add_joint(name=joint, type=kind, axis=[0, -1, 0] if is_angle else [1, 0, 0])

@@ -1,0 +1,178 @@
+"""`ers view`: the plant in MuJoCo's viewer, or in a picture."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ers_mj.commands.options import mapping, number, pair, refuse_unwritable, whole
+from ers_mj.commands.output import Progress, as_json, write_whole
+from ers_mj.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ers_mj.recording import Recording
+    from ers_mj.replay import Replay
+
+LINKAGES = ("constant", "rod")
+WIDTHS = {".png": 960, ".gif": 480}  # what can be rendered, and how wide [pixels]
+SHAPE = 3 / 4  # height over width
+FPS, DURATION, LONGEST = 20.0, 4.0, 100.0  # [1/s], [s], [s] of a motion
+WIDEST = 4096  # [pixels]
+INPUT = "square"  # what a .gif without input or recording shows: out, home, and the other way
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    """Add this command to the command line."""
+    parser = commands.add_parser(
+        "view", help="show the plant in three dimensions",
+        description="The plant in MuJoCo's viewer, or in a picture. A recording is replayed: what was measured is the translucent rudder.",
+        epilog="examples:\n  ers view --linkage rod\n  ers view model.toml --replay run1.csv --render replay.gif\n"
+               "  ers view plant.xml --input steps --render steps.gif")
+    parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="datasheet, model.toml or plant.xml (default table1)")
+    parser.add_argument("--linkage", choices=LINKAGES, help="of the rudder (default constant)")
+    parser.add_argument("--gap", type=number(least=0), metavar="DEG", help="play of +-DEG (default 0)")
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--replay", metavar="REC", help="replay this recording: measured and simulated")
+    shown.add_argument("--input", metavar="NAME", help=f"simulate multisine, chirp, ramp, steps or square (a .gif's default: {INPUT})")
+    parser.add_argument("--map", type=pair, action="append", default=[], metavar="name=column", help="of the recording, as in t_s=Time; repeatable")
+    parser.add_argument("--duration", type=number(above=0), default=DURATION, metavar="S", help=f"shown of the motion [s] (default {DURATION:g})")
+    parser.add_argument("--render", metavar="FILE", help="a picture, .png or .gif, instead of the window; a .png shows the rest position, "
+                        "the end of an input, or where a recording and its simulation differ most")
+    parser.add_argument("--width", type=whole(16), metavar="N", help="of the picture [pixels] (default 960, .gif 480)")
+    parser.add_argument("--force", action="store_true", help="overwrite FILE")
+    parser.add_argument("--json", action="store_true", help="print a summary as one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show or render; 0."""
+    out = _checked_out(arguments)
+    _refuse_contradictions(arguments)
+    if out is None:
+        return _show(arguments)
+    replay = _replay(arguments, is_film=out.suffix.lower() == ".gif")
+    summary = _summary(arguments, replay) | _render(replay, out, arguments.width)
+    print(as_json(summary) if arguments.json else _told(summary))
+    return 0
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    from ers_mj.window import open_window, refuse_no_display
+
+    refuse_no_display()
+    replay = _replay(arguments, is_film=True)
+    open_window(replay)
+    print(as_json(_summary(arguments, replay)) if arguments.json else f"{arguments.model}: shown")
+    return 0
+
+
+# -- what cannot be meant ----------------------------------------------------------------------------------------
+
+
+def _checked_out(arguments: argparse.Namespace) -> Path | None:
+    """The picture's file, checked before any work starts; None for a window."""
+    if arguments.render is None:
+        return None
+    out = Path(arguments.render)
+    if not arguments.render or out.is_dir() or out.suffix.lower() not in WIDTHS:
+        raise InputError(f"--render {arguments.render or 'is empty'}: a file that ends in .png or .gif was expected")
+    if out.exists() and not arguments.force:
+        raise InputError(f"{out}: exists already, give --force to overwrite it")
+    refuse_unwritable(out)
+    return out
+
+
+def _refuse_contradictions(arguments: argparse.Namespace) -> None:
+    from ers_mj.plants.inputs import INPUTS
+
+    if arguments.input is not None and arguments.input not in INPUTS:
+        raise InputError(f"--input {arguments.input}: there is no input of that name; there are {', '.join(INPUTS)}")
+    if arguments.map and arguments.replay is None:
+        raise InputError("--map is for a recording, give one as --replay REC")
+    for option, value in (("--linkage", arguments.linkage), ("--gap", arguments.gap)):
+        if value is not None and _is_mjcf(arguments.model):
+            raise InputError(f"{option} is for a datasheet or a model.toml, {arguments.model} is built already")
+    for option, value, most in (("--duration", arguments.duration, LONGEST), ("--width", arguments.width or 0, WIDEST)):
+        if value > most:
+            raise InputError(f"{option} {value:g}: at most {most:g} was expected")
+
+
+def _is_mjcf(model: str) -> bool:
+    return Path(model).suffix.lower() in (".xml", ".mjcf")
+
+
+# -- what is shown ---------------------------------------------------------------------------------------------------
+
+
+def _replay(arguments: argparse.Namespace, is_film: bool) -> Replay:
+    """The moments to show: a film, or the single one of a still."""
+    from ers_mj.recording import read_recording
+
+    if arguments.replay is not None:
+        replay = _recorded(arguments, read_recording(arguments.replay, mapping(arguments.map)))
+    else:
+        replay = _simulated(arguments, arguments.input or (INPUT if is_film and arguments.render else None))
+    return replay if is_film else replay.still()
+
+
+def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
+    """The plant under a named input, at rest without one."""
+    import numpy as np
+
+    from ers_mj import model_file, replay
+    from ers_mj.datasheet import read_datasheet
+    from ers_mj.plants.inputs import INPUTS, RATE_HZ
+
+    t = np.arange(1 if name is None else max(2, round(arguments.duration * RATE_HZ) + 1)) / RATE_HZ
+    u = np.zeros(1) if name is None else INPUTS[name](t)
+    moments = replay.moments_of(t, FPS, arguments.duration)
+    if _is_mjcf(arguments.model):
+        return model_file.simulated_file(model_file.read_plant(Path(arguments.model)), t, u, moments)
+    plant = replay.plant_of(read_datasheet(arguments.model), arguments.linkage or "constant", math.radians(arguments.gap or 0.0))
+    return replay.simulated(plant, t, u, moments)
+
+
+def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
+    from ers_mj import model_file, replay
+    from ers_mj.datasheet import read_datasheet
+    from ers_mj.traces import trace_of
+
+    moments, unit = replay.moments_of(recording.t, FPS, arguments.duration), recording.output_unit
+    if _is_mjcf(arguments.model):
+        return model_file.recorded_file(model_file.read_plant(Path(arguments.model)), trace_of(recording, None), moments, unit)
+    sheet = read_datasheet(arguments.model)
+    plant = replay.plant_of(sheet, arguments.linkage or "constant", math.radians(arguments.gap or 0.0), unit)
+    return replay.recorded(plant, trace_of(recording, sheet.parameters.get("J")), moments, unit)
+
+
+# -- a picture -----------------------------------------------------------------------------------------------------
+
+
+def _render(replay: Replay, out: Path, width: int | None) -> dict:
+    from ers_mj.rendering import gif_bytes, png_bytes, replay_frames
+
+    kind = out.suffix.lower()
+    width = width or WIDTHS[kind]
+    height, images = round(SHAPE * width), []
+    with Progress() as progress:
+        for image in replay_frames(replay, width, height):
+            images.append(image)
+            progress("rendering", len(images) / replay.t.size)
+    content = png_bytes(images[0]) if kind == ".png" else gif_bytes(images, FPS)
+    write_whole(out, content)
+    return {"render": str(out), "width": width, "height": height, "bytes": len(content)}
+
+
+def _summary(arguments: argparse.Namespace, replay: Replay) -> dict:
+    return {"model": arguments.model, "replay": arguments.replay, "frames": int(replay.t.size), "fps": FPS,
+            "from_s": float(replay.t[0]), "to_s": float(replay.t[-1]), "output_unit": replay.output_unit,
+            "theta": [float(x) for x in (replay.theta[0], replay.theta[-1])]}
+
+
+def _told(summary: dict) -> str:
+    frames = "one picture" if summary["frames"] == 1 else f"{summary['frames']} pictures, {summary['to_s'] - summary['from_s']:.3g} s"
+    return f"{summary['render']}: {frames}, {summary['width']} x {summary['height']} pixels, {summary['bytes'] / 1e3:.0f} kB"
