@@ -115,12 +115,18 @@ def _held(c, on, p, lawful, t, x, m):
     return a, up, down
 
 
+@njit(nogil=True, inline="always")
+def _motor_friction(c):
+    """Friction of the motor's side, per total inertia. Without any it never sticks: its slip s_m stays 1."""
+    return c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS])
+
+
 @njit(nogil=True)
 def _held_motor(c, x, m):
     """(net acceleration without friction on the motor's side at rest, its friction), per total inertia."""
     theta, w, j, theta_m, w_m = x
     a = j - _twist_force(c, m[4], theta, w, theta_m, 0.0)
-    return a, c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS])
+    return a, _motor_friction(c)
 
 
 @njit(nogil=True)
@@ -153,7 +159,7 @@ def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
     dw_m = 0.0
     if two and m[3] != 0:
         a_mech = c[A_PLUS] if w_m > 0 else c[A_MINUS]
-        level = c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS])
+        level = _motor_friction(c)
         dw_m = (j - push - c[BETA] * a_mech * w_m - level * m[3]) / c[RHO]
     return w, dw, dj, w_m, dw_m
 
@@ -202,7 +208,7 @@ def _linear(c, x, m, drive, tau, a_emf, dt, scale):
             force += c[K_STOP] * (c[UPPER] if m[2] > 0 else c[LOWER])
     if motor_free:
         a2_m = c[BETA] * 0.5 * (c[A_PLUS] + c[A_MINUS])
-        force_m = kt * m[4] * c[GAP] - c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS]) * m[3]
+        force_m = kt * m[4] * c[GAP] - _motor_friction(c) * m[3]
     rate = abs(a2) + math.sqrt(abs(a1)) + (1.0 / tau + math.sqrt(abs(a_emf) / tau) if tau > 0 else a_emf)
     if two:
         rate = (rate + math.sqrt(kt) + dt_) / min(rho, rest)
@@ -260,7 +266,7 @@ def _violation(e, c, on, p, lawful, t, x, m):
     if c[TWO] <= 0:
         return -1.0
     if e == 4:
-        return -m[3] * w_m if m[3] != 0 else -1.0
+        return -m[3] * w_m if m[3] != 0 and _motor_friction(c) > 0 else -1.0
     if e == 5:
         twist = theta_m - theta
         return abs(twist) - c[GAP] if m[4] == 0 else c[GAP] - m[4] * twist
@@ -432,7 +438,7 @@ def _start_mode(c, on, p, lawful, t, x):
         side = 1 if w > 0 else -1
     stop = 1 if theta > c[UPPER] else (-1 if theta < c[LOWER] else 0)
     s = 1 if w > 0 else (-1 if w < 0 else 0)
-    s_m = 1 if x[4] > 0 else (-1 if x[4] < 0 else 0)
+    s_m = 1 if x[4] > 0 or (c[TWO] > 0 and _motor_friction(c) <= 0) else (-1 if x[4] < 0 else 0)
     twist = 0
     if c[TWO] > 0 and abs(x[3] - theta) > c[GAP]:
         twist = 1 if x[3] > theta else -1

@@ -15,8 +15,9 @@ import numpy as np
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Coefficients, Twin
 from ers_mj.errors import InputError
+from ers_mj.plants.play import rigid_play
 from ers_mj.plants.reduced import Motion
-from ers_mj.plants.skeletons import MOTOR_SHARE, Skeleton, lumped_skeleton, rudder_skeleton
+from ers_mj.plants.skeletons import Skeleton, lumped_skeleton, rudder_skeleton
 from ers_mj.plants.stepping import Law, Stepper, step_many
 from ers_mj.plants.writing import motor_gain, write_coefficients
 
@@ -34,8 +35,8 @@ class MechanicalPlant:
         parameters: a datasheet's, of which J [kg m^2], n and K_t [N m/A] make the three-dimensional rudder system; None for
             one lumped joint of inertia 1 in output units.
         linkage: "constant" or "rod", of the rudder system.
-        gap: half-width of a rigid play [output unit], with MOTOR_SHARE of J before it and all friction behind it; the
-            effect ``backlash`` brings its own split and an elastic contact.
+        gap: half-width of a rigid play [output unit] (see plants/play.py); the effect ``backlash`` brings its own split and
+            an elastic contact.
         is_angle: whether the output of a lumped plant turns (rad) or slides (m, V).
         timestep: h [s], at most; a sample is divided into whole steps.
 
@@ -134,7 +135,7 @@ class MechanicalPlant:
     def _lower(self) -> Coefficients:
         c = self.coefficients
         if self.gap > 0:
-            c = c._replace(two_body=1.0, gap=self.gap, rho=MOTOR_SHARE, beta=0.0, phi=0.0)
+            c = rigid_play(c, self.gap)
         for name, values in self.effects:
             c = BY_NAME[name].coefficients(values, c)
         return c

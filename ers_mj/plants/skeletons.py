@@ -17,9 +17,9 @@ import numpy as np
 from ers_mj.effects.base import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.plants.mjcf import read_mjcf
+from ers_mj.plants.play import MOTOR_SHARE
 
 LINKAGES = ("constant", "rod")
-MOTOR_SHARE = 0.64  # of J on the motor's side of the play, where no effect says otherwise: n^2 J_m = 0.00198 of 0.0031 kg m^2
 LEVER_SHARE = 1e-6 / 0.0031  # of J in either lever of the preload
 ARM = 0.01417  # [m] rocker arm, n times the lead of 4 mm over 2 pi
 ROD = 0.042  # [m] length of the rod between its pins
