@@ -13,6 +13,7 @@ from ers_mj.confirmation import confirmed
 from ers_mj.datasheet import Datasheet
 from ers_mj.document import Case, Diagnosis
 from ers_mj.identification import polished
+from ers_mj.multibody import Rig
 from ers_mj.recording import Recording
 from ers_mj.selection import select
 from ers_mj.traces import Trace, make_trace, noise_sigma
@@ -49,8 +50,11 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     progress("judging on held-out data", 0.75)
     held = [_trace(r, datasheet) for r in holdout]
     selection, judged = confirmed(start, chosen, held, jobs)
-    progress("locating", 0.88)
-    case = Case(recordings, list(holdout), datasheet, start, selection, judged, coarse, seed)
+    progress("running the MuJoCo plant", 0.84)
+    rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
+    multibody = tuple(rig.rmse(models, judged.parts, jobs) for models in (judged.base_models, judged.models))
+    progress("locating", 0.92)
+    case = Case(recordings, list(holdout), datasheet, start, selection, judged, coarse, seed, rig, multibody)
     return case.told(held)
 
 

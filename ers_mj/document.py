@@ -20,6 +20,7 @@ from ers_mj.excitation import next_recording
 from ers_mj.identification import BASE, STATES, Model, residuals, score, with_starts
 from ers_mj.intervals import standard_errors
 from ers_mj.localisation import Place, gather, places, residual_map, shaded
+from ers_mj.multibody import Rig
 from ers_mj.recording import Recording
 from ers_mj.selection import Candidate, Selection, tie
 from ers_mj.simulation import PER_INERTIA, unit_of
@@ -34,11 +35,12 @@ HALF = 0.5  # share of the squared held-out error that the named effects must ex
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The document (diagnosis.json, version 1), what the report draws, and the improved model."""
+    """The document (diagnosis.json, version 1), what the report draws, the improved model, and the same as MJCF (plant.xml)."""
 
     document: dict
     evidence: Evidence
     model: Datasheet
+    plant: str
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ class Case:
     confirmed: Confirmed
     coarse: bool
     seed: int
+    rig: Rig
+    multibody: tuple[float | None, float | None]
 
     @property
     def model(self) -> Model:
@@ -97,7 +101,8 @@ class Case:
         views = self._views(samples, verdict)
         evidence = Evidence(tuple(views), tuple(self._ladder()), residual_map(samples), self.noise, self.output_unit,
                             self.recordings[0].input_unit)
-        return Diagnosis(document, evidence, self._improved(verdict))
+        plant = self.rig.plant(model if verdict == "missing_physics" else base)
+        return Diagnosis(document, evidence, self._improved(verdict), plant.xml())
 
     # numbers
 
@@ -108,6 +113,7 @@ class Case:
         return {"train_rmse_before_rad": train[0], "train_rmse_after_rad": train[1],
                 "heldout_rmse_before_rad": pooled(c.before).rmse, "heldout_rmse_after_rad": pooled(c.after).rmse,
                 "recalibrated_rmse_before_rad": pooled(again[0]).rmse, "recalibrated_rmse_after_rad": pooled(again[1]).rmse,
+                "mujoco_heldout_rmse_before_rad": self.multibody[0], "mujoco_heldout_rmse_after_rad": self.multibody[1],
                 "noise_floor_rad": self.noise, "heldout_from": c.sentence,
                 "selection_cost_before": self.start.fit.cost, "selection_cost_after": self.selection.chosen.cost}
 

@@ -137,7 +137,7 @@ def stub(monkeypatch, **changes) -> list:
         document = {"version": 1, "verdict": "parameters_only", "sentence": "Only the parameters were off.", "missing": [], "where": [],
                     "fit": {"heldout_rmse_before_rad": np.float64(0.1), "heldout_rmse_after_rad": float("nan")}, "seed": seed,
                     "data": {"output_unit": "rad", "input_unit": "V", "files": [r.name for r in recordings], "sha256": [], "problems": []}}
-        return SimpleNamespace(document=document, evidence=Evidence((), (), None, 1e-3, "rad", "V"), model=changes.get("model", Datasheet(lumped={"b": 1.0})))
+        return SimpleNamespace(document=document, evidence=Evidence((), (), None, 1e-3, "rad", "V"), plant="<mujoco/>", model=changes.get("model", Datasheet(lumped={"b": 1.0})))
 
     monkeypatch.setitem(sys.modules, "ers_mj.diagnosis", SimpleNamespace(diagnose=diagnose))
     import ers_mj
@@ -179,11 +179,11 @@ def test_the_sentence_says_what_exists(argv, words, place, monkeypatch, capsys):
 # -- diagnose -------------------------------------------------------------------------------------------------------
 
 
-def test_diagnose_writes_three_files_and_tells(place, monkeypatch, capsys):
+def test_diagnose_writes_its_files_and_tells(place, monkeypatch, capsys):
     calls = stub(monkeypatch)
     assert cli.main("diagnose good.csv --holdout second.csv --datasheet good.toml --seed 5 --jobs 2 --out res".split()) == 0
     out, err = capsys.readouterr()
-    assert sorted(p.name for p in (place / "res").iterdir()) == ["diagnosis.json", "model.toml", "report.html"]
+    assert sorted(p.name for p in (place / "res").iterdir()) == ["diagnosis.json", "model.toml", "plant.xml", "report.html"]
     document = json.loads((place / "res/diagnosis.json").read_text())
     assert document["fit"]["heldout_rmse_after_rad"] is None and document["seed"] == 5
     assert read_datasheet(place / "res/model.toml").lumped["b"] == 1.0

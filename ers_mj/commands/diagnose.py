@@ -73,6 +73,7 @@ def _write(folder: Path, document: dict, found: object, progress: Progress) -> l
         "diagnosis.json": lambda path: _text(path, as_json(document) + "\n"),
         "report.html": lambda path: _text(path, page),
         "model.toml": lambda path: write_model(path, found.model),
+        "plant.xml": lambda path: _text(path, found.plant),
     })
 
 

@@ -1,0 +1,47 @@
+"""An identified model as a MuJoCo plant: its free runs of recordings, and plant.xml."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from ers_mj.evaluation import Fold, neutral
+from ers_mj.identification import Model, fitted_start
+from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.reduced import lumped
+from ers_mj.traces import Trace
+
+BODILY = ("J", "n", "K_t")  # what a datasheet must give for the rudder system in three dimensions
+
+
+@dataclass(frozen=True)
+class Rig:
+    """What the shape of the MuJoCo plant follows from: the datasheet's parameters, and whether the output is an angle."""
+
+    parameters: Mapping[str, float]
+    is_angle: bool
+
+    def plant(self, model: Model) -> MechanicalPlant:
+        """The identified model as a MuJoCo plant: the rudder system where the datasheet tells its inertia, one lumped joint else."""
+        bodily = self.is_angle and all(self.parameters.get(name, 0.0) > 0 for name in BODILY) and model.values["b"] > 0
+        return MechanicalPlant(lumped(model.values), neutral(model).effects, parameters=self.parameters if bodily else None,
+                               is_angle=self.is_angle)
+
+    def free_run(self, model: Model, trace: Trace) -> np.ndarray:
+        """Output (N,) of the MuJoCo plant under a recording's input, from the initial state that the reduced model fits."""
+        theta, omega = fitted_start(model, trace)
+        plant = self.plant(model)
+        c = plant.coefficients
+        drive = 0.0 if omega == 0 else c.b * trace.u[0] - c.a_emf * omega
+        return plant.simulate(trace.t, trace.u, (theta, omega, drive), enable=trace.enable, load=trace.load).theta
+
+    def rmse(self, models: Sequence[Model], parts: Sequence[Fold], jobs: int) -> float | None:
+        """Pooled free-run error [output unit] of the MuJoCo plants on what each model has not seen; None where one runs away."""
+        with ThreadPoolExecutor(jobs) as pool:
+            outputs = list(pool.map(self.free_run, models, [fold.held_out for fold in parts]))
+        errors = np.concatenate([(fold.held_out.y - y)[fold.held_out.valid] for y, fold in zip(outputs, parts)])
+        return math.sqrt(float(np.mean(errors**2))) if np.all(np.isfinite(errors)) else None
