@@ -7,8 +7,8 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
 ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "simulation", "traces", "identification", "guess", "baseline", "selection",
-         "intervals", "evaluation", "evidence", "excitation", "localisation", "confirmation", "multibody", "document", "diagnosis", "display", "figures", "report", "commands", "cli"]
-SILENT = {"identification", "guess", "baseline", "selection", "intervals", "evaluation", "localisation", "confirmation", "multibody", "document", "diagnosis", "effects", "plants"}
+         "intervals", "evaluation", "evidence", "excitation", "localisation", "confirmation", "multibody", "document", "diagnosis", "validation", "display", "validity", "figures", "page", "maps", "report", "validation_report", "commands", "cli"]
+SILENT = {"identification", "guess", "baseline", "selection", "intervals", "evaluation", "localisation", "confirmation", "multibody", "document", "diagnosis", "validation", "validity", "effects", "plants"}
 
 
 def room(path: Path) -> str:
