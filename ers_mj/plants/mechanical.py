@@ -88,6 +88,10 @@ class MechanicalPlant:
         rows = stepper.run(t, u, self._lowered.delay, enable, load)
         return self._motion(t, rows)
 
+    def ratio(self, theta: float) -> float:
+        """The motor's speed over the rudder's at the angle theta, the play closed."""
+        return self._skeleton.pose(theta)[self._skeleton.motor_joint][1]
+
     def terminal(self, u: np.ndarray) -> np.ndarray:
         """The input (N,) that is left of the command u (N,) after the drive's static effects."""
         for name, values in self.effects:
