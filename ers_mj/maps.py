@@ -41,7 +41,7 @@ def _sine_map(sines: ValidityMap, valid: float, width: float) -> Figure:
 def _play_map(play: ValidityMap, width: float) -> Figure:
     figure = Figure(figsize=(width if width != WIDE else 0.62 * WIDE, 3.2), layout="constrained")
     ax = figure.subplots()
-    _cells(ax, np.degrees(play.rms), np.zeros(play.rms.shape, bool), [f"±{np.degrees(x):.3g}" for x in play.x], [f"{1e3 * y:.3g}" for y in play.y])
+    _cells(ax, np.degrees(play.rms), np.zeros(play.rms.shape, bool), [f"±{np.degrees(x):.3g}" if x else "0" for x in play.x], [f"{1e3 * y:.3g}" for y in play.y])
     ax.set_title("rms deviation [°]", color=INK, fontweight="bold")
     ax.set_xlabel("inductance L [mH]")
     ax.set_ylabel("play [°]")

@@ -171,8 +171,8 @@ def validate(datasheet: Datasheet, gaps: Sequence[float] = GAPS, linkages: Seque
 
 def spoken(condition: Condition) -> str:
     """The condition in words."""
-    play = f"play of ±{np.degrees(condition.gap):.3g}°" if condition.gap else "no play"
-    return f"{play}, {condition.linkage} linkage, inductance {'on' if condition.inductance else 'off'}"
+    play = f"play ±{np.degrees(condition.gap):.3g}°" if condition.gap else "no play"
+    return f"{play}, {condition.linkage} linkage, L {'on' if condition.inductance else 'off'}"
 
 
 def _mujoco(datasheet: Datasheet, c: Condition):

@@ -97,7 +97,8 @@ def called(c: Condition) -> str:
 
 def degrees(x: float) -> str:
     """An angle [rad] as a reader sees it."""
-    return f"{figure(np.degrees(x), 2)}°"
+    x_deg = float(np.degrees(x))
+    return f"{x_deg:.1g}°" if 1e-4 <= x_deg < 1e-3 else f"{figure(x_deg, 2)}°"
 
 
 def per_cent(x: float) -> str:
@@ -125,8 +126,8 @@ def _reason(condition: Condition, cases: Sequence[Case], validation: Validation)
     if condition.gap:
         case = max(cases, key=lambda case: rms(case.error_eq_5))
         moving = np.abs(case.error_eq_5)[np.abs(_speed(case)) > REST]
-        told.append(f"Each time the torque changes sign the rudder is on its own across the play, {degrees(2 * condition.gap)} wide; on the {case.input} "
-                    f"the deviation is {degrees(np.median(moving))} in the median while it moves.")
+        told.append(f"Each time the torque changes sign the motor crosses the play, {degrees(2 * condition.gap)} wide, alone and meets the rudder with a "
+                    f"running start; on the {case.input} the deviation is {degrees(np.median(moving))} in the median while it moves.")
     if condition.linkage == "rod":
         low, high = (min(cases, key=lambda case: case.mujoco.min()), max(cases, key=lambda case: case.mujoco.max()))
         told.append(f"The rod's ratio is {low.ratio[1]:.1f} at zero, {low.ratio[0]:.1f} at {np.degrees(low.mujoco.min()):.0f}° and "

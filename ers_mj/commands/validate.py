@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ers_mj.validation import Validation
 
 LINKAGES, SWITCH = ("constant", "rod"), ("off", "on")
-NAME = 46  # characters of a row's name
+NAME = 38  # characters of a row's name
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -96,15 +96,14 @@ def _told(found: Validation, document: dict, files: list[Path]) -> list[str]:
 
 
 def _told_table(found: Validation) -> list[str]:
-    """RMS deviations in degrees, one condition a line."""
-    from ers_mj.display import figure
+    """RMS deviations, one condition a line."""
     from ers_mj.validation import spoken
-    from ers_mj.validity import VALID
+    from ers_mj.validity import VALID, degrees
 
     inputs = list(dict.fromkeys(case.input for case in found.cases))
-    lines = [bold(f"{'RMS deviation [deg], MuJoCo has':{NAME}}" + "".join(f"{name:>11}" for name in inputs))]
+    lines = [bold(f"{'RMS deviation; MuJoCo has':{NAME}}" + "".join(f"{name:>11}" for name in inputs))]
     for condition in dict.fromkeys(case.condition for case in found.cases):
         cases = {case.input: case for case in found.cases if case.condition == condition}
-        cells = [f"{figure(math.degrees(cases[x].rms), 2)}{'*' if cases[x].rms > VALID * cases[x].motion else ' '}" for x in inputs]
+        cells = [f"{degrees(cases[x].rms)}{'*' if cases[x].rms > VALID * cases[x].motion else ' '}" for x in inputs]
         lines.append(f"  {spoken(condition):{NAME - 2}}" + "".join(f"{cell:>11}" for cell in cells))
     return [*lines, f"  * more than {100 * VALID:.0f} % of the motion; the reduced model is Eq. (6), or Eq. (1) where the inductance is on"]
