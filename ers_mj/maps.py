@@ -53,7 +53,7 @@ def _cells(ax, values: np.ndarray, framed: np.ndarray, rows: Sequence[str], colu
     positive = values[np.isfinite(values) & (values > 0)]
     low, high = np.log(positive.min()), np.log(positive.max())
     shade = (np.log(np.where(values > 0, values, np.nan)) - low) / max(high - low, 1e-9)
-    ax.imshow(np.ma.masked_invalid(shade), cmap=HEAT, vmin=0, vmax=1, origin="lower", aspect="auto")
+    ax.pcolormesh(range(len(columns)), range(len(rows)), np.ma.masked_invalid(shade), cmap=HEAT, vmin=0, vmax=1, shading="nearest")
     for (i, j), x in np.ndenumerate(values):
         if np.isfinite(x):
             ax.text(j, i, digits(x, 2), ha="center", va="center", fontsize=8.5, color="white" if shade[i, j] > DARK else INK)

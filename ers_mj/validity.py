@@ -126,8 +126,10 @@ def _reason(condition: Condition, cases: Sequence[Case], validation: Validation)
     if condition.gap:
         case = max(cases, key=lambda case: rms(case.error_eq_5))
         moving = np.abs(case.error_eq_5)[np.abs(_speed(case)) > REST]
-        told.append(f"Each time the torque changes sign the motor crosses the play, {degrees(2 * condition.gap)} wide, alone and meets the rudder with a "
-                    f"running start; on the {case.input} the deviation is {degrees(np.median(moving))} in the median while it moves.")
+        wide = degrees(2 * condition.gap)
+        told.append(f"Each time the torque changes sign the motor crosses the play, {wide} wide, alone and meets the rudder with a running start; on the "
+                    f"{case.input} the deviation is {degrees(float(np.median(moving)))} in the median while it moves." if moving.size
+                    else f"The motor never gets across the play, {wide} wide, and the rudder stands still.")
     if condition.linkage == "rod":
         low, high = (min(cases, key=lambda case: case.mujoco.min()), max(cases, key=lambda case: case.mujoco.max()))
         told.append(f"The rod's ratio is {low.ratio[1]:.1f} at zero, {low.ratio[0]:.1f} at {np.degrees(low.mujoco.min()):.0f}° and "

@@ -104,10 +104,18 @@ SIMULATE = {
     "inductance without L": f"good.toml {STEPS} --inductance on", "out exists": "--input steps --out exists.csv", "out folder": "--input steps --out folder",
     "out parquet": "--input steps --out new.parquet", "out under file": "--input steps --out exists.csv/new.csv", "two models": f"good.toml both.toml {STEPS}",
 }
+VALIDATE = {
+    "gap word": "--gap wide", "gap negative": "--gap -0.5", "gap inf": "--gap 0,inf", "gap twice": "--gap 0.5,0.50", "gap open list": "--gap 0.5,", "gap without value": "--gap",
+    "linkage": "--linkage rope", "linkages": "--linkage constant,rope", "linkage twice": "--linkage rod,rod", "inductance": "--inductance 1",
+    "no datasheet": "--datasheet missing.toml", "bad datasheet": "--datasheet bad.toml", "too little": "--datasheet no_b.toml", "empty datasheet name": ["--datasheet", ""],
+    "rod of a joint": "--datasheet lumped.toml --linkage rod", "no inductance": "--datasheet lumped.toml --inductance off,on",
+    "jobs": "--jobs 0", "folder holds files": "--out folder", "out is a file": "--out exists.csv", "file given": "good.csv", "unknown option": "--quick",
+}
 OTHERS = {"no command": [], "unknown command": ["diagnoze"], "unknown option": ["--quick"], "demo with a file": ["demo", "good.csv"],
           "demo seed": ["demo", "--seed", "x"], "demo into files": ["demo", "--out", "folder"]}
 SPLIT = {**{f"diagnose {k}": ["diagnose", *(v if isinstance(v, list) else v.split())] for k, v in DIAGNOSE.items()},
-         **{f"simulate {k}": ["simulate", *(v if isinstance(v, list) else v.split())] for k, v in SIMULATE.items()}, **OTHERS}
+         **{f"simulate {k}": ["simulate", *(v if isinstance(v, list) else v.split())] for k, v in SIMULATE.items()},
+         **{f"validate {k}": ["validate", *(v if isinstance(v, list) else v.split())] for k, v in VALIDATE.items()}, **OTHERS}
 
 
 @pytest.fixture
@@ -164,7 +172,9 @@ def test_bad_input_is_one_sentence_code_2_and_nothing_written(argv, place, monke
     ("simulate --input steps --out n.csv --linkage rod", "a rod linkage needs --plant mujoco"),
     ("simulate lumped.toml --input steps --out n.csv --plant mujoco --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
     ("simulate --input steps --out n.csv --gap 1 --effect backlash:gap=0.01", "the play is given twice"),
-    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate"),
+    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate, validate"),
+    ("validate --linkage constant,rope", "there is no 'rope'; there are constant, rod"),
+    ("validate --datasheet lumped.toml --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
     ("diagnose good.csv --map t_s=Time", "the columns are t_s, u_V, theta_rad"),
     ("diagnose good.csv metres.csv", "in m and that of good.csv in rad"),
     ("diagnose good.csv --holdout copy.csv", "copy.csv: is held out and also among the training recordings (as good.csv)"),
@@ -356,7 +366,7 @@ def read_text_of_table1() -> str:
 # -- the program itself -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate"])
+@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate", "validate"])
 def test_help_has_an_example(command, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main([*command.split(), "--help"])
