@@ -27,6 +27,7 @@ STYLE = {
     "legend.frameon": False, "path.simplify": True, "svg.hashsalt": "ers", "axes.titlesize": 10, "axes.titlelocation": "left",
 }
 MOST_RUNGS = 16
+LABELS = ("measured", "model before", "model after")
 CLOSE_UP = 0.08  # share of a recording that the close-up shows
 _serial = itertools.count(1)
 
@@ -73,17 +74,17 @@ def decimate(t: np.ndarray, x: np.ndarray, points: int) -> tuple[np.ndarray, np.
 # -- traces -------------------------------------------------------------------------------------------------------
 
 
-def traces(view: RecordView, evidence: Evidence) -> str:
-    """Measured against simulated before and after, the residual below on the same time axis."""
-    return both_widths(lambda width: _traces(view, evidence, width, None), "measured and simulated output over time")
+def traces(view: RecordView, evidence: Evidence, labels: tuple[str, str, str] = LABELS) -> str:
+    """Measured against simulated before and after (so called in `labels`), the residual below on the same time axis."""
+    return both_widths(lambda width: _traces(view, evidence, width, None, labels), "measured and simulated output over time")
 
 
-def close_up(view: RecordView, evidence: Evidence) -> str | None:
+def close_up(view: RecordView, evidence: Evidence, labels: tuple[str, str, str] = LABELS) -> str | None:
     """The same over the span where the model before does worst; None where the recording is short."""
     span = worst_span(view)
     if span is None:
         return None
-    return both_widths(lambda width: _traces(view, evidence, width, span), "the same, the worst span enlarged")
+    return both_widths(lambda width: _traces(view, evidence, width, span, labels), "the same, the worst span enlarged")
 
 
 def worst_span(view: RecordView) -> tuple[float, float] | None:
@@ -98,18 +99,17 @@ def worst_span(view: RecordView) -> tuple[float, float] | None:
     return float(view.t[begin]), float(view.t[begin + int(1.5 * n)])
 
 
-def _traces(view: RecordView, evidence: Evidence, width: float, span: tuple[float, float] | None) -> Figure:
+def _traces(view: RecordView, evidence: Evidence, width: float, span: tuple[float, float] | None, labels: tuple[str, str, str]) -> Figure:
     figure = Figure(figsize=(width, 4.9 if width == WIDE else 4.7), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
     inside = slice(None) if span is None else slice(*np.searchsorted(view.t, span))
     t, measured, before, after = (x[inside] for x in (view.t, view.measured, view.before, view.after))
     unit = shown(evidence.output_unit, _size(view.measured))
     points = 1500 if width == WIDE else 700
-    for x, colour, label, order in ((measured, MEASURED, "measured", 2), (before, BEFORE, "model before", 3),
-                                    (after, AFTER, "model after", 4)):
+    for x, colour, label, order in zip((measured, before, after), (MEASURED, BEFORE, AFTER), labels, (2, 3, 4), strict=True):
         if np.isfinite(x).any():
             above.plot(*decimate(t, x * unit.factor, points), color=colour, label=label, zorder=order,
-                       linewidth=3.0 if label == "measured" else 1.2)
+                       linewidth=3.0 if order == 2 else 1.2)
     _residual(below, t, measured, before, after, evidence, unit, points)
     shade(above, below, view.shaded, t)
     above.set_ylabel(f"{noun(evidence.output_unit)} [{unit.label}]")

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
-from importlib.resources import files
 
-from ers_mj import figures
-from ers_mj.display import NONE, Unit, figure, interval, missing, pretty, shown 
+from ers_mj import figures, page
+from ers_mj.display import NONE, Unit, figure, interval, missing, pretty, shown
 from ers_mj.evidence import Evidence, RecordView, Rung
 from ers_mj.frames import Frame, Frames
 
@@ -29,7 +27,6 @@ FITS = (
 )
 MOST_RECORDS = 12  # figures of recordings in one page
 SHORT_HASH = 12
-Cell = tuple[str, str]  # html, class
 
 
 def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = None) -> str:
@@ -38,51 +35,7 @@ def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = N
     verdict = str(document.get("verdict") or "")
     parts = (_header, _curves, lambda *_: _frames(frames), _where, _missing, _residuals, _ladder, _fit, _parameters, _record_state, _data, _next)
     body = "\n".join(part(document, evidence) for part in parts)
-    style = files("ers_mj").joinpath("report.css").read_text(encoding="utf-8")
-    return (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-            f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-            f"<title>{_text(VERDICTS.get(verdict, verdict))} · servo diagnosis</title>\n<style>\n{style}</style>\n</head>\n"
-            f'<body>\n<main class="{_text(verdict)}">\n{body}\n{_footer(document)}\n</main>\n</body>\n</html>\n')
-
-
-# -- words, tables, sections -------------------------------------------------------------------------------------
-
-
-def _text(x: object) -> str:
-    return escape("" if x is None else str(x), quote=True)
-
-
-def _named(name: object) -> str:
-    return _text(str(name or "").replace("_", " "))
-
-
-def _section(title: str, lead: str, content: str, kind: str = "") -> str:
-    """A section, nothing where it has no content."""
-    if not content:
-        return ""
-    lead = f'<p class="lead">{lead}</p>' if lead else ""
-    return f'<section class="{kind}">\n<h2>{title}</h2>\n{lead}\n{content}\n</section>'
-
-
-def _table(heads: Sequence[str], rows: Iterable[tuple[Sequence[Cell | str], str]]) -> str:
-    """A table in its own scrolling box; heads that begin with > stand on the right, as their cells do."""
-    right = [head.startswith(">") for head in heads]
-    mark = [' class="n"' if side else "" for side in right]
-    head = "".join(f"<th{m}>{h.lstrip('>')}</th>" for h, m in zip(heads, mark, strict=True))
-    lines = [f'<tr class="{kind}">' + "".join(f"<td{m}>{cell}</td>" for cell, m in zip(cells, mark, strict=True)) + "</tr>"
-             for cells, kind in rows]
-    body = "\n".join(lines)
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>' if lines else ""
-
-
-def _figure(svg: str | None, caption: str = "") -> str:
-    caption = f"<figcaption>{caption}</figcaption>" if caption else ""
-    return f"<figure>{svg}{caption}</figure>" if svg else ""
-
-
-def _list(sentences: Iterable[object]) -> str:
-    items = "\n".join(f"<li>{_text(sentence)}</li>" for sentence in sentences if sentence)
-    return f"<ul>\n{items}\n</ul>" if items else ""
+    return page.frame(f"{VERDICTS.get(verdict, verdict)} · servo diagnosis", verdict, f"{body}\n{_footer(document)}")
 
 
 def _output_unit(document: Mapping, evidence: Evidence) -> str:
@@ -100,11 +53,10 @@ def _error_unit(document: Mapping, evidence: Evidence) -> Unit:
 
 def _header(document: Mapping, evidence: Evidence) -> str:
     verdict = str(document.get("verdict") or "")
-    return (f'<header class="{_text(verdict)}">\n<p class="verdict">{_text(VERDICTS.get(verdict, "No verdict"))}'
-            f"<small>{_text(verdict)}</small></p>\n<h1>{_text(document.get('sentence'))}</h1>\n{_tiles(document, evidence)}\n</header>")
+    return page.header(verdict, VERDICTS.get(verdict, "No verdict"), verdict, document.get("sentence"), _tiles(document, evidence))
 
 
-def _tiles(document: Mapping, evidence: Evidence) -> str:
+def _tiles(document: Mapping, evidence: Evidence) -> list[tuple[str, str]]:
     """The numbers to take away: held-out error before and after, what is explained, the noise."""
     fit, unit = document.get("fit") or {}, _error_unit(document, evidence)
     before, after = fit.get("heldout_rmse_before_rad"), fit.get("heldout_rmse_after_rad")
@@ -114,16 +66,12 @@ def _tiles(document: Mapping, evidence: Evidence) -> str:
                       f'<i>→</i><span class="a">{unit(after)}</span>'))
     share = (document.get("remainder") or {}).get("explained_share")
     if not missing(share):
-        tiles.append(("of the squared error explained", _share(share)))
+        tiles.append(("of the squared error explained", page.share(share)))
     if not missing(fit.get("noise_floor_rad")):
         tiles.append(("noise floor", unit(fit["noise_floor_rad"])))
     named = document.get("missing") or []
-    tiles.append(("effects named", ", ".join(_named(effect.get("effect")) for effect in named) or "none"))
-    return '<div class="tiles">' + "".join(f'<div class="tile"><span>{label}</span><b>{value}</b></div>' for label, value in tiles) + "</div>"
-
-
-def _share(x: float | None) -> str:
-    return NONE if missing(x) else f"{figure(100 * x, 2) if 0 < abs(x) < 0.1 else f'{100 * x:.0f}'} %"
+    tiles.append(("effects named", ", ".join(page.named(effect.get("effect")) for effect in named) or "none"))
+    return tiles
 
 
 def _curves(document: Mapping, evidence: Evidence) -> str:
@@ -139,18 +87,18 @@ def _curves(document: Mapping, evidence: Evidence) -> str:
     lead = ("Each model runs free: it gets the input and the initial state, never the measurement. "
             '<span class="b">Before</span> is the paper’s model refitted to the training recordings, '
             '<span class="a">after</span> has the named physics in it. The grey band is ±2 standard deviations of noise.')
-    return _section("Measured and simulated", lead, "\n".join(content))
+    return page.section("Measured and simulated", lead, "\n".join(content))
 
 
 def _record_title(view: RecordView) -> str:
-    return f"{_text(view.name)} · {'held out' if view.held_out else 'training'}"
+    return f"{page.text(view.name)} · {'held out' if view.held_out else 'training'}"
 
 
 def _record(view: RecordView, evidence: Evidence, titled: bool = True, with_close_up: bool = False) -> str:
     title = f'<p class="note">{_record_title(view)}</p>' if titled else ""
-    content = title + _figure(figures.traces(view, evidence))
+    content = title + page.figure(figures.traces(view, evidence))
     if with_close_up and (enlarged := figures.close_up(view, evidence)):
-        content += _figure(enlarged, "The span in which the model before does worst, enlarged.")
+        content += page.figure(enlarged, "The span in which the model before does worst, enlarged.")
     return content
 
 
@@ -160,14 +108,14 @@ def _frames(frames: Frames | None) -> str:
         return ""
     title = "The rudder at the worst moments"
     if frames.why_not:
-        return _section(title, "", f'<p class="note">No frames are shown: {_text(frames.why_not)}.</p>')
-    lead = (f"{_text(frames.name)} on the plant in three dimensions, when the model before is furthest off. "
+        return page.section(title, "", f'<p class="note">No frames are shown: {page.text(frames.why_not)}.</p>')
+    lead = (f"{page.text(frames.name)} on the plant in three dimensions, when the model before is furthest off. "
             "White is the simulated rudder, translucent amber the measured one.")
     if frames.enlarged > 1:
         lead += f" The difference between them is drawn {frames.enlarged} times as large as it is."
     cells = "\n".join(f"<div>{_frame(f, 'before', f.before, f.picture_before)}{_frame(f, 'after', f.after, f.picture_after)}</div>"
                       for f in frames.moments)
-    return _section(title, lead, f'<div class="frames">{cells}</div>')
+    return page.section(title, lead, f'<div class="frames">{cells}</div>')
 
 
 def _frame(frame: Frame, when: str, simulated: float, picture: bytes) -> str:
@@ -178,29 +126,8 @@ def _frame(frame: Frame, when: str, simulated: float, picture: bytes) -> str:
 
 
 def _where(document: Mapping, evidence: Evidence) -> str:
-    places = "\n".join(_place(place) for place in document.get("where") or [])
-    return _section("Where it fails", "Where the error of the refitted model lives, before any physics is added.", places)
-
-
-def _place(place: Mapping) -> str:
-    sentence = _text(place.get("sentence") or _region(place))
-    bars = _bar("of error", place.get("share_of_error"), "error") + _bar("of time", place.get("share_of_time"), "")
-    return (f'<div class="place"><span class="axis">{_text(place.get("axis"))}</span><p>{sentence}</p>'
-            f'<div class="bars">{bars}</div></div>')
-
-
-def _region(place: Mapping) -> str:
-    if place.get("label") or not place.get("region"):
-        return str(place.get("label") or "")
-    unit = shown(place.get("unit"))
-    return f"{interval(place['region'], unit)} {unit.label}"
-
-
-def _bar(label: str, share: float | None, kind: str) -> str:
-    if missing(share):
-        return ""
-    width = 100 * min(max(share, 0.0), 1.0)
-    return f'<div class="bar {kind}"><span>{label}</span><div><i style="width:{width:.1f}%"></i></div><em>{_share(share)}</em></div>'
+    places = "\n".join(page.place(place) for place in document.get("where") or [])
+    return page.section("Where it fails", "Where the error of the refitted model lives, before any physics is added.", places)
 
 
 def _missing(document: Mapping, evidence: Evidence) -> str:
@@ -212,12 +139,12 @@ def _missing(document: Mapping, evidence: Evidence) -> str:
         "unexplained": "No effect of the library accounts for half of the mismatch, so none is named.",
     }.get(str(document.get("verdict")), "No effect is named.")
     content = (effects or f"<p>{none}</p>") + _suspects(document) + _remainder(document)
-    return _section("The physics that was left out", "", content)
+    return page.section("The physics that was left out", "", content)
 
 
 def _effect(effect: Mapping, unit: Unit) -> str:
-    return (f'<div class="effect"><h3>{_named(effect.get("effect"))}<span class="place-name">{_text(effect.get("subsystem"))}</span></h3>'
-            f'<p class="says">{_text(effect.get("sentence"))}</p>{_effect_parameters(effect.get("parameters") or {})}'
+    return (f'<div class="effect"><h3>{page.named(effect.get("effect"))}<span class="place-name">{page.text(effect.get("subsystem"))}</span></h3>'
+            f'<p class="says">{page.text(effect.get("sentence"))}</p>{_effect_parameters(effect.get("parameters") or {})}'
             f"{_effect_evidence(effect.get('evidence') or {}, unit)}{_alternatives(effect.get('alternatives') or [])}</div>")
 
 
@@ -225,11 +152,11 @@ def _effect_parameters(parameters: Mapping) -> str:
     rows = []
     for name, entry in parameters.items():
         unit = shown(entry.get("unit"), entry.get("value"))
-        rows.append(((f"<code>{_text(name)}</code>", unit.bare(entry.get("value")), interval(entry.get("ci95"), unit),
-                      _text(unit.label), _text(entry.get("meaning"))), ""))
+        rows.append(((f"<code>{page.text(name)}</code>", unit.bare(entry.get("value")), interval(entry.get("ci95"), unit),
+                      page.text(unit.label), page.text(entry.get("meaning"))), ""))
     meaning = any(cells[-1] for cells, _ in rows)
     heads = ["parameter", ">value", ">95 % interval", "unit", "meaning"]
-    return _table(heads if meaning else heads[:-1], [(cells if meaning else cells[:-1], kind) for cells, kind in rows])
+    return page.table(heads if meaning else heads[:-1], [(cells if meaning else cells[:-1], kind) for cells, kind in rows])
 
 
 def _effect_evidence(evidence: Mapping, unit: Unit) -> str:
@@ -250,27 +177,27 @@ def _alternatives(alternatives: Sequence[Mapping]) -> str:
     if not alternatives:
         return ""
     items = "\n".join(
-        f"<li><b>{_named(other.get('effect'))}</b>{_probability(other.get('probability'))}: "
-        f"{_text(other.get('why_not_excluded') or 'not excluded by these recordings')}</li>" for other in alternatives)
+        f"<li><b>{page.named(other.get('effect'))}</b>{_probability(other.get('probability'))}: "
+        f"{page.text(other.get('why_not_excluded') or 'not excluded by these recordings')}</li>" for other in alternatives)
     return f'<p class="note">Could also be:</p><ul class="note">\n{items}\n</ul>'
 
 
 def _probability(x: float | None) -> str:
-    return "" if missing(x) else f" ({_share(x)})"
+    return "" if missing(x) else f" ({page.share(x)})"
 
 
 def _suspects(document: Mapping) -> str:
     suspects = document.get("suspects") or []
     told = [s if isinstance(s, str) else " · ".join(filter(None, (str(s.get("effect") or "").replace("_", " "), s.get("sentence"))))
             for s in suspects]
-    return f'<p class="note">Suspects, none of them proven:</p>{_list(told)}' if told else ""
+    return f'<p class="note">Suspects, none of them proven:</p>{page.listed(told)}' if told else ""
 
 
 def _remainder(document: Mapping) -> str:
     remainder = document.get("remainder") or {}
     if not remainder.get("sentence"):
         return ""
-    return f'<p class="{"flag" if remainder.get("significant") else "note"}">{_text(remainder["sentence"])}</p>'
+    return f'<p class="{"flag" if remainder.get("significant") else "note"}">{page.text(remainder["sentence"])}</p>'
 
 
 def _residuals(document: Mapping, evidence: Evidence) -> str:
@@ -278,7 +205,7 @@ def _residuals(document: Mapping, evidence: Evidence) -> str:
         return ""
     noun = figures.noun(evidence.output_unit)
     lead = f"Rms residual of the free runs in each bin of {noun} and speed, one scale for both; white bins hold no data."
-    return _section(f"Residual over {noun} and speed", lead, _figure(figures.residual_map(evidence.residual_map, evidence)))
+    return page.section(f"Residual over {noun} and speed", lead, page.figure(figures.residual_map(evidence.residual_map, evidence)))
 
 
 def _ladder(document: Mapping, evidence: Evidence) -> str:
@@ -287,21 +214,21 @@ def _ladder(document: Mapping, evidence: Evidence) -> str:
     baseline = next((r.heldout_rmse for r in evidence.ladder if not r.effects), None)
     baseline = (document.get("fit") or {}).get("heldout_rmse_before_rad") if baseline is None else baseline
     unit = _error_unit(document, evidence)
-    drawn = _figure(figures.ladder(evidence.ladder, evidence, baseline),
+    drawn = page.figure(figures.ladder(evidence.ladder, evidence, baseline),
                     'The <span class="b">orange line</span> is the model before, the dashed one the noise floor; what was '
                     '<span class="a">chosen</span> is green.')
     rows = [(_rung(rung, unit), "chosen" if rung.chosen else "") for rung in evidence.ladder]
     heads = ["candidate", ">held-out error", ">gain", ">z", ">numbers", "note"]
-    table = _table([head.replace("held-out error", f"held-out error [{_text(unit.label)}]") for head in heads], rows)
+    table = page.table([head.replace("held-out error", f"held-out error [{page.text(unit.label)}]") for head in heads], rows)
     if len(evidence.ladder) > figures.MOST_RUNGS:
         table = f"<details><summary>All {len(evidence.ladder)} candidates as a table</summary>{table}</details>"
     lead = "Every candidate was fitted in simulation; gain is what it takes off the training cost, z how surely, paired by blocks of time, numbers how many it adds."
-    return _section("The candidates", lead, drawn + table)
+    return page.section("The candidates", lead, drawn + table)
 
 
 def _rung(rung: Rung, unit: Unit) -> tuple[str, ...]:
     gain, z = NONE if missing(rung.gain) else figure(rung.gain), NONE if missing(rung.z) else f"{rung.z:.1f}".replace("-", "−")
-    return (_text(figures.rung_name(rung)), unit.bare(rung.heldout_rmse), gain, z, str(rung.parameters), _text(rung.note))
+    return (page.text(figures.rung_name(rung)), unit.bare(rung.heldout_rmse), gain, z, str(rung.parameters), page.text(rung.note))
 
 
 def _fit(document: Mapping, evidence: Evidence) -> str:
@@ -315,11 +242,11 @@ def _fit(document: Mapping, evidence: Evidence) -> str:
         rows.append(((title, unit.bare(before), unit.bare(after), _times(after, noise), f'<span class="why">{what}</span>'), ""))
     rows.append((("Noise floor", unit.bare(noise), "", "", '<span class="why">of the sensor, from the recordings</span>'), ""))
     known = {f"{key}_rmse_{when}_rad" for key, *_ in FITS for when in ("before", "after")} | {"noise_floor_rad"}
-    rows += [((_named(key.removesuffix("_rad")), "", unit.bare(x) if key.endswith("_rad") else figure(x), "", ""), "")
+    rows += [((page.named(key.removesuffix("_rad")), "", unit.bare(x) if key.endswith("_rad") else figure(x), "", ""), "")
              for key, x in fit.items() if key not in known and not missing(x)]
-    told = "".join(f'<p class="note">{_text(x)}</p>' for key, x in fit.items() if isinstance(x, str))
-    table = _table(["free-run rms error", f">before [{_text(unit.label)}]", f">after [{_text(unit.label)}]", ">after/noise", ""], rows)
-    return _section("How well it fits", "Root-mean-square error of free runs from the first sample on.", table + told)
+    told = "".join(f'<p class="note">{page.text(x)}</p>' for key, x in fit.items() if isinstance(x, str))
+    table = page.table(["free-run rms error", f">before [{page.text(unit.label)}]", f">after [{page.text(unit.label)}]", ">after/noise", ""], rows)
+    return page.section("How well it fits", "Root-mean-square error of free runs from the first sample on.", table + told)
 
 
 def _times(x: float | None, noise: float | None) -> str:
@@ -330,7 +257,7 @@ def _parameters(document: Mapping, evidence: Evidence) -> str:
     rows = [_parameter(name, entry) for name, entry in (document.get("parameters") or {}).items()]
     heads = ["parameter", ">value", ">95 % interval", "unit", ">datasheet", ">change", ""]
     lead = "Of the improved model, fitted to the training recordings."
-    return _section("Parameters", lead, _table(heads, rows))
+    return page.section("Parameters", lead, page.table(heads, rows))
 
 
 def _parameter(name: str, entry: Mapping) -> tuple[tuple[str, ...], str]:
@@ -339,17 +266,17 @@ def _parameter(name: str, entry: Mapping) -> tuple[tuple[str, ...], str]:
     told = entry.get("identifiable") is not False
     change = NONE if missing(value) or missing(sheet) or sheet == 0 else f"{100 * (value / sheet - 1):+.1f} %".replace("-", "−")
     word = "" if told else '<span class="why">not identifiable from these recordings</span>'
-    cells = (f"<code>{_text(name)}</code>", unit.bare(value), interval(entry.get("ci95"), unit), _text(unit.label),
+    cells = (f"<code>{page.text(name)}</code>", unit.bare(value), interval(entry.get("ci95"), unit), page.text(unit.label),
              unit.bare(sheet), change, word)
     return cells, "" if told else "untold"
 
 
 def _record_state(document: Mapping, evidence: Evidence) -> str:
     states = document.get("record_state") or []
-    sentences = _list(state.get("sentence") for state in states)
+    sentences = page.listed(state.get("sentence") for state in states)
     rows = [row for state in states for row in _state_rows(state, evidence)]
     lead = "What changed from one recording to the next: the state of the rig on the day, not its structure."
-    return _section("What differs between recordings", lead, sentences + _table(["state", "recording", ">value", ">95 % interval", "unit"], rows)
+    return page.section("What differs between recordings", lead, sentences + page.table(["state", "recording", ">value", ">95 % interval", "unit"], rows)
                     if states else "")
 
 
@@ -360,21 +287,21 @@ def _state_rows(state: Mapping, evidence: Evidence) -> Iterable[tuple[tuple[str,
     for k, value in enumerate(values):
         name = names[k] if len(names) == len(values) else f"recording {k + 1}"
         ci = cis[k] if k < len(cis) else None
-        yield (_named(state.get("name")) if k == 0 else "", _text(name), unit.bare(value), interval(ci, unit), _text(unit.label)), ""
+        yield (page.named(state.get("name")) if k == 0 else "", page.text(name), unit.bare(value), interval(ci, unit), page.text(unit.label)), ""
 
 
 def _data(document: Mapping, evidence: Evidence) -> str:
     problems = (document.get("data") or {}).get("problems") or []
     lead = "Worked around or ignored, and told." if problems else ""
-    return _section("Problems found in the data", lead, _list(problems) or "<p>None.</p>")
+    return page.section("Problems found in the data", lead, page.listed(problems) or "<p>None.</p>")
 
 
 def _next(document: Mapping, evidence: Evidence) -> str:
     following = document.get("next_recording") or {}
     excitation = following.get("excitation")
-    rows = [((_named(key), _text(_value(value))), "") for key, value in excitation.items()] if isinstance(excitation, Mapping) else []
-    content = f"<p>{_text(following['sentence'])}</p>" if following.get("sentence") else ""
-    return _section("What to record next", "", content + _table(["excitation", ""], rows), "next")
+    rows = [((page.named(key), page.text(_value(value))), "") for key, value in excitation.items()] if isinstance(excitation, Mapping) else []
+    content = f"<p>{page.text(following['sentence'])}</p>" if following.get("sentence") else ""
+    return page.section("What to record next", "", content + page.table(["excitation", ""], rows), "next")
 
 
 def _value(x: object) -> str:
@@ -386,9 +313,9 @@ def _value(x: object) -> str:
 def _footer(document: Mapping) -> str:
     data = document.get("data") or {}
     names, hashes = data.get("files") or [], data.get("sha256") or []
-    rows = [((_text(name), f"<code>{_text((hashes[k] if k < len(hashes) else '') or '')[:SHORT_HASH]}</code>"), "")
+    rows = [((page.text(name), f"<code>{page.text((hashes[k] if k < len(hashes) else '') or '')[:SHORT_HASH]}</code>"), "")
             for k, name in enumerate(names)]
-    versions = ", ".join(f"{_text(name)} {_text(version)}" for name, version in (document.get("versions") or {}).items())
-    told = [f"seed {_text(document.get('seed'))}", f"output [{_text(pretty(data.get('output_unit')))}], input [{_text(pretty(data.get('input_unit')))}]",
+    versions = ", ".join(f"{page.text(name)} {page.text(version)}" for name, version in (document.get("versions") or {}).items())
+    told = [f"seed {page.text(document.get('seed'))}", f"output [{page.text(pretty(data.get('output_unit')))}], input [{page.text(pretty(data.get('input_unit')))}]",
             versions]
-    return f'<footer>{_table(["file", "sha256"], rows)}<p>{" · ".join(filter(None, told))}</p></footer>'
+    return f'<footer>{page.table(["file", "sha256"], rows)}<p>{" · ".join(filter(None, told))}</p></footer>'

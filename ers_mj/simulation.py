@@ -8,13 +8,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
+from typing import Protocol
 
 import numpy as np
 
 from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME, Effect, Parameter
+from ers_mj.effects.base import Coefficients
 from ers_mj.errors import InputError
-from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.plants.play import stiff_play
+from ers_mj.plants.printed_play import PrintedPlay, printed_threshold
+from ers_mj.plants.reduced import Motion, ReducedModel, lumped
 
 PER_INERTIA = {"torque": "", "damping": " s/{y}", "stiffness": "/{y}", "drag": " s^2/{y}^2", "cubic": "/{y}^3"}
 LUMPED_UNIT = {"torque": "{y}/s^2", "damping": "1/s", "stiffness": "1/s^2", "drag": "1/{y}", "cubic": "1/({y}^2 s^2)"}
@@ -24,6 +28,13 @@ FORCE = {"rad": "N m", "m": "N"}
 AFTER_NOISE = ("sensor_quantisation", "sensor_dropout")  # what the converter and the wire do to a noisy signal
 
 EffectSettings = Sequence[tuple[str, Mapping[str, float]]]
+
+
+class Plant(Protocol):
+    """What runs freely under a voltage: the reduced model, the MuJoCo plant, Eq. (4) as printed."""
+
+    def simulate(self, t: np.ndarray, u: np.ndarray) -> Motion:
+        """Free run from rest at theta_0 under u (N,), held between the samples t (N,) [s]."""
 
 
 def unit_of(kind: str, output_unit: str = "rad", input_unit: str = "V", has_inertia: bool = True) -> str:
@@ -53,6 +64,57 @@ def kernel_effects(effects: EffectSettings, inertia: float = 1.0) -> tuple[tuple
     return tuple((name, _vector(_effect(name), values, inertia)) for name, values in effects)
 
 
+def build_plant(
+    datasheet: Datasheet,
+    *,
+    plant: str = "reduced",
+    effects: EffectSettings = (),
+    gap: float | None = None,
+    linkage: str = "constant",
+    inductance: bool = False,
+    play: str = "gap",
+) -> Plant:
+    """The plant of a datasheet, with ``simulate(t, u)`` from rest at theta_0.
+
+    Args:
+        datasheet: the servo, with the effects that its [[effect]] list holds. In MuJoCo one with [parameters] is the
+            three-dimensional rudder system, one with [lumped] alone a single joint.
+        plant: "reduced", the event-exact Eq. (1)/(5), or "mujoco".
+        effects: (name, {key: value}) in SI (torques in N m; per inertia where the datasheet has no J).
+        gap: half-width of the play [rad], the same two bodies on either plant (see plants/play.py).
+        linkage: "constant" or, in MuJoCo, "rod".
+        inductance: whether the datasheet's L acts.
+        play: "gap", two bodies, or "printed", Eq. (4) around the reduced model.
+
+    Raises:
+        InputError: the datasheet, the effects or the options do not make a plant.
+    """
+    chosen = kernel_effects([*datasheet.effects, *effects], inertia_of(datasheet))
+    c = lumped(_values(datasheet, inductance))
+    if plant != "mujoco" and linkage != "constant":
+        raise InputError(f"the reduced model has the constant linkage only, a {linkage} linkage needs --plant mujoco")
+    if gap and any(name == "backlash" for name, _ in chosen):
+        raise InputError("the play is given twice, as gap and as the effect backlash, once was expected")
+    if play == "printed":
+        return _printed(c, plant, chosen, gap)
+    if plant == "mujoco":
+        from ers_mj.plants.mechanical import MechanicalPlant
+        from ers_mj.plants.skeletons import bodily
+
+        return MechanicalPlant(c, chosen, parameters=bodily(datasheet.parameters, True, c.b), linkage=linkage, gap=gap or 0.0)
+    return ReducedModel(stiff_play(c, gap) if gap else c, chosen)
+
+
+def _printed(c: Coefficients, plant: str, effects: Sequence, gap: float | None) -> PrintedPlay:
+    if plant != "reduced":
+        raise InputError("Eq. (4) as printed is a torque's play, which no joint has: --play printed needs --plant reduced")
+    if effects:
+        raise InputError(f"--play printed is Eq. (4) around the bare reduced model, the effect {effects[0][0]} cannot be added")
+    if not gap:
+        raise InputError("--play printed needs a play, as in --gap 0.5")
+    return PrintedPlay(c, printed_threshold(c, gap))
+
+
 def simulate_recording(
     datasheet: Datasheet,
     t: np.ndarray,
@@ -61,31 +123,36 @@ def simulate_recording(
     effects: EffectSettings = (),
     noise: float = 0.0,
     seed: int = 0,
-    gap: float | None = None,
-    inductance: bool = False,
+    **options,
 ) -> dict[str, np.ndarray]:
     """Columns t_s, u_V, theta_rad, each (N,), of a rudder that starts at rest at theta_0.
 
     Args:
-        datasheet: the servo, with the effects that its [[effect]] list holds.
+        datasheet, effects: as :func:`build_plant` takes them.
         t, u: time [s] and voltage [V], held from sample to sample.
-        effects: (name, {key: value}) in SI (torques in N m; per inertia where the datasheet has no J).
         noise: standard deviation of the sensor's noise [rad].
-        gap: half-width of the play [rad], short for the effect backlash.
-        inductance: whether the datasheet's L acts.
+        options: plant, gap, linkage, inductance and play, as :func:`build_plant` takes them.
 
     Raises:
-        InputError: the datasheet or the effects cannot be simulated.
+        InputError: the datasheet, the effects or the options cannot be simulated.
     """
-    play = [("backlash", {"gap": gap})] if gap else []
-    chosen = kernel_effects([*datasheet.effects, *effects, *play], inertia_of(datasheet))
-    model = ReducedModel(lumped(_values(datasheet, inductance)), chosen)
+    plant = build_plant(datasheet, effects=effects, **options)
     t, u = np.ascontiguousarray(t, float), np.ascontiguousarray(u, float)
-    theta = model.simulate(t, u).theta
+    theta = finite(t, plant.simulate(t, u).theta)
+    chosen = kernel_effects([*datasheet.effects, *effects], inertia_of(datasheet))
+    return {"t_s": t, "u_V": u, "theta_rad": _sensed(theta, chosen, noise, seed)}
+
+
+def finite(t: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """theta (N,) as it is.
+
+    Raises:
+        InputError: it is not finite throughout.
+    """
     if not np.isfinite(theta).all():
         k = int(np.argmax(~np.isfinite(theta)))
         raise InputError(f"the simulation leaves all bounds at {t[k]:.4g} s, check the input and the effects' values")
-    return {"t_s": t, "u_V": u, "theta_rad": _sensed(theta, chosen, noise, seed)}
+    return theta
 
 
 def _values(datasheet: Datasheet, inductance: bool) -> dict[str, float]:

@@ -52,7 +52,7 @@ FILES = {
     "twice.csv": GOOD.replace("theta_rad", "u_V"), "two_outputs.csv": csv(columns() | {"theta_deg": np.degrees(columns()["theta_rad"])}),
     "notes.txt": GOOD, "fake.parquet": GOOD, "bad.toml": "[parameters", "unknown.toml": "[parameters]\nJJ = 1\n",
     "negative.toml": "[parameters]\nJ = -1\n", "nan.toml": "[parameters]\nJ = nan\n", "word.toml": '[parameters]\nJ = "big"\n',
-    "section.toml": "[servo]\nJ = 1\n", "both.toml": SHEET + "[lumped]\nb = 1\n", "nothing.toml": "", "no_b.toml": "[parameters]\nk_s = 1\n",
+    "section.toml": "[servo]\nJ = 1\n", "both.toml": SHEET + "[lumped]\nb = 1\n", "nothing.toml": "", "lumped.toml": "[lumped]\nb = 80\na_2 = 50\nc_2 = 100\n", "no_b.toml": "[parameters]\nk_s = 1\n",
     "strange.toml": SHEET + '[[effect]]\nname = "magic"\n', "volts.csv": csv({"t_s": T, "u_V": 8 * np.sin(3 * T)}),
     "volts_text.csv": csv({"t_s": T, "u_V": ["x"] * N}), "volts_hole.csv": csv({"t_s": T, "u_V": [""] + [1] * (N - 1)}),
     "volts_back.csv": csv({"t_s": T[::-1], "u_V": T}), "volts_one.csv": "t_s,u_V\n0,1\n", "exists.csv": "kept",
@@ -86,8 +86,11 @@ SIMULATE = {
     "input without u": "--input no_input.csv --out new.csv", "input text": "--input volts_text.csv --out new.csv", "input holes": "--input volts_hole.csv --out new.csv",
     "input backwards": "--input volts_back.csv --out new.csv", "input of one": "--input volts_one.csv --out new.csv", "input empty": "--input empty.csv --out new.csv",
     "rate of a file": "--input volts.csv --rate-hz 100 --out new.csv", "plant": "--plant real --input steps --out new.csv",
-    "plant later": "--plant mujoco --input steps --out new.csv", "plants": "--plant reduced,mujoco --input steps --out new.csv",
-    "linkage later": f"{STEPS} --linkage rod", "linkage": f"{STEPS} --linkage rope", "inductance": f"{STEPS} --inductance maybe",
+    "plants": "--plant reduced,mujoco --input steps --out new.csv",
+    "linkage of the reduced": f"{STEPS} --linkage rod", "rod of a joint": f"lumped.toml {STEPS} --linkage rod --plant mujoco",
+    "play twice": f"{STEPS} --gap 1 --effect backlash:gap=0.01", "printed without gap": f"{STEPS} --play printed",
+    "printed in mujoco": f"{STEPS} --play printed --gap 1 --plant mujoco", "printed with effect": f"{STEPS} --play printed --gap 1 --effect bias_torque:tau_0=0.1",
+    "play": f"{STEPS} --play loose", "linkage": f"{STEPS} --linkage rope", "inductance": f"{STEPS} --inductance maybe",
     "effect": f"{STEPS} --effect magic", "near effect": f"{STEPS} --effect stribek:dF_s=1", "effect key": f"{STEPS} --effect stribeck:F=1,v_s=1",
     "effect word": f"{STEPS} --effect stribeck:dF_s=big,v_s=1", "effect nan": f"{STEPS} --effect stribeck:dF_s=nan,v_s=1",
     "effect form": f"{STEPS} --effect stribeck:dF_s", "effect key twice": f"{STEPS} --effect bias_torque:tau_0=1,tau_0=2",
@@ -101,10 +104,18 @@ SIMULATE = {
     "inductance without L": f"good.toml {STEPS} --inductance on", "out exists": "--input steps --out exists.csv", "out folder": "--input steps --out folder",
     "out parquet": "--input steps --out new.parquet", "out under file": "--input steps --out exists.csv/new.csv", "two models": f"good.toml both.toml {STEPS}",
 }
+VALIDATE = {
+    "gap word": "--gap wide", "gap negative": "--gap -0.5", "gap inf": "--gap 0,inf", "gap twice": "--gap 0.5,0.50", "gap open list": "--gap 0.5,", "gap without value": "--gap",
+    "linkage": "--linkage rope", "linkages": "--linkage constant,rope", "linkage twice": "--linkage rod,rod", "inductance": "--inductance 1",
+    "no datasheet": "--datasheet missing.toml", "bad datasheet": "--datasheet bad.toml", "too little": "--datasheet no_b.toml", "empty datasheet name": ["--datasheet", ""],
+    "rod of a joint": "--datasheet lumped.toml --linkage rod", "no inductance": "--datasheet lumped.toml --inductance off,on",
+    "jobs": "--jobs 0", "folder holds files": "--out folder", "out is a file": "--out exists.csv", "file given": "good.csv", "unknown option": "--quick",
+}
 OTHERS = {"no command": [], "unknown command": ["diagnoze"], "unknown option": ["--quick"], "demo with a file": ["demo", "good.csv"],
           "demo seed": ["demo", "--seed", "x"], "demo into files": ["demo", "--out", "folder"]}
 SPLIT = {**{f"diagnose {k}": ["diagnose", *(v if isinstance(v, list) else v.split())] for k, v in DIAGNOSE.items()},
-         **{f"simulate {k}": ["simulate", *(v if isinstance(v, list) else v.split())] for k, v in SIMULATE.items()}, **OTHERS}
+         **{f"simulate {k}": ["simulate", *(v if isinstance(v, list) else v.split())] for k, v in SIMULATE.items()},
+         **{f"validate {k}": ["validate", *(v if isinstance(v, list) else v.split())] for k, v in VALIDATE.items()}, **OTHERS}
 
 
 @pytest.fixture
@@ -158,8 +169,12 @@ def test_bad_input_is_one_sentence_code_2_and_nothing_written(argv, place, monke
     ("simulate --input steps --out n.csv --effect stribek:dF_s=1", "did you mean stribeck?"),
     ("simulate --input steps --out n.csv --effect bias_torque:tau=1", "tau_0 (constant torque"),
     ("simulate --input stepz --out n.csv", "multisine, chirp, ramp, steps, square"),
-    ("simulate --input steps --out n.csv --plant mujoco", "the one plant is reduced"),
-    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate, view"),
+    ("simulate --input steps --out n.csv --linkage rod", "a rod linkage needs --plant mujoco"),
+    ("simulate lumped.toml --input steps --out n.csv --plant mujoco --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
+    ("simulate --input steps --out n.csv --gap 1 --effect backlash:gap=0.01", "the play is given twice"),
+    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate, validate, view"),
+    ("validate --linkage constant,rope", "there is no 'rope'; there are constant, rod"),
+    ("validate --datasheet lumped.toml --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
     ("diagnose good.csv --map t_s=Time", "the columns are t_s, u_V, theta_rad"),
     ("diagnose good.csv metres.csv", "in m and that of good.csv in rad"),
     ("diagnose good.csv --holdout copy.csv", "copy.csv: is held out and also among the training recordings (as good.csv)"),
@@ -288,16 +303,48 @@ def test_simulate_keeps_the_users_times_and_voltages(place):
     assert recording.y[0] == pytest.approx(np.radians(15), abs=1e-12)
 
 
-def test_effects_act_in_si_and_gap_is_backlash(place):
+def simulated(place, options: str) -> np.ndarray:
+    """theta (N,) [rad] of the file that a call of simulate writes."""
+    assert cli.main(f"simulate --input steps --out new.csv --force {options}".split()) == 0
+    return read_recording(place / "new.csv").y
+
+
+def rms_deg(x: np.ndarray) -> float:
+    return float(np.degrees(np.sqrt(np.mean(x**2))))
+
+
+@pytest.mark.parametrize("inductance", ["off", "on"])
+@pytest.mark.parametrize("gap", ["0", "0.5"])
+def test_a_gap_is_the_same_play_on_both_plants(gap, inductance, place):
+    options = f"--duration 2 --gap {gap} --inductance {inductance}"
+    reduced, mujoco = simulated(place, options), simulated(place, f"--plant mujoco {options}")
+    assert rms_deg(reduced - mujoco) < 0.02
+    if gap != "0":
+        assert rms_deg(reduced - simulated(place, "--duration 2")) > 0.1
+
+
+def test_mujoco_simulates_rods_lumped_models_and_effects(place):
+    short = "--duration 1 --plant mujoco"
+    assert rms_deg(simulated(place, f"{short} --linkage rod") - simulated(place, short)) > 0.1
+    lumped = simulated(place, f"lumped.toml {short}"), simulated(place, "lumped.toml --duration 1")
+    assert rms_deg(lumped[0] - lumped[1]) < 0.01
+    stopped = [simulated(place, f"--duration 1 {plant} --effect end_stop:upper=0.6,f_stop=80") for plant in ("", "--plant mujoco")]
+    assert stopped[0].max() < 0.7 and rms_deg(stopped[0] - stopped[1]) < 0.02
+
+
+def test_play_as_printed_is_another_motion(place):
+    printed, plain = simulated(place, "--duration 2 --gap 5 --play printed"), simulated(place, "--duration 2")
+    assert 0.05 < rms_deg(printed - plain) < 5
+
+
+def test_effects_act_in_si(place):
     def theta(options: str) -> np.ndarray:
-        assert cli.main(f"simulate --input steps --out new.csv --force {options}".split()) == 0
-        return read_recording(place / "new.csv").y
+        return simulated(place, options)
 
     plain = theta("")
     stopped = theta("--effect end_stop:upper=0.6,f_stop=80")
     assert plain.max() > 0.8 and 0.6 < stopped.max() < 0.68
     np.testing.assert_array_equal(theta("--gap 0"), plain)
-    np.testing.assert_array_equal(theta("--gap 0.5"), theta(f"--effect backlash:gap={float(np.radians(0.5))!r}"))
     assert np.abs(theta("--inductance on") - plain).max() > 1e-6
     strong = theta("--effect bias_torque:tau_0=0.9")  # above F_c + T_LH = 0.8 N m: moves off without voltage
     weak = theta("--effect bias_torque:tau_0=0.7")
@@ -319,7 +366,7 @@ def read_text_of_table1() -> str:
 # -- the program itself -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate", "view"])
+@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate", "validate", "view"])
 def test_help_has_an_example(command, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main([*command.split(), "--help"])

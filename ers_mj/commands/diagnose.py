@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import add_common, add_out, mapping, pair, results_folder
-from ers_mj.commands.output import Progress, as_json, bold, plain, write_results
+from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -71,15 +71,11 @@ def _write(folder: Path, document: dict, found: object, progress: Progress) -> l
     progress("drawing the report", 1.0)
     page = report_page(document, found.evidence, frames_of(found.plant, found.evidence))
     return write_results(folder, {
-        "diagnosis.json": lambda path: _text(path, as_json(document) + "\n"),
-        "report.html": lambda path: _text(path, page),
+        "diagnosis.json": lambda path: write_text(path, as_json(document) + "\n"),
+        "report.html": lambda path: write_text(path, page),
         "model.toml": lambda path: write_model(path, found.model),
-        "plant.xml": lambda path: _text(path, found.plant.xml()),
+        "plant.xml": lambda path: write_text(path, found.plant.xml()),
     })
-
-
-def _text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 # -- what cannot be diagnosed together --------------------------------------------------------------------------

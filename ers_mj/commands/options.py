@@ -46,6 +46,29 @@ def whole(least: int):
     return parse
 
 
+def several(parse, noun: str):
+    """A type for argparse: values with commas between them, each once, as `parse` reads them."""
+
+    def parse_all(text: str) -> list:
+        values = [parse(part.strip()) for part in text.split(",")]
+        if len(set(values)) < len(values):
+            raise argparse.ArgumentTypeError(f"{text!r} gives a {noun} twice")
+        return values
+
+    return parse_all
+
+
+def one_of(choices: tuple[str, ...]):
+    """A type for argparse: one of these words."""
+
+    def parse(text: str) -> str:
+        if text not in choices:
+            raise argparse.ArgumentTypeError(f"there is no {text[:40]!r}; there are {', '.join(choices)}")
+        return text
+
+    return parse
+
+
 def pair(text: str) -> tuple[str, str]:
     """A type for argparse: name=column."""
     name, mark, column = text.partition("=")
@@ -63,6 +86,11 @@ def add_out(parser: argparse.ArgumentParser) -> None:
 def add_common(parser: argparse.ArgumentParser) -> None:
     """--seed, --jobs and --json."""
     parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of everything drawn by chance (default 0)")
+    add_jobs_and_json(parser)
+
+
+def add_jobs_and_json(parser: argparse.ArgumentParser) -> None:
+    """--jobs and --json."""
     parser.add_argument("--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N", help="cores to use (default all)")
     parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
 

@@ -34,6 +34,11 @@ def as_json(document: object) -> str:
     return json.dumps(plain(document), indent=1, ensure_ascii=False, allow_nan=False)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write text with plain line ends."""
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
 def write_results(folder: Path, writers: Mapping[str, Callable[[Path], None]]) -> list[Path]:
     """Let each writer write its file in a neighbour of `folder`, then move all of them in; the paths.
 

@@ -14,7 +14,7 @@ from ers_mj.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
-PLANTS, LINKAGES = ("reduced", "mujoco"), ("constant", "rod")
+PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
 OTHER_FORMATS = (".parquet", ".mat", ".h5", ".hdf5", ".npz", ".json", ".toml")
 MOST_SAMPLES = 20_000_000
 
@@ -24,12 +24,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "simulate", help="write a recording with known truth", description="Simulate a servo: a recording with known truth.",
         epilog="examples:\n  ers simulate --plant reduced --input steps --effect stribeck:dF_s=0.1,v_s=0.2 --noise-deg 0.01 --out rec.csv\n"
+               "  ers simulate --plant mujoco --linkage rod --gap 0.5 --inductance on --input chirp --out rec.csv\n"
                "  ers simulate model.toml --plant reduced --input volts.csv --out rec.csv")
     parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)")
     parser.add_argument("--plant", choices=PLANTS, default="reduced", help="what to simulate (default reduced)")
     parser.add_argument("--input", required=True, metavar="CSV|NAME", help="columns t_s,u_V, or multisine, chirp, ramp, steps, square")
     parser.add_argument("--gap", type=number(least=0), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
-    parser.add_argument("--linkage", choices=LINKAGES, default="constant", help="of the rudder (default constant)")
+    parser.add_argument("--play", choices=PLAYS, default="gap", help="a gap between two bodies, or the paper's Eq. (4) as printed (default gap)")
+    parser.add_argument("--linkage", choices=LINKAGES, default="constant", help="of the rudder; rod in mujoco only (default constant)")
     parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
     parser.add_argument("--effect", action="append", default=[], metavar="NAME:key=value,...", help="physics to add, SI; repeatable")
     parser.add_argument("--noise-deg", type=number(least=0), default=0.0, metavar="X", help="sensor noise, standard deviation [deg]")
@@ -45,7 +47,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write; 0."""
     out = _checked_out(arguments)
-    _refuse_not_yet(arguments)
     from ers_mj.datasheet import read_datasheet
     from ers_mj.recording import write_recording
     from ers_mj.simulation import parse_effect, simulate_recording
@@ -55,7 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     t, u = _input(arguments)
     columns = simulate_recording(
         datasheet, t, u, effects=effects, noise=math.radians(arguments.noise_deg), seed=arguments.seed,
-        gap=math.radians(arguments.gap), inductance=arguments.inductance == "on")
+        plant=arguments.plant, gap=math.radians(arguments.gap), linkage=arguments.linkage, play=arguments.play,
+        inductance=arguments.inductance == "on")
     out.parent.mkdir(parents=True, exist_ok=True)
     write_recording(out, columns)
     summary = _summary(arguments, columns, [*datasheet.effects, *effects])
@@ -74,13 +76,6 @@ def _checked_out(arguments: argparse.Namespace) -> Path:
         raise InputError(f"{out}: exists already, give --force to overwrite it")
     refuse_unwritable(out)
     return out
-
-
-def _refuse_not_yet(arguments: argparse.Namespace) -> None:
-    if arguments.plant != "reduced":
-        raise InputError(f"--plant {arguments.plant}: does not exist yet, the one plant is reduced")
-    if arguments.linkage != "constant":
-        raise InputError(f"--linkage {arguments.linkage}: does not exist yet, the one linkage is constant")
 
 
 def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
@@ -107,17 +102,16 @@ def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
 
 def _summary(arguments: argparse.Namespace, columns: dict, effects: list) -> dict:
     t, theta = columns["t_s"], columns["theta_rad"]
-    if arguments.gap:
-        effects = [*effects, ("backlash", {"gap": math.radians(arguments.gap)})]
     return {"out": arguments.out, "plant": arguments.plant, "linkage": arguments.linkage, "input": arguments.input,
-            "inductance": arguments.inductance == "on", "gap_rad": math.radians(arguments.gap), "samples": int(t.size),
+            "inductance": arguments.inductance == "on", "gap_rad": math.radians(arguments.gap), "play": arguments.play, "samples": int(t.size),
             "duration_s": float(t[-1] - t[0]), "noise_rad": math.radians(arguments.noise_deg), "seed": arguments.seed,
             "effects": [{"name": name, "parameters": dict(values)} for name, values in effects],
             "theta_rms_rad": float(theta.std()), "theta_min_rad": float(theta.min()), "theta_max_rad": float(theta.max())}
 
 
 def _told(summary: dict) -> str:
-    effects = ", ".join(effect["name"] for effect in summary["effects"]) or "no effect"
+    added = [effect["name"] for effect in summary["effects"]]
+    added += [f"a play of +-{math.degrees(summary['gap_rad']):.4g} deg"] if summary["gap_rad"] else []
     low, high = math.degrees(summary["theta_min_rad"]), math.degrees(summary["theta_max_rad"])
     return (f"{summary['out']}: {summary['samples']} samples over {summary['duration_s']:.4g} s, "
-            f"{low:.1f} to {high:.1f} deg, {effects}")
+            f"{low:.1f} to {high:.1f} deg, {summary['plant']} plant, {', '.join(added) or 'no effect'}")

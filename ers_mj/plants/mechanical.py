@@ -88,6 +88,10 @@ class MechanicalPlant:
         rows = stepper.run(t, u, self._lowered.delay, enable, load)
         return self._motion(t, rows)
 
+    def ratio(self, theta: float) -> float:
+        """The motor's speed over the rudder's at the angle theta, the play closed."""
+        return self._skeleton.pose(theta)[self._skeleton.motor_joint][1]
+
     def terminal(self, u: np.ndarray) -> np.ndarray:
         """The input (N,) that is left of the command u (N,) after the drive's static effects."""
         for name, values in self.effects:
@@ -197,13 +201,14 @@ def _viscous_asymmetry(c: Coefficients) -> Law:
     return Law("asymmetric viscous friction", np.array([half]), lambda p, theta, w, j, t: -p[0] * abs(w), None)
 
 
-def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarray) -> list[Motion]:
-    """Free runs of many plants (or one plant under many inputs) from rest at theta_0, on all cores.
+def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarray, jobs: int = 0) -> list[Motion]:
+    """Free runs of many plants (or one plant under many inputs) from rest at theta_0, on many cores.
 
     Args:
         plants: (M,), or one for all inputs.
         t: (N,) [s], uniform.
         u: (M, N), or (N,) for all plants.
+        jobs: cores to use, 0 for all; they do not change the result.
 
     Raises:
         InputError: the counts do not match, or t is not uniform.
@@ -222,7 +227,7 @@ def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarra
         for stepper, k in zip(steppers, group, strict=True):
             stepper.reset(plants[k]._start(None))
         terminal = np.array([plants[k].terminal(u[k]) for k in group])
-        for k, rows in zip(group, step_many(steppers, t, terminal), strict=True):
+        for k, rows in zip(group, step_many(steppers, t, terminal, jobs), strict=True):
             motions[k] = plants[k]._motion(t, rows)
     for k, plant in enumerate(plants):
         if motions[k] is None:

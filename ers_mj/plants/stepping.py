@@ -160,10 +160,10 @@ def _delayed(t: np.ndarray, u: np.ndarray, delay: float) -> Callable[[np.ndarray
 
 
 @unlogged()
-def step_many(steppers: Sequence[Stepper], t: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Rows (M, N, 5) as Stepper.run's, of plants without laws or delay and of one layout, on all cores; u is (M, N)."""
+def step_many(steppers: Sequence[Stepper], t: np.ndarray, u: np.ndarray, jobs: int = 0) -> np.ndarray:
+    """Rows (M, N, 5) as Stepper.run's, of plants without laws or delay and of one layout, on ``jobs`` cores (0: all); u is (M, N)."""
     first = steppers[0]
-    batch = mujoco.batch.Batch(first.model, len(steppers))
+    batch = mujoco.batch.Batch(first.model, len(steppers), jobs)
     h, steps = first._divide(t[1] - t[0])
     for stepper in steppers:
         stepper.model.opt.timestep = h

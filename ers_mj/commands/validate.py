@@ -1,0 +1,109 @@
+"""`ers validate`: the reduced model against the MuJoCo plant under the same voltages."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ers_mj.commands.options import add_jobs_and_json, add_out, number, one_of, results_folder, several
+from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
+
+if TYPE_CHECKING:
+    from ers_mj.datasheet import Datasheet
+    from ers_mj.validation import Validation
+
+LINKAGES, SWITCH = ("constant", "rod"), ("off", "on")
+NAME = 38  # characters of a row's name
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    """Add this command to the command line."""
+    parser = commands.add_parser(
+        "validate", help="the reduced model against the MuJoCo plant",
+        description="Say where and why the reduced model, Eq. (6), stops being valid: MuJoCo has the play, the rod, the inductance, it has not.\n"
+                    "With none of --gap, --linkage, --inductance every combination of 0 and 0.5 deg, both linkages, off and on.",
+        epilog="examples:\n  ers validate\n  ers validate --gap 0.1,0.5,1 --inductance off,on --out play\n"
+               "  ers validate --gap 0 --linkage constant --json")
+    parser.add_argument("--datasheet", default="table1", metavar="TOML", help="datasheet or model.toml (default table1, the paper's)")
+    parser.add_argument("--gap", type=several(number(least=0), "gap"), metavar="DEG,...", help="play of +-DEG (default 0)")
+    parser.add_argument("--linkage", type=several(one_of(LINKAGES), "linkage"), metavar="constant,rod", help="of MuJoCo's rudder (default constant)")
+    parser.add_argument("--inductance", type=several(one_of(SWITCH), "switch"), metavar="off,on", help="whether L acts, in both plants (default off)")
+    parser.add_argument("--no-maps", action="store_true", help="leave the validity maps out, a third of the time")
+    add_out(parser)
+    add_jobs_and_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate both, compare, write, tell; 0."""
+    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    from ers_mj.datasheet import read_datasheet
+    from ers_mj.validation import validate
+    from ers_mj.validity import as_document
+
+    datasheet = read_datasheet(arguments.datasheet)
+    gaps, linkages, inductances, left_out = _asked(arguments, datasheet)
+    with Progress() as progress:
+        found = validate(datasheet, gaps, linkages, inductances, maps=not arguments.no_maps, jobs=arguments.jobs, progress=progress)
+        document = plain({**as_document(found), "left_out": left_out, "datasheet": datasheet.name or arguments.datasheet, "versions": _versions()})
+        files = _write(folder, document, found, progress) if folder is not None else []
+    print(as_json(document) if arguments.json else "\n".join(_told(found, document, files)))
+    return 0
+
+
+def _asked(arguments: argparse.Namespace, datasheet: Datasheet) -> tuple[list, list, list, list[str]]:
+    """Gaps [rad], linkages, inductances, and what the default run leaves out because the datasheet cannot make it."""
+    if arguments.gap is None and arguments.linkage is None and arguments.inductance is None:
+        from ers_mj.validation import possible
+
+        return possible(datasheet)
+    return ([math.radians(x) for x in arguments.gap or (0.0,)], arguments.linkage or ["constant"],
+            [x == "on" for x in arguments.inductance or ("off",)], [])
+
+
+def _versions() -> dict[str, str]:
+    import mujoco
+
+    from ers_mj import __version__
+
+    return {"ers-mj": __version__, "mujoco": mujoco.__version__}
+
+
+def _write(folder: Path, document: dict, found: Validation, progress: Progress) -> list[Path]:
+    from ers_mj.validation_report import validation_page
+
+    progress("drawing the report", 1.0)
+    page = validation_page(found, {"datasheet": document["datasheet"], **document["versions"]})
+    return write_results(folder, {
+        "validation.json": lambda path: write_text(path, as_json(document) + "\n"),
+        "report.html": lambda path: write_text(path, page),
+    })
+
+
+# -- the validation in lines ----------------------------------------------------------------------------------------
+
+
+def _told(found: Validation, document: dict, files: list[Path]) -> list[str]:
+    """What a terminal shows when all is done."""
+    lines = ["", bold(document["sentence"]), "", *_told_table(found), ""]
+    for key in dict.fromkeys((e["gap_rad"], e["linkage"], e["inductance"]) for e in document["where"]):
+        entries = [e for e in document["where"] if (e["gap_rad"], e["linkage"], e["inductance"]) == key]
+        lines += [f"  {e['axis']:10} {e['sentence']}" for e in entries] + [""]
+    lines += [f"left out: {sentence}" for sentence in document["left_out"]]
+    return lines + ([bold("written"), *(f"  {path}" for path in files)] if files else [])
+
+
+def _told_table(found: Validation) -> list[str]:
+    """RMS deviations, one condition a line."""
+    from ers_mj.validation import spoken
+    from ers_mj.validity import VALID, degrees
+
+    inputs = list(dict.fromkeys(case.input for case in found.cases))
+    lines = [bold(f"{'RMS deviation; MuJoCo has':{NAME}}" + "".join(f"{name:>11}" for name in inputs))]
+    for condition in dict.fromkeys(case.condition for case in found.cases):
+        cases = {case.input: case for case in found.cases if case.condition == condition}
+        cells = [f"{degrees(cases[x].rms)}{'*' if cases[x].rms > VALID * cases[x].motion else ' '}" for x in inputs]
+        lines.append(f"  {spoken(condition):{NAME - 2}}" + "".join(f"{cell:>11}" for cell in cells))
+    return [*lines, f"  * more than {100 * VALID:.0f} % of the motion; the reduced model is Eq. (6), or Eq. (1) where the inductance is on"]
