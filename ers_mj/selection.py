@@ -27,6 +27,7 @@ ELSEWHERE = 3  # and those that another place than the refitted baseline finds m
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
+NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 MOST_ROUNDS = 2
 
@@ -143,8 +144,11 @@ def _resized(start: np.ndarray, sized: int, factor: float) -> np.ndarray:
 
 
 def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str],
-               anchors: Sequence[Mapping[str, float]] = ()) -> list[Candidate]:
-    """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first."""
+               anchors: Sequence[Mapping[str, float]] = (), least: float = 0.0) -> list[Candidate]:
+    """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
+
+    They are left at their first refit where none has come near the ``least`` gain that matters.
+    """
     reference = float(score(base.misfit, tau).sum())
 
     def total(found):
@@ -177,10 +181,11 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         most = max((reference - total(f) for _, f in once), default=0.0)
         rough = sorted(pool.map(further, zip(screened, once)), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
+        if not gains or gains[0] < NEAR_LEAST * least:
+            return sorted(map(judged, rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         ranked = sorted(map(judged, list(pool.map(finish, rough[:close])) + rough[close:]), key=lambda c: -c.worth)
-        least = ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain) if ranked else 0.0
-        rivals = sum(c.worth > max(least, 0.0) for c in ranked)
+        rivals = sum(c.worth > max(ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain), 0.0) for c in ranked)
         if rivals > 1:
             close = [c.fit for c in ranked[:rivals]]
             ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, [f for f in close if f is not c.fit], traces, tau))), ranked[:rivals])
@@ -204,9 +209,9 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     tau = tau_of(base.misfit)
     while len(rounds) < MOST_ROUNDS and float(score(current.misfit, tau).sum()) > LEAST_GAIN * blocks:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
-        ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else ())
-        rounds.append(tuple(ranked))
         least = max(LEAST_GAIN * blocks, LEAST_SHARE * float(score(current.misfit, tau).sum()))
+        ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
+        rounds.append(tuple(ranked))
         if not ranked or ranked[0].gain < least or ranked[0].z < LEAST_Z:
             break
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)

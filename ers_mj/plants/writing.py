@@ -21,6 +21,7 @@ from ers_mj.plants.skeletons import Skeleton
 
 RIGID = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 PLAY = [0.99, 0.9999, 1e-5, 0.5, 2.0]
+OVERDAMPED = 2.0  # damping ratio of the play's rigid ends: a limit that does not pull still bounces at critical damping
 ELASTIC = [1e-4, 1e-4, 0.001, 0.5, 2.0]  # mjMINIMP: the limit's force does not depend on the other forces
 RESOLVED = 0.8  # decay rate [1/s] of a contact times h, above which a rigid limit is nearer to it than its own spring-damper
 FAR = 1e6  # [output unit] an end that is not there
@@ -122,6 +123,7 @@ def _write_play(skeleton: Skeleton, c: Coefficients) -> None:
     """The play: elastic where c gives its contact a stiffness and the timestep resolves its damping, else rigid."""
     joint, (rocker, rudder) = skeleton.spec.joint("gap"), skeleton.local
     joint.limited, joint.range, joint.solimp_limit = True, [-c.gap, c.gap], PLAY
+    joint.solref_limit = [2 * skeleton.spec.option.timestep, OVERDAMPED]
     if c.k_twist > 0 and c.d_twist / (c.rho * (1.0 - c.rho)) * skeleton.spec.option.timestep < RESOLVED:
         joint.solref_limit, joint.solimp_limit = _elastic(skeleton, 1 / rocker + 1 / rudder, c.k_twist, c.d_twist), ELASTIC
 
