@@ -13,7 +13,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.errors import InputError
 from ers_mj.guess import guesses
-from ers_mj.identification import Fit, Model, descend, fit, tau_of, with_starts
+from ers_mj.identification import Fit, Model, descend, fit, hopped, tau_of, with_starts
 from ers_mj.traces import Trace
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
@@ -44,11 +44,11 @@ class Start:
     """
 
     fit: Fit
-    traces: list[Trace]
+    traces: Sequence[Trace]
     anchors: tuple[Mapping[str, float], ...] = ()
 
 
-def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool) -> Start:
+def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool, jobs: int = 1) -> Start:
     """The refitted baseline of these recordings.
 
     Raises:
@@ -57,21 +57,22 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
     known = datasheet.to_lumped() if datasheet is not None else {}
     if {"a_2", "b"} <= known.keys():
         sheet = _from_datasheet(traces, known, is_angle)
-        refitted, traces = _refined(sheet, traces)
+        refitted, traces = _refined(sheet, traces, jobs)
         found = Start(refitted, traces, ({**sheet.values, "theta_0": refitted.model.values["theta_0"]},))
     else:
-        found = _from_scratch(traces, known, is_angle)
+        found = _from_scratch(traces, known, is_angle, jobs)
     if not np.isfinite(found.fit.cost):
         raise InputError("no motion that the reduced model can make resembles these recordings: check units and signs of input and output")
     return found
 
 
-def _refined(model: Model, traces: Sequence[Trace]) -> tuple[Fit, list[Trace]]:
+def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace]]:
     """Fit, with the initial states fitted before and after."""
     traces = with_starts(model, traces)
     first = fit(model, traces)
     traces = with_starts(first.model, traces)
-    return fit(first.model, traces, tau=tau_of(first.misfit)), traces
+    found = fit(first.model, traces, tau=tau_of(first.misfit))
+    return hopped(found, traces, tau_of(found.misfit), jobs, restart=True)
 
 
 def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> Model:
@@ -98,7 +99,7 @@ def _priors(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     return {"emf_share": (math.log(values["emf_share"]), SHARE_PRIOR)} if values["tau_e"] > 0 and values["emf_share"] > 0 else {}
 
 
-def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> Start:
+def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, jobs: int) -> Start:
     """Several guesses, refitted as observers of falling gain; the simplest structure that the data supports.
 
     Stops and one-sided friction disturb the search most, so both are tried as a scaffold that is taken away at the end: a spring
@@ -118,7 +119,7 @@ def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle:
         if chosen.cost - best[kind].cost > price:
             chosen = best[kind]
     scales = scales_of(traces, chosen.model.values, is_angle, None)
-    found, traces = _refined(replace(chosen.model, effects=(), scales=scales), traces)
+    found, traces = _refined(replace(chosen.model, effects=(), scales=scales), traces, jobs)
     return Start(found, traces, (dict(chosen.model.values),) if chosen.model.effects else ())
 
 

@@ -43,7 +43,7 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
     traces = [trace_of(r, inertia) for r in recordings]
     progress("fitting the baseline", 0.03)
-    start = baseline(traces, datasheet, first.output_unit == "rad")
+    start = baseline(traces, datasheet, first.output_unit == "rad", jobs)
     coarse = max(t.quantum for t in traces) > COARSE * 2 * start.fit.model.scales.position
     chosen = select(start.fit, start.traces, anchors=start.anchors, jobs=jobs, progress=progress)
     start = replace(start, fit=polished(start.fit, start.traces))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,11 @@ STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth
 POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
 FLOOR = 1e-4  # gain in C of one step below which a fit stands on its valley's floor
+HOPS = (3.0, 30.0)  # C by which a hop would raise the cost, were its curvature the same all the way
+FAR_HOP = 0.3  # length of the longest hop, in the transformed parameters
+SOFT = 3  # directions along which a fit hops, of least curvature
+HOP_GAIN = 0.3  # of C that a hop must win to be followed by further ones
+ROUGH, QUIET = 10.0, 0.01  # median misfit up to which, and C per block from which, a fit hops
 HOPELESS = 0.02  # excess of C per block over a nested model at which a search is given up
 NEAR = 0.1  # half travels by which theta_0 may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
@@ -247,6 +253,32 @@ def converged(found: Fit, rivals: Sequence[Fit], traces: Sequence[Trace], tau: f
     starts = [replace(found.model, values=rival.model.values) for rival in rivals]
     ends = [descend(model, traces, OBSERVER_RATE, tau, 40, FLOOR) for model in (found.model, *starts)]
     return min(ends, key=lambda f: f.cost)
+
+
+def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restart: bool = False) -> tuple[Fit, Sequence[Trace]]:
+    """The fit after hops along its softest directions, as long as they pay, and the traces it belongs to.
+
+    One start leads into one dent of many (see ``converged``). A hop goes as far as the fit's own curvature prices at one of HOPS, and
+    descends from there; ``restart`` fits the initial states again, which a wrong model has bent. Only near the noise are dents what
+    keeps a fit from its floor: beyond ROUGH the model itself is wrong, below QUIET nothing is left to win.
+    """
+    def land(start):
+        begun = with_starts(start, traces) if restart else traces
+        end = descend(start, begun, OBSERVER_RATE, tau, 12, 0.01)
+        return end, begun
+
+    while float(np.median(found.misfit)) < ROUGH and float(np.mean(score(found.misfit, tau))) > QUIET:
+        layout = found.model.layout()
+        z, (curvature, directions) = found.model.vector(layout), np.linalg.eigh(found.hessian)
+        sizes = [way * min(math.sqrt(2 * price / max(c, 1e-9)), FAR_HOP) for c in curvature[:SOFT] for price in HOPS for way in (-1, 1)]
+        along = [directions[:, k] for k in range(min(SOFT, z.size)) for _ in range(2 * len(HOPS))]
+        with ThreadPoolExecutor(jobs) as pool:
+            ends = list(pool.map(land, [found.model.at(layout, z + size * way) for size, way in zip(sizes, along)]))
+        best, begun = min(ends, key=lambda end: end[0].cost)
+        if not best.cost < found.cost - HOP_GAIN:
+            break
+        found, traces = best, begun
+    return found, traces
 
 
 def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
