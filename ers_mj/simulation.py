@@ -23,7 +23,7 @@ from ers_mj.plants.reduced import Motion, ReducedModel, lumped
 PER_INERTIA = {"torque": "", "damping": " s/{y}", "stiffness": "/{y}", "drag": " s^2/{y}^2", "cubic": "/{y}^3"}
 LUMPED_UNIT = {"torque": "{y}/s^2", "damping": "1/s", "stiffness": "1/s^2", "drag": "1/{y}", "cubic": "1/({y}^2 s^2)"}
 PLAIN_UNIT = {"position": "{y}", "speed": "{y}/s", "acceleration": "{y}/s^2", "input": "{u}", "time": "s",
-              "frequency": "Hz", "ratio": "-"}
+              "frequency": "Hz", "phase": "rad", "ratio": "-", "per_position": "1/{y}", "per_position_squared": "1/{y}^2"}
 FORCE = {"rad": "N m", "m": "N"}
 AFTER_NOISE = ("sensor_quantisation", "sensor_dropout")  # what the converter and the wire do to a noisy signal
 

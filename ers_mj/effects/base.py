@@ -60,7 +60,8 @@ class Scales:
 
     ``position`` half the travel, ``low``/``high`` its ends, ``speed`` a high percentile of |w|, ``acceleration`` the
     friction level (or the drive's, where there is none), ``input`` the peak |u|, ``sample_time`` [s], ``noise`` and
-    ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad.
+    ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
+    recording [s].
     """
 
     position: float
@@ -74,6 +75,7 @@ class Scales:
     quantum: float
     is_angle: bool
     tau_e_datasheet: float | None = None
+    duration: float = 10.0
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ class Parameter:
     """One number of an effect.
 
     ``kind`` names its dimension: torque, damping, stiffness, drag, cubic (all carried per inertia), position, speed,
-    input, time, ratio. ``positive`` parameters are fitted in their logarithm.
+    input, time, frequency, phase, ratio, per_position, per_position_squared. ``positive`` parameters are fitted in their logarithm.
     """
 
     name: str
@@ -98,13 +100,14 @@ class Twin:
     """Where an effect writes its MJCF realisation.
 
     ``spec`` is the model so far; ``inertia`` the J [kg m^2, or 1 where lumped] that turns an acceleration into a torque;
-    ``is_angle`` whether the output turns (hinges) or slides. Named alike in every model: body ``rudder``, tendon
+    ``is_angle`` whether the output turns (hinges) or slides; ``ampere`` the drive acceleration of one unit of the motor's force. Named alike in every model: body ``rudder``, tendon
     ``rudder_angle`` (the absolute output), actuators ``motor`` (ctrl in input units) and ``load``.
     """
 
     spec: mujoco.MjSpec
     inertia: float
     is_angle: bool
+    ampere: float
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,7 @@ class Effect:
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
     sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
-    follows_current: ClassVar[bool] = False  # its law changes as fast as the current: half the segment length
+    follows_current: ClassVar[bool] = False  # its law changes as fast as the current, or within a small angle: half the segment length
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
 

@@ -3,7 +3,8 @@
 State x = (theta, w, j, theta_m, w_m): rudder angle and speed, drive acceleration j (the motor torque over J; current in
 disguise), and the motor's side where a second body exists. Mode m = (s, side, stop, s_m, twist): the values that the set-valued
 terms take until the next event: direction of slip (0 = stuck), side of theta_0 (0 = held in the corner), stop touched,
-motor slip, contact of the play. A flow ends where the mode's inequality fails; the instant is found on the flow itself.
+motor slip, contact of the play (of two bodies without play: 1 throughout, a spring that pushes and pulls). A flow
+ends where the mode's inequality fails; the instant is found on the flow itself.
 
 Within a mode the plant itself is linear: a precomputed map over a whole segment of a sample, a Taylor series to machine
 precision over a part of one. What the laws of effects add is a force; over a segment it enters the same maps as a parabola in time
@@ -39,44 +40,73 @@ GAUSS_X, GAUSS_W = (0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1), 0.5 * np
 
 
 def _chain_torque(laws):
-    """One compiled function that adds up the torques of the effects that are on."""
+    """One compiled function that evaluates the torque of the effect in one row."""
     if not laws:
-        @njit(nogil=True)
-        def total(on, p, theta, w, j, t):
+        @njit(nogil=True, inline="always")
+        def pick(k, p, theta, w, j, t):
             return 0.0
-        return total
+        return pick
     (row, law), rest = laws[0], _chain_torque(laws[1:])
 
-    @njit(nogil=True)
-    def total(on, p, theta, w, j, t):
-        a = rest(on, p, theta, w, j, t)
-        if on[row]:
-            a += law(p[row], theta, w, j, t)
+    @njit(nogil=True, inline="always")
+    def pick(k, p, theta, w, j, t):
+        if k == row:
+            a = law(p, theta, w, j, t)
+        else:
+            a = rest(k, p, theta, w, j, t)
         return a
-    return total
+    return pick
 
 
 def _chain_friction(laws):
-    """One compiled function that passes the friction level through the effects that are on."""
+    """One compiled function that passes the friction level through the effect in one row."""
     if not laws:
-        @njit(nogil=True)
-        def total(on, p, level, theta, w, j, direction):
+        @njit(nogil=True, inline="always")
+        def pick(k, p, level, theta, w, j, direction):
             return level
-        return total
+        return pick
     (row, law), rest = laws[0], _chain_friction(laws[1:])
 
-    @njit(nogil=True)
-    def total(on, p, level, theta, w, j, direction):
-        level = rest(on, p, level, theta, w, j, direction)
-        if on[row]:
-            level = law(p[row], level, theta, w, j, direction)
-        return level
-    return total
+    @njit(nogil=True, inline="always")
+    def pick(k, p, level, theta, w, j, direction):
+        if k == row:
+            a = law(p, level, theta, w, j, direction)
+        else:
+            a = rest(k, p, level, theta, w, j, direction)
+        return a
+    return pick
 
 
-_torque = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
-_friction = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
-HAS_LAW = np.array([bool(e.torque or e.friction) for e in EFFECTS])
+_torque_of = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
+_friction_of = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
+
+
+@njit(nogil=True)
+def _torque(on, p, theta, w, j, t):
+    """Sum of the torques of the effects that are on."""
+    a = 0.0
+    for i in range(on[0, 0]):
+        k = on[0, i + 1]
+        a += _torque_of(k, p[k], theta, w, j, t)
+    return a
+
+
+@njit(nogil=True)
+def _friction(on, p, level, theta, w, j, direction):
+    """The friction level after every effect that is on."""
+    for i in range(on[1, 0]):
+        k = on[1, i + 1]
+        level = _friction_of(k, p[k], level, theta, w, j, direction)
+    return level
+
+
+def rows_of(names):
+    """Effects as the laws are called: (2, 1 + effects) their number and rows, of torques and of frictions."""
+    on = np.zeros((2, 1 + len(EFFECTS)), np.int64)
+    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS])):
+        rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and laws[row]]
+        on[kind, 0], on[kind, 1:1 + len(rows)] = len(rows), rows
+    return on
 
 
 @njit(nogil=True, inline="always")
@@ -282,6 +312,8 @@ def _violation(e, c, on, p, lawful, t, x, m):
     if e == 4:
         return -m[3] * w_m if m[3] != 0 and _motor_friction(c) > 0 else -1.0
     if e == 5:
+        if c[GAP] <= 0:
+            return -1.0
         side = m[4] if m[4] != 0 else (1 if theta_m > theta else -1)
         depth, rate = side * (theta_m - theta) - c[GAP], side * (w_m - w)
         if m[4] == 0:
@@ -465,7 +497,9 @@ def _start_mode(c, on, p, lawful, t, x):
     s = 1 if w > 0 else (-1 if w < 0 else 0)
     s_m = 1 if x[4] > 0 or (c[TWO] > 0 and _motor_friction(c) <= 0) else (-1 if x[4] < 0 else 0)
     twist = 0
-    if c[TWO] > 0 and abs(x[3] - theta) > c[GAP]:
+    if c[TWO] > 0 and c[GAP] <= 0:
+        twist = 1
+    elif c[TWO] > 0 and abs(x[3] - theta) > c[GAP]:
         twist = 1 if x[3] > theta else -1
     return s, side, stop, s_m, twist
 
@@ -627,7 +661,7 @@ def _clean(c, on, p, lawful, t, x, z, m, tau, load, h):
 @njit(nogil=True)
 def _calm(c, x, h):
     """Whether the twist of two bodies is further from the ends of the play than it moves within h."""
-    return abs(x[4] - x[1]) * h <= CALM * abs(abs(x[3] - x[0]) - c[GAP])
+    return c[GAP] <= 0 or abs(x[4] - x[1]) * h <= CALM * abs(abs(x[3] - x[0]) - c[GAP])
 
 
 @njit(nogil=True)
@@ -641,11 +675,11 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
 
     ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
     hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
-    (effects,) is true where an effect with a law acts; ``refine`` divides the segments. A motion that runs away, or chatters
-    beyond EVENT_BUDGET, is NaN from there on.
+    holds the rows of the effects with a law (see rows_of), ``p`` (effects, N_PARAMETERS) their constants; ``refine`` divides the
+    segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
     """
     n = t.size
-    lawful, two = on.any(), c[TWO] > 0
+    lawful, two = on[0, 0] + on[1, 0] > 0, c[TWO] > 0
     h0 = t[1] - t[0]
     tau, a_emf, bias = c[TAU], c[A_EMF], c[BIAS]
     ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)

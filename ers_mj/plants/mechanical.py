@@ -155,7 +155,7 @@ class MechanicalPlant:
         skeleton = (lumped_skeleton(c, self.is_angle) if self.parameters is None
                     else rudder_skeleton(c, self.parameters, self.linkage))
         write_coefficients(skeleton, c, self.timestep)
-        twin = Twin(skeleton.spec, skeleton.inertia, skeleton.is_angle)
+        twin = Twin(skeleton.spec, skeleton.inertia, skeleton.is_angle, skeleton.ratio * skeleton.K_t / skeleton.inertia)
         laws = []
         for name, values in self.effects:
             effect, constants = BY_NAME[name], BY_NAME[name].constants(values, c)

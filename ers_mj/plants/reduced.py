@@ -9,7 +9,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients
-from ers_mj.plants.events import N_PARAMETERS, simulate_kernel
+from ers_mj.plants.events import N_PARAMETERS, rows_of, simulate_kernel
 
 ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
 
@@ -52,15 +52,14 @@ class ReducedModel:
 
     def __post_init__(self):
         c = self.coefficients
-        on, p = np.zeros(len(EFFECTS), np.bool_), np.zeros((len(EFFECTS), N_PARAMETERS))
+        p = np.zeros((len(EFFECTS), N_PARAMETERS))
         for name, values in self.effects:
             effect = BY_NAME[name]
             c = effect.coefficients(values, c)
             if effect.torque or effect.friction:
-                on[ROW[name]] = True
                 constants = effect.constants(values, c)
                 p[ROW[name], :len(constants)] = constants
-        object.__setattr__(self, "_lowered", (np.array(c, float), on, p))
+        object.__setattr__(self, "_lowered", (np.array(c, float), rows_of([name for name, _ in self.effects]), p))
 
     def terminal(self, u: np.ndarray) -> np.ndarray:
         """The input (N,) that is left of the command u (N,) after the drive's static effects."""

@@ -83,6 +83,7 @@ class Stepper:
         """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration."""
         model, data, rows = self.model, self.data, np.full((t.size, 5), np.nan)
         late = _delayed(t, u, delay) if delay > 0 else None
+        data.time = t[0]
         for k in range(t.size):
             rows[k] = self._observe()
             if k == t.size - 1 or not abs(rows[k, 0]) < 1e12:

@@ -120,8 +120,12 @@ def _write_stops(skeleton: Skeleton, c: Coefficients) -> None:
 
 
 def _write_play(skeleton: Skeleton, c: Coefficients) -> None:
-    """The play: elastic where c gives its contact a stiffness and the timestep resolves its damping, else rigid."""
+    """The play: elastic where c gives its contact a stiffness and the timestep resolves its damping, else rigid; a shaft if it has no width."""
     joint, (rocker, rudder) = skeleton.spec.joint("gap"), skeleton.local
+    if c.gap <= 0:
+        joint.limited = False
+        joint.stiffness, joint.damping = [skeleton.inertia * c.k_twist, 0.0, 0.0], [skeleton.inertia * c.d_twist, 0.0, 0.0]
+        return
     joint.limited, joint.range, joint.solimp_limit = True, [-c.gap, c.gap], PLAY
     joint.solref_limit = [2 * skeleton.spec.option.timestep, OVERDAMPED]
     if c.k_twist > 0 and c.d_twist / (c.rho * (1.0 - c.rho)) * skeleton.spec.option.timestep < RESOLVED:
