@@ -203,6 +203,17 @@ class Sensor(Effect):
     subsystem = "sensor"
 
 
+def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap: float = 0.0) -> Coefficients:
+    """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta, slack within +-gap.
+
+    Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones named.
+    """
+    k, d = (2 * np.pi * f) ** 2, 4 * np.pi * zeta * f
+    if c.two_body > 0 and c.k_twist > 0:
+        k, d = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist)
+    return c._replace(two_body=1.0, gap=c.gap + gap, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d)
+
+
 def law(function: Callable) -> staticmethod:
     """Compile one effect's law for the integrator."""
     from numba import njit

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from ers_mj.effects.base import Parameter, Transmission
+from ers_mj.effects.base import Parameter, Transmission, coupled
 
 
 class ShaftCompliance(Transmission):
     """Two bodies on a spring-damper without play; f_shaft is its natural frequency against the total inertia.
 
-    The motor's side carries the shares rho of the inertia and phi of the friction. Beside a play it softens the play's contact.
+    The motor's side carries the shares rho of the inertia and phi of the friction. Beside a play it is in series with the play's contact.
     """
 
     name = "shaft_compliance"
@@ -27,7 +27,4 @@ class ShaftCompliance(Transmission):
         return [np.array([min(f, highest), 0.1, 0.6, 0.2]) for f in (10.0, 20.0, 40.0, 80.0)]
 
     def coefficients(self, p, c):
-        if not np.isfinite(p[0]):
-            return c
-        shaft = 2 * np.pi * p[0]
-        return c._replace(two_body=1.0, rho=p[2], beta=p[2], phi=p[3], k_twist=shaft**2, d_twist=2 * p[1] * shaft)
+        return coupled(c, f=p[0], zeta=p[1], rho=p[2], phi=p[3]) if np.isfinite(p[0]) else c

@@ -14,7 +14,7 @@ class ThermalDrift(Drive):
     """
 
     name = "thermal_drift"
-    sentence = "the motor's resistance drifts by {rise} of itself (1 = doubles) as it warms up within {T_w}"
+    sentence = "the motor's resistance drifts by {rise} of itself as it warms up within {T_w}"
     mjcf = "none: the torque is set step by step (the thermal of a dcmotor follows the current's heat, this one the clock)"
     parameters = (
         Parameter("rise", "ratio", "relative rise of the resistance once warm", positive=False, lower=-0.8, upper=10.0),

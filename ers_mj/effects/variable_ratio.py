@@ -15,7 +15,7 @@ class VariableRatio(Transmission):
     """
 
     name = "variable_ratio"
-    sentence = "the gear ratio changes along the travel, away from rest by {slope} and, squared, by {bend} of itself"
+    sentence = "the gear ratio changes along the travel: by {slope} times the angle from rest and {bend} times its square"
     mjcf = "none: the torque is set step by step; a rod on a rocker arm is the rudder system's own linkage"
     parameters = (
         Parameter("slope", "per_position", "relative change of the ratio per angle", positive=False),
