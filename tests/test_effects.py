@@ -46,7 +46,10 @@ def test_equivalence_classes_hold_known_names_once():
     assert set(BY_NAME) & set(names)
 
 
-@pytest.mark.parametrize("effect", [e for e in EFFECTS if e.subsystem in ("drive", "transmission") and e.follows_current and e.name != "cogging"], **ids)
+CURRENT = [e for e in EFFECTS if e.subsystem in ("drive", "transmission") and e.follows_current and e.name != "cogging"]
+
+
+@pytest.mark.parametrize("effect", CURRENT, **ids)
 def test_an_open_circuit_feels_nothing_of_the_current(effect):
     off, c = np.zeros(T.size, bool), table_1().coefficients
     with_it, without = (ReducedModel(c, chosen).simulate(T, np.zeros(T.size), (0.5, 8.0), enable=off).theta

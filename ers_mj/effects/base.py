@@ -100,8 +100,9 @@ class Twin:
     """Where an effect writes its MJCF realisation.
 
     ``spec`` is the model so far; ``inertia`` the J [kg m^2, or 1 where lumped] that turns an acceleration into a torque;
-    ``is_angle`` whether the output turns (hinges) or slides; ``ampere`` the drive acceleration of one unit of the motor's force. Named alike in every model: body ``rudder``, tendon
-    ``rudder_angle`` (the absolute output), actuators ``motor`` (ctrl in input units) and ``load``.
+    ``is_angle`` whether the output turns (hinges) or slides; ``ampere`` the drive acceleration of one unit of the motor's
+    force. Named alike in every model: body ``rudder``, tendon ``rudder_angle`` (the absolute output), actuators ``motor``
+    (ctrl in input units) and ``load``.
     """
 
     spec: mujoco.MjSpec
