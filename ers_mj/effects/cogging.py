@@ -13,7 +13,7 @@ class Cogging(Drive):
     """theta'' += A sin(2 pi theta / period + phase) / J, with or without current; n periods at the motor are n times as wide."""
 
     name = "cogging"
-    sentence = "the motor cogs: a torque of ±{A} at the rudder that returns every {period} of its angle"
+    sentence = "the motor cogs: a torque of amplitude {A} at the rudder that returns every {period} of its angle"
     mjcf = "a passive dcmotor on the rudder's angle, its cogging of one pole behind a gear of 2 pi / period"
     parameters = (
         Parameter("A", "torque", "amplitude, seen at the output", positive=False),

@@ -13,7 +13,7 @@ class PeriodicGust(Load):
     """theta'' += A sin(2 pi f t + phase) / J, t from the zero of the recording's own clock: gusts, waves, another machine."""
 
     name = "periodic_gust"
-    sentence = "a load of ±{A} swings at {f}, whatever the drive does"
+    sentence = "a load of amplitude {A} swings at {f}, whatever the drive does"
     mjcf = "none: the ctrl of the load actuator is set step by step from the clock"
     parameters = (
         Parameter("A", "torque", "amplitude", positive=False),

@@ -17,7 +17,7 @@ class TransmissionRipple(Transmission):
     """
 
     name = "transmission_ripple"
-    sentence = "the gear ratio swings by ±{ripple} of itself every {period} of the rudder's angle"
+    sentence = "the gear ratio swings by an amplitude of {ripple} of itself every {period} of the rudder's angle"
     mjcf = "none: the torque is set step by step from angle, speed and current"
     parameters = (
         Parameter("ripple", "ratio", "amplitude over the mean ratio", positive=False, lower=-0.9, upper=0.9),
