@@ -33,7 +33,7 @@ MOST_HOPS = 3
 FAR_HOP = 0.3  # length of the longest hop, in the transformed parameters
 SOFT = 3  # directions along which a fit hops, of least curvature
 HOP_GAIN = 0.3  # of C that a hop must win to be followed by further ones
-ROUGH, QUIET = 10.0, 0.02  # median misfit up to which, and C per block from which, a fit hops
+ROUGH, QUIET = 3.0, 0.02  # median misfit up to which, and C per block from which, a fit hops
 HOPELESS = 0.02  # excess of C per block over a nested model at which a search is given up
 NEAR = 0.1  # half travels by which theta_0 may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
@@ -231,13 +231,15 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
     ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
     given up, since its start was a bad one.
 
-    Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the mean
-    misfit, where C is nearly a sum of squares, and lowers it to the one that was asked for.
+    Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
+    mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
+    more of a search that begins near the data: one bad block would send it back to the sum of squares.)
     """
     now = math.inf
     while True:
         misfit = Blocks.of(traces).misfit(residuals(model, traces, rate))
-        level = float(np.mean(misfit)) if np.all(np.isfinite(misfit)) else 0.0  # a runaway has one descent to find a motion
+        sound = np.all(np.isfinite(misfit))  # a runaway has one descent to find a motion
+        level = float(np.exp(np.mean(np.log(misfit + tau)))) if sound else 0.0
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
         found = descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3)
