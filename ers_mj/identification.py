@@ -28,11 +28,12 @@ STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth
 POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
 FLOOR = 1e-4  # gain in C of one step below which a fit stands on its valley's floor
-HOPS = (3.0, 30.0)  # C by which a hop would raise the cost, were its curvature the same all the way
+HOP = 30.0  # C by which a hop would raise the cost, were its curvature the same all the way
+MOST_HOPS = 3
 FAR_HOP = 0.3  # length of the longest hop, in the transformed parameters
 SOFT = 3  # directions along which a fit hops, of least curvature
 HOP_GAIN = 0.3  # of C that a hop must win to be followed by further ones
-ROUGH, QUIET = 10.0, 0.01  # median misfit up to which, and C per block from which, a fit hops
+ROUGH, QUIET = 3.0, 0.02  # median misfit up to which, and C per block from which, a fit hops
 HOPELESS = 0.02  # excess of C per block over a nested model at which a search is given up
 NEAR = 0.1  # half travels by which theta_0 may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
@@ -230,13 +231,15 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
     ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
     given up, since its start was a bad one.
 
-    Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the mean
-    misfit, where C is nearly a sum of squares, and lowers it to the one that was asked for.
+    Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
+    mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
+    more of a search that begins near the data: one bad block would send it back to the sum of squares.)
     """
     now = math.inf
     while True:
         misfit = Blocks.of(traces).misfit(residuals(model, traces, rate))
-        level = float(np.mean(misfit)) if np.all(np.isfinite(misfit)) else 0.0  # a runaway has one descent to find a motion
+        sound = np.all(np.isfinite(misfit))  # a runaway has one descent to find a motion
+        level = float(np.exp(np.mean(np.log(misfit + tau)))) if sound else 0.0
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
         found = descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3)
@@ -258,22 +261,22 @@ def converged(found: Fit, rivals: Sequence[Fit], traces: Sequence[Trace], tau: f
 def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restart: bool = False) -> tuple[Fit, Sequence[Trace]]:
     """The fit after hops along its softest directions, as long as they pay, and the traces it belongs to.
 
-    One start leads into one dent of many (see ``converged``). A hop goes as far as the fit's own curvature prices at one of HOPS, and
+    One start leads into one dent of many (see ``converged``). A hop goes as far as the fit's own curvature prices at HOP, and
     descends from there; ``restart`` fits the initial states again, which a wrong model has bent. Only near the noise are dents what
     keeps a fit from its floor: beyond ROUGH the model itself is wrong, below QUIET nothing is left to win.
     """
     def land(start):
         begun = with_starts(start, traces) if restart else traces
-        end = descend(start, begun, OBSERVER_RATE, tau, 12, 0.01)
-        return end, begun
+        return descend(start, begun, OBSERVER_RATE, tau, 12, 0.03), begun
 
-    while float(np.median(found.misfit)) < ROUGH and float(np.mean(score(found.misfit, tau))) > QUIET:
+    for _ in range(MOST_HOPS):
+        if float(np.median(found.misfit)) > ROUGH or float(np.mean(score(found.misfit, tau))) < QUIET:
+            break
         layout = found.model.layout()
         z, (curvature, directions) = found.model.vector(layout), np.linalg.eigh(found.hessian)
-        sizes = [way * min(math.sqrt(2 * price / max(c, 1e-9)), FAR_HOP) for c in curvature[:SOFT] for price in HOPS for way in (-1, 1)]
-        along = [directions[:, k] for k in range(min(SOFT, z.size)) for _ in range(2 * len(HOPS))]
+        hops = [min(math.sqrt(2 * HOP / max(c, 1e-9)), FAR_HOP) * d for c, d in zip(curvature[:SOFT], directions.T)]
         with ThreadPoolExecutor(jobs) as pool:
-            ends = list(pool.map(land, [found.model.at(layout, z + size * way) for size, way in zip(sizes, along)]))
+            ends = list(pool.map(land, [found.model.at(layout, z + way * hop) for hop in hops for way in (-1, 1)]))
         best, begun = min(ends, key=lambda end: end[0].cost)
         if not best.cost < found.cost - HOP_GAIN:
             break

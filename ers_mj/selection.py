@@ -154,17 +154,14 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     def total(found):
         return float(score(found.misfit, tau).sum())
 
-    def quick(models):
-        return min((fit(model, traces, tau=tau, steps=6, ceiling=base.misfit) for model in models), key=total)
+    def quick(model):
+        return fit(model, traces, tau=tau, steps=6, ceiling=base.misfit)
 
-    def first(item):
-        name, per_place = item
-        return name, quick([models[0] for models in per_place])
-
-    def further(item):
-        (name, per_place), (_, found) = item
-        others = [model for models in per_place for model in models[1:]]
-        return name, min(found, quick(others), key=total) if others and reference - total(found) >= AGAIN * most else found
+    def refitted(starts):
+        """The best fit by name from pairs (name, model), those with the most parameters begun first since they take longest."""
+        order = sorted(starts, key=lambda start: -len(start[1].layout()))
+        ends = list(zip((name for name, _ in order), pool.map(quick, (model for _, model in order))))
+        return {name: min((found for other, found in ends if other == name), key=total) for name, _ in starts}
 
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
@@ -177,9 +174,12 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
         screened = screen(places, traces, tau, exclude) + states
-        once = list(pool.map(first, screened))
-        most = max((reference - total(f) for _, f in once), default=0.0)
-        rough = sorted(pool.map(further, zip(screened, once)), key=lambda item: total(item[1]))
+        first = refitted([(name, models[0]) for name, per_place in screened for models in per_place])
+        most = max((reference - total(f) for f in first.values()), default=0.0)
+        again = refitted([(name, model) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
+                          for models in per_place for model in models[1:]])
+        best = [(name, min((ends[name] for ends in (first, again) if name in ends), key=total)) for name in first]
+        rough = sorted(best, key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
             return sorted(map(judged, rough), key=lambda c: -c.worth)
