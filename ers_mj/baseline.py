@@ -33,7 +33,8 @@ def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bo
                   acceleration=max(values.get("c_2", 0.0), 0.05 * abs(values["b"]) * peak), input=peak,
                   sample_time=float(np.median([t.sample_time for t in traces])),
                   noise=float(np.median([t.sigma for t in traces])), quantum=max(t.quantum for t in traces),
-                  is_angle=is_angle, tau_e_datasheet=tau_e, duration=max(float(t.t[-1] - t.t[0]) for t in traces))
+                  is_angle=is_angle, tau_e_datasheet=tau_e, duration=max(float(t.t[-1] - t.t[0]) for t in traces),
+                  recordings=len(traces))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from ers_mj.baseline import Start
 from ers_mj.confirmation import Confirmed
 from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME
-from ers_mj.evaluation import free_run, neutral, pooled, recalibrated, scored
+from ers_mj.evaluation import free_run, pooled, recalibrated, scored
 from ers_mj.evidence import Evidence, RecordView, Rung
 from ers_mj.excitation import next_recording
 from ers_mj.identification import BASE, STATES, Model, residuals, score, with_starts
@@ -54,7 +54,7 @@ class Case:
     start: Start
     selection: Selection
     confirmed: Confirmed
-    coarse: bool
+    sensors: Mapping[str, np.ndarray]
     seed: int
     rig: Rig
     multibody: tuple[float | None, float | None]
@@ -134,7 +134,7 @@ class Case:
         return float(np.mean(score(self.selection.chosen.misfit, 1.0)))
 
     def _verdict(self, explained: float) -> str:
-        if self.coarse and not self.model.names:
+        if self.sensors and not self.model.names:
             return "missing_physics"
         if self.model.names:
             return "missing_physics" if explained >= HALF else "unexplained"
@@ -152,10 +152,9 @@ class Case:
         return bool(np.all(np.isfinite(misfit))) and float(np.mean(score(misfit, 1.0))) < CONSISTENT
 
     def _missing(self) -> list[dict]:
-        sensors = [self._quantised()] if self.coarse else []
+        sensors = [self._symptom(name, values) for name, values in self.sensors.items()]
         effects = [self._effect(name) for name in self.model.names]
-        after = pooled(self.confirmed.after).rmse
-        effects.sort(key=lambda e: after - (e["evidence"]["heldout_rmse_without_rad"] or 0.0))
+        effects.sort(key=lambda e: -self.confirmed.without[e["effect"]].rmse)
         return effects + sensors
 
     def _effect(self, name: str) -> dict:
@@ -164,14 +163,15 @@ class Case:
         without = c.without[name]
         gain = float(np.sum(score(without.misfit, 1.0)) - np.sum(score(pooled(c.after).misfit, 1.0)))
         size = sum(np.isfinite(v) for v in dict(self.model.effects)[name])
+        with_and_without = (None, None) if effect.local else (pooled(c.after).rmse, without.rmse)
         shown = {k: _shown(e["value"], e["unit"]) for k, e in parameters.items()}
         return {"effect": name, "sentence": effect.describe(shown), "subsystem": effect.subsystem, "parameters": parameters,
-                "evidence": {"heldout_rmse_without_rad": without.rmse, "heldout_rmse_with_rad": pooled(c.after).rmse,
+                "evidence": {"heldout_rmse_without_rad": with_and_without[1], "heldout_rmse_with_rad": with_and_without[0],
                              "delta_bic": 2 * gain - size * math.log(max(without.misfit.size, 2)), "p_value": c.p[name]},
                 "alternatives": self._alternatives(name)}
 
     def _effect_parameters(self, name: str):
-        values, errors = dict(self.model.effects)[name], self._errors()
+        values, errors = dict(self.model.effects_of())[name], self._errors()
         for parameter, value in zip(BY_NAME[name].parameters, values):
             factor = self.inertia if self.inertia and parameter.kind in PER_INERTIA else 1.0
             finite = bool(np.isfinite(value))
@@ -182,12 +182,13 @@ class Case:
                 "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
                 "meaning": parameter.meaning}}
 
-    def _quantised(self) -> dict:
-        step = max(t.quantum for t in self.start.traces)
-        effect = BY_NAME["sensor_quantisation"]
-        entry = {"value": step, "unit": self.output_unit, "ci95": [0.99 * step, 1.01 * step], "meaning": effect.parameters[0].meaning}
-        return {"effect": effect.name, "sentence": effect.describe({"step": _shown(step, self.output_unit)}),
-                "subsystem": effect.subsystem, "parameters": {"step": entry},
+    def _symptom(self, name: str, values: np.ndarray) -> dict:
+        """A sensor effect that was found in the data itself."""
+        effect = BY_NAME[name]
+        entries = {p.name: {"value": float(v), "unit": unit_of(p.kind, self.output_unit, self.input_unit), "ci95": [None, None],
+                            "meaning": p.meaning} for p, v in zip(effect.parameters, values)}
+        return {"effect": name, "sentence": effect.describe({k: _shown(e["value"], e["unit"]) for k, e in entries.items()}),
+                "subsystem": effect.subsystem, "parameters": entries,
                 "evidence": {"heldout_rmse_without_rad": None, "heldout_rmse_with_rad": None, "delta_bic": None, "p_value": None},
                 "alternatives": []}
 
@@ -216,12 +217,14 @@ class Case:
     def _errors(self) -> dict:
         """95 % intervals of every fitted number, by (owner, name)."""
         if not hasattr(self, "_cached"):
-            model = neutral(self.model)
+            model = replace(self.model, states=None)
             left_out = self.confirmed.models if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2 else []
             error, factor = standard_errors(model, self.start.traces, left_out, self.selection.tau)
             layout = model.layout()
             z, out = model.vector(layout), {}
             for f, q, e in zip(layout, z, error * factor):
+                if (f.owner, f.name) in out:  # of a further recording
+                    continue
                 ends = f.ends(q, e)
                 if f.name == "b" and model.values["b"] < 0:
                     ends = (-ends[1], -ends[0])
@@ -260,7 +263,7 @@ class Case:
         """What differs between recordings beyond chance: training ones as fitted, held-out ones as recalibrated."""
         out, unknown = [], (None, None)
         states, errors = dict(self.model.states or {}), self._state_errors()
-        later = [recalibrated(self.model, h)[1] for h in held]
+        later = [recalibrated(model, h)[1] for model, h in zip(self.confirmed.models, held)]
         count = len(self.start.traces)
         for name in STATES:
             rest = 0.0 if name == "offset" else 1.0
@@ -362,8 +365,8 @@ class Case:
         for name in (self.model.names if verdict == "missing_physics" else ()):
             entries = {p["name"]: p["entry"]["value"] for p in self._effect_parameters(name)}
             effects.append((name, {k: v for k, v in entries.items() if v is not None}))
-        if verdict == "missing_physics" and self.coarse:
-            effects.append(("sensor_quantisation", {"step": max(t.quantum for t in self.start.traces)}))
+        if verdict == "missing_physics":
+            effects += [(name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)}) for name, values in self.sensors.items()]
         parameters = dict(self.datasheet.parameters) if self.datasheet is not None else {}
         return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
 

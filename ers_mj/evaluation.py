@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ers_mj.effects import BY_NAME
 from ers_mj.identification import OBSERVER_RATE, Model, fit, fitted_start, residuals, score, tau_of
 from ers_mj.intervals import standard_errors
 from ers_mj.traces import Blocks, Trace
 
+TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
 RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
 LAST_PART = 0.7  # where the only recording is cut into training and held out
 
@@ -49,17 +51,41 @@ def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0) -> Score
     return Score(float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)))
 
 
-def neutral(model: Model) -> Model:
-    """The model without record states: what a recording that was never seen gets."""
-    return replace(model, states=None)
+def settled(model: Model, trace: Trace, tau: float) -> Model:
+    """The model for one recording that it was not fitted to.
+
+    What only that recording can tell of an effect (the phase of a gust, the time of a knock) is fitted in it, from the first values of
+    ``local``; an effect whose values there are NaN stays away.
+    """
+    one = replace(model.of_records([0]), free=(), frozen=model.names)
+    layout = one.layout()
+    if not layout:
+        return replace(one, free=model.free, frozen=model.frozen)
+    z = one.vector(layout)
+    turns = np.array([f.name == "phase" for f in layout], float)
+    starts = [one.at(layout, z + turn * turns) for turn in (TURNS if turns.any() else TURNS[:1])]
+    best = min((fit(start, [trace], tau=tau, steps=8) for start in starts), key=lambda f: f.cost)
+    return replace(best.model, free=model.free, frozen=model.frozen)
+
+
+def _strange(model: Model) -> Model:
+    """The model as a recording of another day gets it: what happened once does not happen again."""
+    once = [name for name in model.local or {} if any(p.name == "record" for p in BY_NAME[name].parameters)]
+    for name in once:
+        model = model.without_effect(name)
+    return model
 
 
 @dataclass(frozen=True)
 class Fold:
-    """A held-out recording, and the training ones where the model must be refitted without it (None: it never saw it)."""
+    """A held-out recording, and the training ones where the model must be refitted without it (None: it never saw it).
+
+    ``record`` is the held-out one's place among all training recordings where it is one of them.
+    """
 
     held_out: Trace
     training: tuple[Trace, ...] | None
+    record: int = 0
 
 
 def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold], str]:
@@ -67,7 +93,7 @@ def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold]
     if holdout:
         return [Fold(h, None) for h in holdout], "held-out recordings were opened after selection had ended"
     if len(traces) > 1:
-        return ([Fold(out, tuple(t for t in traces if t is not out)) for out in traces],
+        return ([Fold(out, tuple(t for t in traces if t is not out), k) for k, out in enumerate(traces)],
                 "each recording was held out in turn while the parameters were refitted to the others; the structure was chosen on all")
     cut = int(LAST_PART * traces[0].t.size)
     return ([Fold(traces[0].part(cut, traces[0].t.size), (traces[0].part(0, cut),))],
@@ -77,7 +103,12 @@ def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold]
 def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int, steps: int = 6) -> list[Model]:
     """The model of each fold, refitted to its training recordings where it has some."""
     def one(fold: Fold) -> Model:
-        return neutral(model) if fold.training is None else fit(neutral(model), fold.training, tau=tau, steps=steps).model
+        if fold.training is None:
+            return settled(_strange(model), fold.held_out, tau)
+        others = [k for k in range(len(fold.training) + 1) if k != fold.record] if len(parts) > 1 else [0]
+        found = fit(model.of_records(others), fold.training, tau=tau, steps=steps).model
+        mine = {name: rows[[fold.record]] for name, rows in (model.local or {}).items()}
+        return settled(replace(found, local=mine or None), fold.held_out, tau)
 
     with ThreadPoolExecutor(jobs) as pool:
         return list(pool.map(one, parts))
@@ -88,7 +119,9 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     taken on the rest. They stay neutral unless they buy their price there. Each is (value, lower, upper end of 95 %)."""
     cut = int(RECALIBRATED * trace.t.size)
     head = trace.part(0, cut)
-    pair = replace(neutral(model), free=(), frozen=model.names).with_state("gain", 2).with_state("friction_level", 2)
+    known = {name: rows[[0, 0]] for name, rows in (model.local or {}).items()}
+    held = (*model.names, *(f"{name}, local" for name in known))
+    pair = replace(model, states=None, local=known or None, free=(), frozen=held).with_state("gain", 2).with_state("friction_level", 2)
     if model.values["a_1"] > 0 or model.values["c_1"] > 0:
         pair = pair.with_state("offset", 2)
     blank = replace(head, valid=np.zeros(head.t.size, bool), counts=np.zeros_like(head.counts))

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.effects import EFFECTS
-from ers_mj.identification import OBSERVER_RATE, STATES, Fit, Model, converged, fit, hopped, jacobian_of, residuals, score, tau_of
-from ers_mj.traces import Blocks, Trace
+from ers_mj.effects import EFFECTS, Effect
+from ers_mj.identification import OBSERVER_RATE, STATES, Columns, Fit, Model, converged, fit, hopped, jacobian_of, residuals, score, tau_of
+from ers_mj.traces import BLOCK, Blocks, Trace
 
 LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error of about 0.3 sigma RMS
 LEAST_SHARE = 0.1  # and the share of what is left to explain
@@ -30,6 +30,16 @@ AGAIN = 0.1  # share of the best first refit's gain from which an effect is refi
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 MOST_ROUNDS = 2
+QUICK = 8  # steps of a first refit, on a borrowed Jacobian
+HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
+
+
+@dataclass(frozen=True)
+class Begin:
+    """Where a refit begins: the model, and the Jacobian's columns at the place that it extends."""
+
+    model: Model
+    known: Columns
 
 
 @dataclass(frozen=True)
@@ -63,7 +73,7 @@ def tie(best: Candidate, other: Candidate) -> float:
     return math.erfc(max(float(np.sum(d)), 0.0) / spread / math.sqrt(2.0))
 
 
-def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Model]]]]:
+def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Begin]]]]:
     """The promising effects, each with the models to refit: for every place, those of its best starts.
 
     From each place (the refitted baseline, and where else a fit may start from) the secant e(with effect) - e(without) is taken at
@@ -72,27 +82,48 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     a small effect beside the noise, the second a large one that the baseline could not swallow. The baseline sends REFITTED
     effects on, every other place ELSEWHERE.
     """
-    tried: dict[str, list[list[Model]]] = {}
+    tried: dict[str, list[list[Begin]]] = {}
     sent: list[str] = []
     for place, most in zip(places, (REFITTED, *[ELSEWHERE] * len(places))):
         e = residuals(place, traces, OBSERVER_RATE)
         if not np.all(np.isfinite(e)):
             continue
-        targets = _targets(place, e, traces, tau)
+        (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
         promises = {}
         for effect in EFFECTS:
             if effect.name not in exclude:
-                found = [p for start in effect.starts(place.scales) if (p := _promise(place, effect, start, e, targets, traces))]
+                starts = _hopeful(place, effect, effect.starts(scales), targets, traces)
+                found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
                 found.sort(key=lambda p: -p[0])
                 if found:
                     promises[effect.name] = found[0][0]
-                    tried.setdefault(effect.name, []).append([model for _, model in found[:effect.tries]])
+                    tried.setdefault(effect.name, []).append([Begin(model, known) for _, model in found[:effect.tries]])
         sent += sorted(promises, key=promises.get, reverse=True)[:most]
     return [(name, tried[name]) for name in dict.fromkeys(sent)]
 
 
-def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """(weights (N,), orthonormal basis (N, k) of the place's own parameters, weighted residual (N,) beside it) at either weighting."""
+def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
+    """Of many starts of a law, those that promise most to first order along the place's own motion."""
+    if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or place.plant().coupled:
+        return starts
+    sigma = np.concatenate([np.full(t.y.size, t.sigma) for t in traces])
+    valid = np.concatenate([t.valid for t in traces])
+    groups = _groups(effect, traces)
+    waves = 2 if effect.wave else 1
+    every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
+    changes = np.where(valid, -place.first_orders(traces, OBSERVER_RATE, effect.name, every) / sigma, 0.0)
+    if "record" in (names := [p.name for p in effect.parameters]):
+        record = np.repeat(np.arange(len(traces)), [t.y.size for t in traces])
+        changes *= np.array([s[names.index("record")] for s in every])[:, None] == record
+    shares = [max(_mixed(_split(changes[i:i + waves], groups), target)[0] if effect.signed else _explained(changes[i], target, False)[0]
+                  for target in targets) for i in range(0, len(every), waves)]
+    best = sorted(np.argsort(shares)[::-1][:effect.tries])
+    return [starts[i] for i in best]
+
+
+def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
+    """The Jacobian's columns at the place, and at either weighting (weights (N,), orthonormal basis (N, k) of the place's own
+    parameters, weighted residual (N,) beside it)."""
     blocks, layout = Blocks.of(traces), place.layout()
     m = blocks.misfit(e)
     jacobian = jacobian_of(place, layout, place.vector(layout), e, traces, OBSERVER_RATE)
@@ -101,7 +132,7 @@ def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float) -
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
         basis, _ = np.linalg.qr(jacobian * root[:, None])
         out.append((root, basis, _beside(basis, root * e)))
-    return out
+    return {f.key: column for f, column in zip(layout, jacobian.T)}, out
 
 
 def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
@@ -109,6 +140,8 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
 
     A secant across a large step bends; where the effect is proportional to its leading parameters it is taken again at that size.
     """
+    if effect.wave and np.isfinite(start[effect.wave[1]]):
+        return _promise_of_wave(place, effect, start, e, targets, traces)
     best = None
     for _ in range(2 if effect.sized else 1):
         secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
@@ -119,6 +152,60 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
         if best is None or share > best[0]:
             best = share, place.with_effect(effect.name, start)
     return best
+
+
+def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
+    """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local."""
+    amplitude, phase = effect.wave
+    secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
+    if not np.all(np.isfinite(secants)):
+        return None
+    columns = _split(secants, _groups(effect, traces))
+    share, mixture = max((_mixed(columns, target) for target in targets), key=lambda found: found[0])
+    mixture = mixture.reshape(-1, 2)
+    sizes, turns = np.hypot(*mixture.T), np.arctan2(mixture[:, 1], mixture[:, 0])
+    found = start.copy()
+    found[amplitude] *= min(max(math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
+    found[phase] += turns[0]
+    model = place.with_effect(effect.name, found)
+    if effect.local:
+        model.local[effect.name][:, effect.local_columns.index(phase)] = start[phase] + turns
+    return share, model
+
+
+def _mixed(columns: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[float, np.ndarray]:
+    """Share of a target that the columns (N, 2 g) explain together, and the multiples (2 g,) of them that do."""
+    root, basis, residual = target
+    free = _beside(basis, root[:, None] * columns)
+    multiples = np.linalg.lstsq(free, -residual, rcond=1e-9)[0]
+    left = residual + free @ multiples
+    return 1.0 - float(left @ left) / float(residual @ residual), multiples
+
+
+def _quarter(effect: Effect, start: np.ndarray) -> np.ndarray:
+    """The start of a wave a quarter period on."""
+    turned = start.copy()
+    turned[effect.wave[1]] += 0.5 * math.pi
+    return turned
+
+
+def _groups(effect: Effect, traces: Sequence[Trace]) -> np.ndarray:
+    """For each sample (N,) the number of what may have a phase of its own: its recording, or 0 for all."""
+    return np.repeat(np.arange(len(traces)) if effect.local and effect.wave else np.zeros(len(traces), int), [t.y.size for t in traces])
+
+
+def _split(changes, groups: np.ndarray) -> np.ndarray:
+    """Columns (N, groups x changes): each change (N,) within each group."""
+    return np.column_stack([np.where(groups == g, s, 0.0) for g in range(groups[-1] + 1) for s in changes])
+
+
+def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int, float, float], ...]:
+    """Spans (recording, begin [s], length [s]) around the blocks of largest misfit: where something may have knocked."""
+    blocks = Blocks.of(traces)
+    record = np.repeat(np.arange(len(traces)), [t.counts.size for t in traces])
+    within = np.concatenate([np.arange(t.counts.size) for t in traces])
+    worst = np.argsort(-score(blocks.misfit(e), tau), kind="stable")[:HOTTEST]
+    return tuple((int(record[b]), float(traces[record[b]].t[0] + within[b] * BLOCK), length) for b in worst for length in KNOCKS)
 
 
 def _explained(secant: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray], signed: bool) -> tuple[float, float]:
@@ -154,13 +241,13 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     def total(found):
         return float(score(found.misfit, tau).sum())
 
-    def quick(model):
-        return fit(model, traces, tau=tau, steps=6, ceiling=base.misfit)
+    def quick(begin):
+        return fit(begin.model, traces, tau=tau, steps=QUICK, ceiling=base.misfit, known=begin.known)
 
     def refitted(starts):
-        """The best fit by name from pairs (name, model), those with the most parameters begun first since they take longest."""
-        order = sorted(starts, key=lambda start: -len(start[1].layout()))
-        ends = list(zip((name for name, _ in order), pool.map(quick, (model for _, model in order))))
+        """The best fit by name from pairs (name, Begin), those with the most parameters begun first since they take longest."""
+        order = sorted(starts, key=lambda start: -len(start[1].model.layout()))
+        ends = list(zip((name for name, _ in order), pool.map(quick, (begin for _, begin in order))))
         return {name: min((found for other, found in ends if other == name), key=total) for name, _ in starts}
 
     def finish(item):
@@ -170,14 +257,14 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         name, found = item
         return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau))
 
-    states = [(s, [[base.model.with_state(s, len(traces))]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
+    states = [(s, [[Begin(base.model.with_state(s, len(traces)), {})]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
         screened = screen(places, traces, tau, exclude) + states
-        first = refitted([(name, models[0]) for name, per_place in screened for models in per_place])
+        first = refitted([(name, begins[0]) for name, per_place in screened for begins in per_place])
         most = max((reference - total(f) for f in first.values()), default=0.0)
-        again = refitted([(name, model) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
-                          for models in per_place for model in models[1:]])
+        again = refitted([(name, begin) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
+                          for begins in per_place for begin in begins[1:]])
         best = [(name, min((ends[name] for ends in (first, again) if name in ends), key=total)) for name in first]
         rough = sorted(best, key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]

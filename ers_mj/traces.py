@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ers_mj.recording import Recording
+from ers_mj.symptoms import at_extreme, excursions, frozen_spans
 
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
@@ -17,7 +18,7 @@ START_SAMPLES = 10
 
 @dataclass(frozen=True)
 class Trace:
-    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, and the state it starts in."""
+    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the state it starts in, and the spans that its sensor lost."""
 
     name: str
     t: np.ndarray
@@ -31,6 +32,7 @@ class Trace:
     start: tuple[float, float]
     block: np.ndarray
     counts: np.ndarray
+    lost: tuple[slice, ...] = ()
 
     @property
     def sample_time(self) -> float:
@@ -46,11 +48,19 @@ class Trace:
 
 
 def trace_of(recording: Recording, inertia: float | None) -> Trace:
-    """A recording as a trace; its known load torque becomes an acceleration where the inertia [kg m^2] is known, else nothing."""
+    """A recording as a trace; its known load torque becomes an acceleration where the inertia [kg m^2] is known, else nothing.
+
+    Spans in which the sensor shows a spike, or hangs, are no measurement of the output.
+    """
     load = -recording.load / inertia if recording.load is not None and inertia else None
-    valid = recording.valid
-    return make_trace(recording.name, recording.t, recording.u, recording.y, valid, recording.enable, load,
-                      noise_sigma(recording.y[valid], recording.quantum), recording.quantum)
+    y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
+    stuck = [s for s in frozen_spans(y, recording.quantum) if not at_extreme(y, s) and np.ptp(recording.u[s]) > 0]
+    lost = (*excursions(np.where(recording.valid, y, np.nan), sigma), *stuck)
+    valid = recording.valid.copy()
+    for span in lost:
+        valid[span] = False
+    trace = make_trace(recording.name, recording.t, recording.u, y, valid, recording.enable, load, sigma, recording.quantum)
+    return replace(trace, lost=lost)
 
 
 def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:

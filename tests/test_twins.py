@@ -15,6 +15,8 @@ VISIBLE = 0.2  # [deg] RMS
 SIZES = {  # where the first start of an effect is too small to be seen beside the two plants' own difference
     "inductance": [0.004], "input_delay": [0.0043], "backlash": [0.012, 0.6, 0.2, 120.0, 0.2], "stribeck": [40.0, 0.6, 1.4],
     "end_stop": [0.15, 0.35, 100.0, 0.3], "sensor_quantisation": [0.0213], "voltage_saturation": [5.0],
+    "load_disturbance": [150.0, 0.6, 0.5, 0.0], "sensor_dropout": [4.0, 0.08], "sensor_lag": [0.02],
+    "sensor_nonlinearity": [0.2, 0.1, np.inf, np.inf, np.inf],
 }
 
 
@@ -34,7 +36,7 @@ def test_law_and_twin_agree(effect, road):
     size = rms_deg(law.measured - without.measured)
     assert size > VISIBLE
     if effect.subsystem == "sensor":  # what the sensor does to one and the same angle
-        assert np.array_equal(twin.measured, effect.measure(chosen[0][1], twin.theta))
+        assert np.array_equal(twin.measured, effect.measure(chosen[0][1], T, twin.theta))
     else:
         assert rms_deg(twin.measured - law.measured) < TOLERANCE * size
 

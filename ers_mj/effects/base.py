@@ -61,7 +61,7 @@ class Scales:
     ``position`` half the travel, ``low``/``high`` its ends, ``speed`` a high percentile of |w|, ``acceleration`` the
     friction level (or the drive's, where there is none), ``input`` the peak |u|, ``sample_time`` [s], ``noise`` and
     ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
-    recording [s].
+    recording [s], ``recordings`` their number, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
     """
 
     position: float
@@ -76,6 +76,8 @@ class Scales:
     is_angle: bool
     tau_e_datasheet: float | None = None
     duration: float = 10.0
+    recordings: int = 1
+    hot: tuple[tuple[int, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ class Parameter:
     """One number of an effect.
 
     ``kind`` names its dimension: torque, damping, stiffness, drag, cubic (all carried per inertia), position, speed,
-    input, time, frequency, phase, ratio, per_position, per_position_squared. ``positive`` parameters are fitted in their logarithm.
+    input, time, frequency, phase, ratio, count, per_position, per_position_squared. ``positive`` parameters are fitted in their
+    logarithm; those not ``fitted`` keep the value they start with; those ``per_record`` are another number in every recording.
     """
 
     name: str
@@ -93,6 +96,8 @@ class Parameter:
     lower: float = -np.inf
     upper: float = np.inf
     absent: float = 0.0
+    fitted: bool = True
+    per_record: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,11 +132,22 @@ class Effect:
     mjcf: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
+    wave: ClassVar[tuple[int, int] | None] = None  # amplitude and phase: the screening finds both from a start's two quarter periods
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
     sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
     follows_current: ClassVar[bool] = False  # its law changes as fast as the current, or within a small angle: half the segment length
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
+
+    @property
+    def local(self) -> bool:
+        """Whether some of it is another number in every recording, so that no other recording can tell it."""
+        return any(p.per_record for p in self.parameters)
+
+    @property
+    def local_columns(self) -> list[int]:
+        """Which of its parameters are ``per_record``."""
+        return [k for k, p in enumerate(self.parameters) if p.per_record]
 
     @property
     def signed(self) -> bool:
@@ -158,8 +174,8 @@ class Effect:
         """What the motor's terminals see (N,) of the command u (N,)."""
         return u
 
-    def measure(self, p: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """What the sensor reads (N,) of the true output y (N,)."""
+    def measure(self, p: np.ndarray, t: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """What the sensor reads (N,) at times t (N,) of the true output y (N,)."""
         return y
 
     def edit_spec(self, p: np.ndarray, c: Coefficients, twin: Twin) -> bool:

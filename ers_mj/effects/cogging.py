@@ -20,12 +20,12 @@ class Cogging(Drive):
         Parameter("period", "position", "period, seen at the output"),
         Parameter("phase", "phase", "phase of the sine at angle zero", positive=False),
     )
-    follows_current = True
     sized, tries = 1, 3
+    wave = (0, 2)
 
     def starts(self, scales):
         travel = scales.high - scales.low
-        return [np.array([0.2 * scales.acceleration, travel / order, phase]) for order in ORDERS for phase in (0.8, 0.8 + np.pi / 2)]
+        return [np.array([0.2 * scales.acceleration, travel / order, 0.0]) for order in ORDERS]
 
     def constants(self, p, c):
         return np.array([p[0], 2 * np.pi / p[1], p[2]])

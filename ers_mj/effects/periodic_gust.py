@@ -18,13 +18,13 @@ class PeriodicGust(Load):
     parameters = (
         Parameter("A", "torque", "amplitude", positive=False),
         Parameter("f", "frequency", "frequency"),
-        Parameter("phase", "phase", "phase of the sine at time zero", positive=False),
+        Parameter("phase", "phase", "phase of the sine at time zero, another in every recording", positive=False, per_record=True),
     )
     sized, tries = 1, 3
+    wave = (0, 2)
 
     def starts(self, scales):
-        return [np.array([0.2 * scales.acceleration, cycles / scales.duration, phase])
-                for cycles in CYCLES for phase in (0.8, 0.8 + np.pi / 2)]
+        return [np.array([0.2 * scales.acceleration, cycles / scales.duration, 0.0]) for cycles in CYCLES]
 
     def constants(self, p, c):
         return np.array([p[0], 2 * np.pi * p[1], p[2]])

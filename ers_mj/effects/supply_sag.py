@@ -14,7 +14,6 @@ class SupplySag(Drive):
     sentence = "the supply sags under load: at a command of {u_half} the motor would get half its current"
     mjcf = "none: the torque is set step by step from speed and current"
     parameters = (Parameter("u_half", "input", "command at which the motor gets half its current", absent=np.inf),)
-    follows_current = True
 
     def starts(self, scales):
         return [np.array([part * scales.input]) for part in (2.0, 1.0, 4.0)]

@@ -20,7 +20,6 @@ class ThermalDrift(Drive):
         Parameter("rise", "ratio", "relative rise of the resistance once warm", positive=False, lower=-0.8, upper=10.0),
         Parameter("T_w", "time", "time constant of the warm-up", upper=1e4),
     )
-    follows_current = True
     sized, tries = 1, 2
 
     def starts(self, scales):

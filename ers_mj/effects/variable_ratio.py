@@ -21,7 +21,6 @@ class VariableRatio(Transmission):
         Parameter("slope", "per_position", "relative change of the ratio per angle", positive=False),
         Parameter("bend", "per_position_squared", "relative change of the ratio per angle squared", positive=False),
     )
-    follows_current = True
     sized, tries = 2, 2
 
     def starts(self, scales):

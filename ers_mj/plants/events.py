@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from ers_mj.effects import EFFECTS
 from ers_mj.effects.base import Coefficients
@@ -87,7 +87,7 @@ def _torque(on, p, theta, w, j, t):
     a = 0.0
     for i in range(on[0, 0]):
         k = on[0, i + 1]
-        a += _torque_of(k, p[k], theta, w, j, t)
+        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3]), theta, w, j, t)
     return a
 
 
@@ -96,7 +96,7 @@ def _friction(on, p, level, theta, w, j, direction):
     """The friction level after every effect that is on."""
     for i in range(on[1, 0]):
         k = on[1, i + 1]
-        level = _friction_of(k, p[k], level, theta, w, j, direction)
+        level = _friction_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3]), level, theta, w, j, direction)
     return level
 
 
@@ -595,16 +595,17 @@ def _extra(c, on, p, t, x, s):
 
 
 @njit(nogil=True)
-def _segment(e, c, on, p, lawful, t, x, m, drive, load, h):
-    """The state a whole segment later if no event falls into it."""
+def _segment(e, c, on, p, lawful, t, x, m, drive, load, h, extra):
+    """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they add now (NaN: unknown)."""
     two = c[TWO] > 0
     whole, half = e[0, m[0] + 1, m[3] + 1, m[4] + 1], e[1, m[0] + 1, m[3] + 1, m[4] + 1]
     if not lawful or m[0] == 0:
-        return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0)
-    g0 = load + _extra(c, on, p, t, x, m[0])
+        return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0), np.nan
+    g0 = load + (extra if extra == extra else _extra(c, on, p, t, x, m[0]))
     ga = load + _extra(c, on, p, t + 0.5 * h, _mapped(half, two, x, drive, m[1], g0, 0.0, 0.0), m[0])
-    gb = load + _extra(c, on, p, t + h, _mapped(whole, two, x, drive, m[1], g0, 2.0 * (ga - g0), 0.0), m[0])
-    return _mapped(whole, two, x, drive, m[1], g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0))
+    end = _extra(c, on, p, t + h, _mapped(whole, two, x, drive, m[1], g0, 2.0 * (ga - g0), 0.0), m[0])
+    gb = load + end
+    return _mapped(whole, two, x, drive, m[1], g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0)), end
 
 
 @njit(nogil=True)
@@ -670,6 +671,31 @@ def _steady(x, z):
     return abs(z[1]) >= CALM * abs(x[1]) and abs(z[4]) >= CALM * abs(x[4])
 
 
+def _perturb(t, x, gain, every, c, on, p, out):
+    """Fill out (N,) with the first-order change of theta that the laws of ``on`` make along a motion of one body.
+
+    ``x`` (N, >= 3) are theta, w, j of the motion at the sample times. A body that rests stays at rest; its observer
+    (see simulate_kernel) forgets the change as it would any other.
+    """
+    h = t[1] - t[0]
+    maps = _maps(c, c[TAU], c[A_EMF], h)[0]
+    a = b = d = 0.0
+    for k in range(t.size):
+        out[k] = a
+        if k == t.size - 1:
+            break
+        if k % every == 0:
+            a *= 1.0 - gain
+        if x[k, 1] == 0.0 and x[k + 1, 1] == 0.0:
+            b = d = 0.0
+            continue
+        s = 1 if x[k, 1] + x[k + 1, 1] > 0.0 else -1
+        e = maps[s + 1, 1, 1]
+        force = _extra(c, on, p, t[k], (x[k, 0], x[k, 1], x[k, 2], x[k, 0], 0.0), s)
+        a, b, d = (e[0, 0] * a + e[0, 1] * b + e[0, 2] * d + e[0, 8] * force, e[1, 0] * a + e[1, 1] * b + e[1, 2] * d + e[1, 8] * force,
+                   e[2, 0] * a + e[2, 1] * b + e[2, 2] * d)
+
+
 def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
 
@@ -695,6 +721,8 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
         h_max = min(h_max, last / refine)
     corner = CORNER * (c[C_1] + c[C_PLUS]) * h0
     budget = EVENT_BUDGET * n + 1000
+    resting = -1  # the sample that begins in a rest which was checked already
+    extra = np.nan  # what the laws add where a segment ended that holds no event
     x = (x0[0], x0[1], x0[2], x0[0], x0[1] if two else 0.0)
     m = _start_mode(c, on, p, lawful, t[0], x)
     for k in range(n):
@@ -702,6 +730,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
         if k == n - 1:
             break
         if gain > 0.0 and k % every == 0 and y[k] == y[k]:
+            resting, extra = -1, np.nan
             x, m = _corrected(c, on, p, lawful, t[k], x, m, gain * (y[k] - x[0]))
         uniform = abs(t[k + 1] - t[k] - h0) < 1e-6 * h0
         stretch = 1.0 if uniform else (t[k + 1] - t[k]) / h0
@@ -710,7 +739,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
             drive = c[B] * u[max(k - skip, 0)]
             if tau <= 0:
                 x = (x[0], x[1], drive - a_emf * x[4], x[3], x[4])
-            z = _segment(whole, c, on, p, lawful, t[k], x, m, drive, load[k], h0)
+            z, _ = _segment(whole, c, on, p, lawful, t[k], x, m, drive, load[k], h0, np.nan)
             if tau <= 0:
                 z = (z[0], z[1], drive - a_emf * z[4], z[3], z[4])
             if _calm(c, z, h0) and _steady(x, z) and _clean(c, on, p, lawful, t[k], x, z, m, tau, load[k], h0):
@@ -728,16 +757,17 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                     x = (x[0], 0.0, x[2] if tau > 0 else drive, x[3], x[4])
                     z = (x[0], 0.0, j, x[3], x[4])
                     c[BIAS] = bias + load[k]
-                    held = (_violation(3, c, on, p, lawful, now + h, z, m) <= 0
-                            and _violation(3, c, on, p, lawful, now, x, m) <= 0)
+                    held = _violation(3, c, on, p, lawful, now + h, z, m) <= 0 and (
+                        (tau > 0 and resting == k) or _violation(3, c, on, p, lawful, now, x, m) <= 0)
                     c[BIAS] = bias
                     if held:
                         x = z
+                        resting = k + 1 if i == ends.size - 1 and load[k + 1] == load[k] else k
                         continue
                 elif not two:
                     if tau <= 0:
                         x = (x[0], x[1], drive - a_emf * x[1], x[3], x[4])
-                    z = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h)
+                    z, extra = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h, extra if tau > 0 else np.nan)
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * z[1], z[3], z[4])
                     if (z[1] * m[0] > 0 and (z[0] - c[THETA_0]) * m[1] >= 0 and z[0] <= c[UPPER] and z[0] >= c[LOWER]
@@ -748,12 +778,13 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                 else:
                     if tau <= 0:
                         x = (x[0], x[1], drive - a_emf * x[4], x[3], x[4])
-                    z = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h)
+                    z, _ = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h, np.nan)
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * z[4], z[3], z[4])
                     if _clean(c, on, p, lawful, now, x, z, m, tau, load[k], h):
                         x = z
                         continue
+            extra = np.nan
             c[BIAS] = bias + load[k]
             if enable[k]:
                 x, m, events = _advance(c, on, p, lawful, now, x, m, drive, tau, a_emf, h, h_max, corner)
@@ -767,5 +798,12 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
             return
 
 
-with compiled_cache():
-    simulate_kernel = njit(nogil=True, cache=True)(_simulate)
+READ, READ_BOOL = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.bool_, 1, "C", readonly=True)
+ROWS, LAWS = types.int64[:, ::1], types.float64[:, ::1]
+VECTOR = types.float64[::1]
+
+with compiled_cache():  # one signature each: locked and other arrays alike
+    simulate_kernel = njit(types.void(READ, READ, READ_BOOL, READ, READ, types.float64, types.int64, VECTOR, ROWS, LAWS, types.int64,
+                                      VECTOR, LAWS), nogil=True, cache=True)(_simulate)
+    perturb_kernel = njit(types.void(READ, types.float64[:, ::1], types.float64, types.int64, VECTOR, ROWS, LAWS, VECTOR),
+                          nogil=True, cache=True)(_perturb)

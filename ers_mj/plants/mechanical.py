@@ -191,7 +191,7 @@ class MechanicalPlant:
         theta, omega, theta_m, _, drive = rows.T.copy()
         measured = theta
         for name, values in self.effects:
-            measured = BY_NAME[name].measure(values, measured)
+            measured = BY_NAME[name].measure(values, t, measured)
         return Motion(t, theta, omega, drive, theta_m, measured)
 
 
