@@ -22,6 +22,7 @@ from ers_mj.plants.stepping import Law, Stepper, step_many
 from ers_mj.plants.writing import motor_gain, write_coefficients
 
 TIMESTEP = 5e-5  # [s] RMS error on Table 1 at most 0.01 deg; twice the step, twice the error
+SLIDER_STEPS = 5  # steps for one where friction acts on a slider: its damper drags it along by one step of the rudder
 MAX_DELAY_SAMPLES = 4096  # history of a delayed actuator in plant.xml
 
 
@@ -109,7 +110,7 @@ class MechanicalPlant:
         spec, delay = skeleton.spec, self._lowered.delay
         if delay > 0:
             motor = spec.actuator("motor")
-            motor.delay, motor.nsample = delay, min(int(np.ceil(delay / self.timestep)) + 1, MAX_DELAY_SAMPLES)
+            motor.delay, motor.nsample = delay, min(int(np.ceil(delay / self._step)) + 1, MAX_DELAY_SAMPLES)
         spec.compile()
         stepper = self._stepper()
         stepper.reset(self._start(None))
@@ -150,11 +151,15 @@ class MechanicalPlant:
             c = BY_NAME[name].coefficients(values, c)
         return c
 
+    @property
+    def _step(self) -> float:
+        return self.timestep / SLIDER_STEPS if self._lowered.has_slider else self.timestep
+
     def _build(self) -> tuple[Skeleton, tuple[Law, ...]]:
         c = self._lowered
         skeleton = (lumped_skeleton(c, self.is_angle) if self.parameters is None
                     else rudder_skeleton(c, self.parameters, self.linkage))
-        write_coefficients(skeleton, c, self.timestep)
+        write_coefficients(skeleton, c, self._step)
         twin = Twin(skeleton.spec, skeleton.inertia, skeleton.is_angle, skeleton.ratio * skeleton.K_t / skeleton.inertia)
         laws = []
         for name, values in self.effects:
@@ -169,7 +174,7 @@ class MechanicalPlant:
 
     def _stepper(self) -> Stepper:
         c, J = self._lowered, self._skeleton.inertia
-        return Stepper(self.model, c, self._laws, self.timestep, inertia=J, ratio=self._skeleton.ratio,
+        return Stepper(self.model, c, self._laws, self._step, inertia=J, ratio=self._skeleton.ratio,
                        motor_joint=self._skeleton.motor_joint, activation=self._activation())
 
     def _activation(self) -> float:
@@ -182,6 +187,9 @@ class MechanicalPlant:
         c = self._lowered
         theta, omega, drive = (*start, 0.0)[:3] if start is not None else (c.theta_0, 0.0, 0.0)
         joints = {name: (q, dq * omega) for name, (q, dq) in self._skeleton.pose(theta).items()}
+        if c.has_slider:
+            slip = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_twist
+            joints["slider"] = (theta - float(np.clip(omega / np.sqrt(c.k_twist), -slip, slip)), 0.0)
         joints["lever_up"] = (max(theta, c.theta_0), omega if theta > c.theta_0 else max(omega, 0.0) * (theta == c.theta_0))
         joints["lever_down"] = (min(theta, c.theta_0), omega if theta < c.theta_0 else min(omega, 0.0) * (theta == c.theta_0))
         return joints | {"drive": (drive, 0.0)}
@@ -197,7 +205,7 @@ class MechanicalPlant:
 
 def _viscous_asymmetry(c: Coefficients) -> Law:
     """Half the difference of viscous friction between the directions: a force even in the speed, which no damping gives."""
-    half = 0.5 * (c.a_mech_plus - c.a_mech_minus) * (1.0 - c.beta if c.two_body > 0 else 1.0)
+    half = 0.5 * (c.a_mech_plus - c.a_mech_minus) * (1.0 - c.beta if c.has_motor_side else 1.0)
     return Law("asymmetric viscous friction", np.array([half]), lambda p, theta, w, j, t: -p[0] * abs(w), None)
 
 

@@ -62,7 +62,7 @@ class Stepper:
         self.motor, self.load = (self.model.actuator(name).id for name in ("motor", "load"))
         self.tendon = self.model.tendon("rudder_angle").id
         self.rocker, self.rotor = (self._address(name) for name in ("rocker", self.motor_joint))
-        self.gap = self._address("gap") if self.c.two_body > 0 else None
+        self.gap = self._address("gap") if self.c.has_motor_side else None
         self.torques = [(law.torque, law.p) for law in self.laws if law.torque]
         self.frictions = [(law.friction, law.p) for law in self.laws if law.friction]
 
@@ -143,12 +143,17 @@ class Stepper:
         j, t, c = self._drive(v), self.data.time, self.c
         force = load + sum(torque(p, theta, w, j, t) for torque, p in self.torques)
         if self.frictions:
-            share = 1.0 - c.phi if c.two_body > 0 else 1.0
+            share = 1.0 - c.phi if c.has_motor_side else 1.0
             up, down = c.c_2_plus, c.c_2_minus
             for friction, p in self.frictions:
                 up, down = friction(p, up, theta, w, j, 1.0), friction(p, down, theta, w, j, -1.0)
-            self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
-            force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
+            level, push = 0.5 * share * self.inertia * (up + down), -0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
+            if c.has_slider:
+                dof = self.model.joint("slider").dofadr[0]
+                self.model.dof_frictionloss[dof], self.data.qfrc_applied[dof] = level, self.inertia * push
+            else:
+                self.model.tendon_frictionloss[self.tendon] = level
+                force += push
         self.data.ctrl[self.load] = self.inertia * force
 
 

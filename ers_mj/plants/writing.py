@@ -42,7 +42,7 @@ def write_coefficients(skeleton: Skeleton, c: Coefficients, timestep: float) -> 
     _write_friction(skeleton, c)
     _write_spring(skeleton, c)
     _write_stops(skeleton, c)
-    if c.two_body > 0:
+    if c.has_motor_side:
         _write_play(skeleton, c)
 
 
@@ -83,15 +83,27 @@ def _write_motor(skeleton: Skeleton, c: Coefficients) -> None:
 
 
 def _write_friction(skeleton: Skeleton, c: Coefficients) -> None:
-    """Dry and viscous friction, shared by rocker and rudder; the asymmetry of the dry one is a constant torque."""
+    """Dry and viscous friction, shared by rocker and rudder; the asymmetry of the dry one is a constant torque. A slider takes all the dry."""
     J, tendon, rocker = skeleton.inertia, skeleton.spec.tendon("rudder_angle"), skeleton.spec.joint("rocker")
-    beta, phi = (c.beta, c.phi) if c.two_body > 0 else (0.0, 0.0)
+    beta, phi = (c.beta, c.phi) if c.has_motor_side else (0.0, 0.0)
     damping, level = 0.5 * J * (c.a_mech_plus + c.a_mech_minus), 0.5 * J * (c.c_2_plus + c.c_2_minus)
     tendon.damping, rocker.damping = [(1 - beta) * damping, 0.0, 0.0], [beta * damping, 0.0, 0.0]
     tendon.frictionloss, rocker.frictionloss = (1 - phi) * level, phi * level
-    push = J * (c.bias - 0.5 * (1 - phi) * (c.c_2_plus - c.c_2_minus))
+    push, asymmetry = J * c.bias, -0.5 * J * (1 - phi) * (c.c_2_plus - c.c_2_minus)
+    if c.has_slider:
+        slider, bristle = skeleton.spec.joint("slider"), skeleton.spec.tendon("bristle")
+        tendon.frictionloss, slider.frictionloss = 0.0, level
+        bristle.stiffness, bristle.damping, bristle.springlength = [J * c.k_twist, 0.0, 0.0], [J * c.d_twist, 0.0, 0.0], [0.0, 0.0]
+        _add_push(skeleton, "asymmetry", mujoco.mjtTrn.mjTRN_JOINT, "slider", asymmetry)
+    else:
+        push += asymmetry
+    _add_push(skeleton, "bias", mujoco.mjtTrn.mjTRN_TENDON, "rudder_angle", push)
+
+
+def _add_push(skeleton: Skeleton, name: str, kind: mujoco.mjtTrn, target: str, push: float) -> None:
+    """An actuator without ctrl that exerts a constant force, if it is one."""
     if push:
-        skeleton.spec.add_actuator(name="bias", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle", gainprm=np.zeros(10),
+        skeleton.spec.add_actuator(name=name, trntype=kind, target=target, gainprm=np.zeros(10),
                                    biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[push, *[0.0] * 9])
 
 
@@ -115,7 +127,7 @@ def _write_stops(skeleton: Skeleton, c: Coefficients) -> None:
         return
     tendon, (rocker, rudder) = skeleton.spec.tendon("rudder_angle"), skeleton.local
     tendon.limited, tendon.range = True, [max(c.lower, -FAR), min(c.upper, FAR)]
-    mobility = 1.0 / rudder if c.two_body > 0 else 1.0 / (rocker + rudder)
+    mobility = 1.0 / rudder if c.has_motor_side else 1.0 / (rocker + rudder)
     tendon.solref_limit, tendon.solimp_limit = _elastic(skeleton, mobility, c.k_stop, c.d_stop), ELASTIC
 
 
