@@ -23,7 +23,7 @@ from ers_mj.plants.play import MOTOR_SHARE
 LINKAGES = ("constant", "rod")
 BODILY = ("J", "n", "K_t")  # what a datasheet must give for the rudder system in three dimensions
 LEVER_SHARE = 1e-6 / 0.0031  # of J in either lever of the preload
-SLIDER_SHARE = 1e-3  # of J in the slider, which has none in the reduced model
+SLIDER_SHARE = 2e-3  # of J in the slider, which has none in the reduced model
 ARM = 0.01417  # [m] rocker arm, n times the lead of 4 mm over 2 pi
 ROD = 0.042  # [m] length of the rod between its pins
 
