@@ -27,7 +27,7 @@ class Coefficients(NamedTuple):
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
     spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``. With rho = 0 it
-    is a slider instead (effect ``presliding``): all Coulomb friction and nothing else acts on it, the drive on the rudder.
+    is the foot of a bristle instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder.
     """
 
     a_1: float = 0.0
@@ -60,8 +60,8 @@ class Coefficients(NamedTuple):
         return self.two_body > 0 and self.rho > 0
 
     @property
-    def has_slider(self) -> bool:
-        """Whether friction acts on a slider."""
+    def has_bristle(self) -> bool:
+        """Whether friction bends a bristle first."""
         return self.two_body > 0 and self.rho <= 0
 
 
@@ -219,7 +219,7 @@ def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap:
     """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta, slack within +-gap.
 
     Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones named.
-    A slider gives way to them: friction is then rigid.
+    A bristle gives way to them: friction is then rigid.
     """
     k, d = (2 * np.pi * f) ** 2, 4 * np.pi * zeta * f
     if c.has_motor_side and c.k_twist > 0:

@@ -6,23 +6,22 @@ import numpy as np
 
 from ers_mj.effects.base import Friction, Parameter
 
-RIGID_HZ = 2000.0  # natural frequency of the bristles (against J) above which friction is rigid: 1e-4 deg of displacement in Table 1
+RIGID_HZ = 2000.0  # natural frequency of the bristle (against J) above which friction is rigid: 4e-5 deg of displacement in Table 1
 
 
 class Presliding(Friction):
-    """Coulomb friction acts on a slider without inertia, tied to the rudder by a spring-damper: F = k z + d z' until |F| = F_c.
+    """LuGre's bristle z without its Stribeck: friction k z + d z', z' = w - |w| k z / F, tends to the level F after a few x_s of motion.
 
-    k = F_c / x_s, and zeta = d / (2 sqrt(k J)). In slip the rudder feels F_c alone (and what other laws make of it), in stick it rings on
-    the spring. Near rest this is LuGre's and Dahl's bristle with sigma_0 = F_c / x_s, without their creep. Beside a play or a shaft,
-    whose second body takes its place in the plant, the effect is not there.
+    k = F_c / x_s (LuGre's sigma_0) and zeta = d / (2 sqrt(k J)); small zeta is Dahl's friction. The level F is what the other laws make
+    of F_c. Beside a play or a shaft, whose second body takes the bristle's place in the plant, the effect is not there.
     """
 
     name = "presliding"
-    sentence = "friction gives like a spring before it slips, by {x_s} at its full level"
-    mjcf = "frictionloss on a light joint slider, which a tendon's spring-damper ties to the absolute angle"
+    sentence = "friction gives like a spring before it slips: its level over its stiffness is {x_s}"
+    mjcf = "LuGre friction of a dcmotor without torque on the absolute angle (lugre), in place of frictionloss"
     parameters = (
-        Parameter("x_s", "position", "displacement at which it slips"),
-        Parameter("zeta", "ratio", "damping ratio of the spring against the inertia", lower=0.05, upper=2.0, absent=0.2),
+        Parameter("x_s", "position", "level of friction over its stiffness at rest"),
+        Parameter("zeta", "ratio", "damping ratio of that spring against the inertia", lower=0.005, upper=2.0, absent=0.2),
     )
     tries = 3
 

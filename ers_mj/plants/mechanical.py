@@ -22,7 +22,7 @@ from ers_mj.plants.stepping import Law, Stepper, step_many
 from ers_mj.plants.writing import motor_gain, write_coefficients
 
 TIMESTEP = 5e-5  # [s] RMS error on Table 1 at most 0.01 deg; twice the step, twice the error
-SLIDER_STEPS = 5  # steps for one where friction acts on a slider: its damper drags it along by one step of the rudder
+BRISTLE_STEPS = 4  # steps for one where friction bends a bristle: MuJoCo steps its force explicitly
 MAX_DELAY_SAMPLES = 4096  # history of a delayed actuator in plant.xml
 
 
@@ -153,7 +153,7 @@ class MechanicalPlant:
 
     @property
     def _step(self) -> float:
-        return self.timestep / SLIDER_STEPS if self._lowered.has_slider else self.timestep
+        return self.timestep / BRISTLE_STEPS if self._lowered.has_bristle else self.timestep
 
     def _build(self) -> tuple[Skeleton, tuple[Law, ...]]:
         c = self._lowered
@@ -168,6 +168,8 @@ class MechanicalPlant:
                 laws.append(Law(name, constants, effect.torque, effect.friction))
         if c.a_mech_plus != c.a_mech_minus:
             laws.append(_viscous_asymmetry(c))
+        if c.has_bristle and c.c_2_plus != c.c_2_minus:
+            laws.append(Law("asymmetric friction of a bristle", np.zeros(0), None, lambda p, level, theta, w, j, direction: level))
         return skeleton, tuple(laws)
 
     # -- running --
@@ -183,16 +185,15 @@ class MechanicalPlant:
         return float(np.copysign(motor_gain(s, self._lowered) * s.ratio * s.K_t / s.inertia, self._lowered.b))
 
     def _start(self, start) -> dict[str, tuple[float, float]]:
-        """{joint: (position, velocity)} and, under "drive", (acceleration, 0) for (theta, omega[, drive])."""
+        """{joint: (position, velocity)} and, under "drive" and "bristle", (acceleration or deflection, 0) for (theta, omega[, drive])."""
         c = self._lowered
         theta, omega, drive = (*start, 0.0)[:3] if start is not None else (c.theta_0, 0.0, 0.0)
         joints = {name: (q, dq * omega) for name, (q, dq) in self._skeleton.pose(theta).items()}
-        if c.has_slider:
-            slip = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_twist
-            joints["slider"] = (theta - float(np.clip(omega / np.sqrt(c.k_twist), -slip, slip)), 0.0)
         joints["lever_up"] = (max(theta, c.theta_0), omega if theta > c.theta_0 else max(omega, 0.0) * (theta == c.theta_0))
         joints["lever_down"] = (min(theta, c.theta_0), omega if theta < c.theta_0 else min(omega, 0.0) * (theta == c.theta_0))
-        return joints | {"drive": (drive, 0.0)}
+        slip = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_twist if c.has_bristle else 0.0
+        bent = float(np.clip(omega / np.sqrt(c.k_twist), -slip, slip)) if c.has_bristle else 0.0
+        return joints | {"drive": (drive, 0.0), "bristle": (bent, 0.0)}
 
     def _motion(self, t: np.ndarray, rows: np.ndarray) -> Motion:
         """Rows (N, 5) of theta, omega, theta_m, motor speed over n, drive -> Motion."""

@@ -2,8 +2,7 @@
 
 Two roads to one set of names: the rudder system in three dimensions from the folder mjcf/, for a servo with a datasheet, and
 one joint in output units (J = 1), for a plant of which only Eq. (6)'s coefficients are known. In both the joint ``rocker``
-is the output of the drive, ``gap`` the play behind it, and the tendon ``rudder_angle`` their sum, the absolute output. Where
-friction acts on a slider, that is a joint ``slider`` of its own, tied to the output by the tendon ``bristle``.
+is the output of the drive, ``gap`` the play behind it, and the tendon ``rudder_angle`` their sum, the absolute output.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from ers_mj.plants.play import MOTOR_SHARE
 LINKAGES = ("constant", "rod")
 BODILY = ("J", "n", "K_t")  # what a datasheet must give for the rudder system in three dimensions
 LEVER_SHARE = 1e-6 / 0.0031  # of J in either lever of the preload
-SLIDER_SHARE = 2e-3  # of J in the slider, which has none in the reduced model
 ARM = 0.01417  # [m] rocker arm, n times the lead of 4 mm over 2 pi
 ROD = 0.042  # [m] length of the rod between its pins
 
@@ -89,9 +87,7 @@ def rudder_skeleton(c: Coefficients, parameters: Mapping[str, float], linkage: s
         spec.equality("ratio").data[:2] = [0.0, 1.0 / n]
         if c.has_motor_side:
             spec.delete(spec.equality("gap_closed"))
-    local = _share_inertia(spec, J, n, c.rho if c.has_motor_side else MOTOR_SHARE, SLIDER_SHARE if c.has_slider else 0.0)
-    if c.has_slider:
-        _add_slider(spec, SLIDER_SHARE * J, True, ["rocker"])
+    local = _share_inertia(spec, J, n, c.rho if c.has_motor_side else MOTOR_SHARE)
     pose = _constant_pose(n) if linkage == "constant" else _rod_pose(n)
     return Skeleton(spec, J, n, parameters["K_t"], "rotor", True, pose, local)
 
@@ -104,12 +100,12 @@ def _load(name: str, has_play: bool) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(texts[name], include={key: text.encode() for key, text in texts.items()})
 
 
-def _share_inertia(spec: mujoco.MjSpec, J: float, n: float, rho: float, slider: float) -> tuple[float, float]:
-    """Make the parts sum to J at the rudder, rho of it before the play and a share left for the slider; returns that of (rocker, rudder)."""
+def _share_inertia(spec: mujoco.MjSpec, J: float, n: float, rho: float) -> tuple[float, float]:
+    """Make the parts sum to J at the rudder, rho of it before the play; returns the inertia of (rocker, rudder)."""
     nut, rocker = 3.2e-4 * rho * J, 3.2e-4 * rho * J
     rotor = (rho * J - nut - rocker) / n**2
     lever = LEVER_SHARE * J
-    rudder = (1.0 - rho - slider) * J - lever
+    rudder = (1.0 - rho) * J - lever
     spec.body("nut").mass = nut / ARM**2
     for body, inertia in {"motor": rotor, "rocker": rocker, "rudder": rudder, "lever_up": lever, "lever_down": lever}.items():
         spec.body(body).inertia = [inertia] * 3
@@ -137,7 +133,7 @@ def _rod_pose(n: float) -> Pose:
 
 
 def lumped_skeleton(c: Coefficients, is_angle: bool) -> Skeleton:
-    """One joint of inertia 1 in output units, split in two by a joint ``gap`` where c has a motor's side."""
+    """One joint of inertia 1 in output units, split in two by a joint ``gap`` where c has a second body."""
     spec = mujoco.MjSpec()
     spec.modelname = "lumped servo"
     spec.compiler.degree = False
@@ -146,18 +142,15 @@ def lumped_skeleton(c: Coefficients, is_angle: bool) -> Skeleton:
     spec.option.tolerance = 1e-12
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_DIAGEXACT
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    rho, slider = c.rho if c.has_motor_side else MOTOR_SHARE, SLIDER_SHARE if c.has_slider else 0.0
-    output, rest = ["rocker", "gap"] if c.has_motor_side else ["rocker"], 1.0 - rho - LEVER_SHARE - slider
+    rho = c.rho if c.has_motor_side else MOTOR_SHARE
     rocker = _lumped_body(spec.worldbody, "rocker", rho, is_angle, "rocker")
-    rudder = _lumped_body(rocker, "rudder", rest, is_angle, "gap" if c.has_motor_side else "")
+    rudder = _lumped_body(rocker, "rudder", 1.0 - rho - LEVER_SHARE, is_angle, "gap" if c.has_motor_side else "")
     rudder.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.3, 0.1, 0.01], pos=[0.2, 0, 0], mass=0, contype=0, conaffinity=0)
     for name in ("lever_up", "lever_down"):
         _lumped_body(spec.worldbody, name, LEVER_SHARE, is_angle, name)
-    _lumped_tendons(spec, output)
-    if slider:
-        _add_slider(spec, slider, is_angle, output)
+    _lumped_tendons(spec, ["rocker", "gap"] if c.has_motor_side else ["rocker"])
     _lumped_actuators(spec)
-    return Skeleton(spec, 1.0, 1.0, 1.0, "rocker", is_angle, lambda theta: {"rocker": (theta, 1.0)}, (rho, rest))
+    return Skeleton(spec, 1.0, 1.0, 1.0, "rocker", is_angle, lambda theta: {"rocker": (theta, 1.0)}, (rho, 1 - rho - LEVER_SHARE))
 
 
 def _lumped_body(parent: mujoco.MjsBody, name: str, inertia: float, is_angle: bool, joint: str) -> mujoco.MjsBody:
@@ -166,15 +159,6 @@ def _lumped_body(parent: mujoco.MjsBody, name: str, inertia: float, is_angle: bo
         kind = mujoco.mjtJoint.mjJNT_HINGE if is_angle else mujoco.mjtJoint.mjJNT_SLIDE
         body.add_joint(name=joint, type=kind, axis=[0, -1, 0] if is_angle else [1, 0, 0])
     return body
-
-
-def _add_slider(spec: mujoco.MjSpec, inertia: float, is_angle: bool, output: list[str]) -> None:
-    """A light body for the friction to act on, and the tendon that stretches by output minus slider."""
-    _lumped_body(spec.worldbody, "slider", inertia, is_angle, "slider")
-    bristle = spec.add_tendon(name="bristle")
-    for joint in output:
-        bristle.wrap_joint(joint, 1.0)
-    bristle.wrap_joint("slider", -1.0)
 
 
 def _lumped_tendons(spec: mujoco.MjSpec, output: list[str]) -> None:

@@ -24,6 +24,7 @@ PLAY = [0.99, 0.9999, 1e-5, 0.5, 2.0]
 OVERDAMPED = 2.0  # damping ratio of the play's rigid ends: a limit that does not pull still bounces at critical damping
 ELASTIC = [1e-4, 1e-4, 0.001, 0.5, 2.0]  # mjMINIMP: the limit's force does not depend on the other forces
 RESOLVED = 0.8  # decay rate [1/s] of a contact times h, above which a rigid limit is nearer to it than its own spring-damper
+NO_TORQUE = 1e-9  # [N m/A] the constant of a motor that only rubs
 FAR = 1e6  # [output unit] an end that is not there
 
 
@@ -83,28 +84,26 @@ def _write_motor(skeleton: Skeleton, c: Coefficients) -> None:
 
 
 def _write_friction(skeleton: Skeleton, c: Coefficients) -> None:
-    """Dry and viscous friction, shared by rocker and rudder; the asymmetry of the dry one is a constant torque. A slider takes all the dry."""
+    """Dry and viscous friction, shared by rocker and rudder; the asymmetry of the dry one is a constant torque, on a bristle a law."""
     J, tendon, rocker = skeleton.inertia, skeleton.spec.tendon("rudder_angle"), skeleton.spec.joint("rocker")
     beta, phi = (c.beta, c.phi) if c.has_motor_side else (0.0, 0.0)
     damping, level = 0.5 * J * (c.a_mech_plus + c.a_mech_minus), 0.5 * J * (c.c_2_plus + c.c_2_minus)
     tendon.damping, rocker.damping = [(1 - beta) * damping, 0.0, 0.0], [beta * damping, 0.0, 0.0]
+    push = J * (c.bias - 0.5 * (1 - phi) * (c.c_2_plus - c.c_2_minus))
+    if c.has_bristle:
+        _write_bristle(skeleton, c, level)
+        level, push = 0.0, J * c.bias
     tendon.frictionloss, rocker.frictionloss = (1 - phi) * level, phi * level
-    push, asymmetry = J * c.bias, -0.5 * J * (1 - phi) * (c.c_2_plus - c.c_2_minus)
-    if c.has_slider:
-        slider, bristle = skeleton.spec.joint("slider"), skeleton.spec.tendon("bristle")
-        tendon.frictionloss, slider.frictionloss = 0.0, level
-        bristle.stiffness, bristle.damping, bristle.springlength = [J * c.k_twist, 0.0, 0.0], [J * c.d_twist, 0.0, 0.0], [0.0, 0.0]
-        _add_push(skeleton, "asymmetry", mujoco.mjtTrn.mjTRN_JOINT, "slider", asymmetry)
-    else:
-        push += asymmetry
-    _add_push(skeleton, "bias", mujoco.mjtTrn.mjTRN_TENDON, "rudder_angle", push)
-
-
-def _add_push(skeleton: Skeleton, name: str, kind: mujoco.mjtTrn, target: str, push: float) -> None:
-    """An actuator without ctrl that exerts a constant force, if it is one."""
     if push:
-        skeleton.spec.add_actuator(name=name, trntype=kind, target=target, gainprm=np.zeros(10),
+        skeleton.spec.add_actuator(name="bias", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle", gainprm=np.zeros(10),
                                    biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[push, *[0.0] * 9])
+
+
+def _write_bristle(skeleton: Skeleton, c: Coefficients, level: float) -> None:
+    """LuGre friction, which MuJoCo has as a part of a motor: one without torque, its activation the bristle's deflection."""
+    bristle = skeleton.spec.add_actuator(name="bristle", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle")
+    bristle.set_to_dcmotor(motorconst=[NO_TORQUE, NO_TORQUE], resistance=1.0,
+                           lugre=[skeleton.inertia * c.k_twist, skeleton.inertia * c.d_twist, level, level, 1.0])
 
 
 def _write_spring(skeleton: Skeleton, c: Coefficients) -> None:
