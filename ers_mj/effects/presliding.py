@@ -23,11 +23,11 @@ class Presliding(Friction):
         Parameter("x_s", "position", "level of friction over its stiffness at rest"),
         Parameter("zeta", "ratio", "damping ratio of that spring against the inertia", lower=0.005, upper=2.0, absent=0.2),
     )
-    tries = 3
+    tries = 4
 
     def starts(self, scales):
         least, most = 2 * scales.noise, 0.02 * scales.position
-        return [np.array([x_s, 0.2]) for x_s in (most, math.sqrt(least * most), least)]
+        return [np.array([x_s, 0.5]) for x_s in np.geomspace(most, least, 4)]
 
     def coefficients(self, p, c):
         level = 0.5 * (c.c_2_plus + c.c_2_minus)
