@@ -34,6 +34,17 @@ def test_baseline_equals_an_independent_scheme_at_a_far_smaller_step(name, induc
     assert np.degrees(np.max(np.abs(ours - truth))) < 1e-3
 
 
+@pytest.mark.parametrize("x_s_deg", [1.0, 0.2])
+@pytest.mark.parametrize("name", ["multisine", "steps"])
+def test_presliding_equals_an_independent_lugre(name, x_s_deg):
+    plant = pytest.importorskip("independent_plant", reason="analysis/ is not beside the tests")
+    u, shape = INPUTS[name](T), {"form": "LuGre, constant bristle damping", "bristle_damping_ratio": 0.4}
+    lugre = {"label": "presliding", "strength": x_s_deg, "shape": shape}
+    truth = plant.simulate(dict(TABLE_1.parameters), [lugre], T, u, step=5e-6, stand=0.0).true
+    ours = ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.4]))]).simulate(T, u).theta
+    assert np.degrees(np.max(np.abs(ours - truth))) < 3e-3
+
+
 @pytest.mark.parametrize("name", ["multisine", "chirp", "ramp", "steps"])
 def test_eq_5_is_the_limit_of_vanishing_inductance(name):
     u = INPUTS[name](T)
@@ -57,6 +68,16 @@ def test_nothing_creeps_in_the_stick_band():
     assert np.ptp(table_1().simulate(T, u).theta) == 0.0
     away = table_1().simulate(T, 0.9 * c.c_2_plus / c.b * np.ones(T.size) + (c.c_1 + c.a_1 * 0.1) / c.b, start=(c.theta_0 + 0.1, 0.0))
     assert np.ptp(away.theta) == 0.0
+
+
+def test_a_bent_bristle_holds_still():
+    """Constant forces bend it once, by about x_s at nine tenths of the friction, and it does not creep; the preload's corner still holds."""
+    c = table_1().coefficients
+    sprung = ReducedModel(c, [("presliding", np.array([0.008, 0.2]))])
+    away = sprung.simulate(T, (0.3 * c.c_2_plus + c.c_1 + c.a_1 * 0.1) / c.b * np.ones(T.size), start=(c.theta_0 + 0.1, 0.0)).theta
+    assert 0.3 * 0.008 < away[-1] - away[0] < 2 * 0.008
+    assert np.ptp(away[2000:]) < 1e-9
+    assert np.ptp(sprung.simulate(T, np.full(T.size, 0.9 * c.c_1 / c.b)).theta) == 0.0
 
 
 def test_it_breaks_away_where_friction_and_preload_end():

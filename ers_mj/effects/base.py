@@ -26,7 +26,8 @@ class Coefficients(NamedTuple):
 
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
-    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``.
+    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``. With rho = 0 it
+    is the foot of a bristle instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder.
     """
 
     a_1: float = 0.0
@@ -52,6 +53,16 @@ class Coefficients(NamedTuple):
     k_twist: float = 0.0
     d_twist: float = 0.0
     gap: float = 0.0
+
+    @property
+    def has_motor_side(self) -> bool:
+        """Whether motor and rudder are two bodies."""
+        return self.two_body > 0 and self.rho > 0
+
+    @property
+    def has_bristle(self) -> bool:
+        """Whether friction bends a bristle first."""
+        return self.two_body > 0 and self.rho <= 0
 
 
 @dataclass(frozen=True)
@@ -224,9 +235,10 @@ def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap:
     """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta, slack within +-gap.
 
     Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones named.
+    A bristle gives way to them: friction is then rigid.
     """
     k, d = (2 * np.pi * f) ** 2, 4 * np.pi * zeta * f
-    if c.two_body > 0 and c.k_twist > 0:
+    if c.has_motor_side and c.k_twist > 0:
         k, d = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist)
     return c._replace(two_body=1.0, gap=c.gap + gap, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d)
 
