@@ -24,6 +24,7 @@ LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that o
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 REFITTED = 7  # candidates of the screening that are refitted
 ELSEWHERE = 3  # and those that another place than the refitted baseline finds most promising
+RENEWED = 5  # of those, how many are fitted on with Jacobians of their own
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
@@ -250,6 +251,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         ends = list(zip((name for name, _ in order), pool.map(quick, (begin for _, begin in order))))
         return {name: min((found for other, found in ends if other == name), key=total) for name, _ in starts}
 
+    def renew(item):
+        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit)
+
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
 
@@ -266,7 +270,10 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         again = refitted([(name, begin) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
                           for begins in per_place for begin in begins[1:]])
         best = [(name, min((ends[name] for ends in (first, again) if name in ends), key=total)) for name in first]
-        rough = sorted(best, key=lambda item: total(item[1]))
+        best.sort(key=lambda item: total(item[1]))
+        hopeful = [(name, found) for name, found in best if total(found) < reference][:RENEWED]
+        renewed = list(pool.map(renew, hopeful))
+        rough = sorted(renewed + [item for item in best if item[0] not in dict(hopeful)], key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
             return sorted(map(judged, rough), key=lambda c: -c.worth)
