@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class Trace:
     counts: np.ndarray
     lost: tuple[slice, ...] = ()
 
-    @property
+    @cached_property
     def sample_time(self) -> float:
         """Median step [s]."""
         return float(np.median(np.diff(self.t)))
