@@ -13,7 +13,7 @@ from ers_mj import __version__
 from ers_mj.baseline import Start
 from ers_mj.confirmation import Confirmed
 from ers_mj.datasheet import Datasheet
-from ers_mj.effects import BY_NAME
+from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.evaluation import free_run, pooled, recalibrated, scored
 from ers_mj.evidence import Evidence, RecordView, Rung
 from ers_mj.excitation import next_recording
@@ -176,11 +176,19 @@ class Case:
             factor = self.inertia if self.inertia and parameter.kind in PER_INERTIA else 1.0
             finite = bool(np.isfinite(value))
             low_high = errors.get((name, parameter.name))
-            yield {"name": parameter.name, "entry": {
+            yield {"name": parameter.name, "entry": self._per_recording(name, parameter, factor) | {
                 "value": float(value) * factor if finite else None,
                 "unit": unit_of(parameter.kind, self.output_unit, self.input_unit, bool(self.inertia)),
                 "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
                 "meaning": parameter.meaning}}
+
+    def _per_recording(self, name: str, parameter: Parameter, factor: float) -> dict:
+        """The values in every training recording of a parameter that has one of its own in each; null where the effect is absent."""
+        if not parameter.per_record:
+            return {}
+        columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
+        values = self.model.local[name][:, columns.index(parameter.name)]
+        return {"per_recording": [float(v) * factor if np.isfinite(v) else None for v in values]}
 
     def _symptom(self, name: str, values: np.ndarray) -> dict:
         """A sensor effect that was found in the data itself."""

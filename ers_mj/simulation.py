@@ -140,7 +140,7 @@ def simulate_recording(
     t, u = np.ascontiguousarray(t, float), np.ascontiguousarray(u, float)
     theta = finite(t, plant.simulate(t, u).theta)
     chosen = kernel_effects([*datasheet.effects, *effects], inertia_of(datasheet))
-    return {"t_s": t, "u_V": u, "theta_rad": _sensed(theta, chosen, noise, seed)}
+    return {"t_s": t, "u_V": u, "theta_rad": _sensed(t, theta, chosen, noise, seed)}
 
 
 def finite(t: np.ndarray, theta: np.ndarray) -> np.ndarray:
