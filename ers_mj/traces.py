@@ -55,7 +55,7 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     """
     load = -recording.load / inertia if recording.load is not None and inertia else None
     y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
-    stuck = [s for s in frozen_spans(y, recording.quantum) if not at_extreme(y, s) and np.ptp(recording.u[s]) > 0]
+    stuck = [s for s in frozen_spans(y, recording.quantum) if not at_extreme(y, s)]
     lost = (*excursions(np.where(recording.valid, y, np.nan), sigma), *stuck)
     valid = recording.valid.copy()
     for span in lost:
