@@ -56,7 +56,8 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     selection, judged = confirmed(start, chosen, held, jobs)
     progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
-    multibody = tuple(rig.rmse(models, judged.parts, jobs) for models in (judged.base_models, judged.models))
+    before = rig.rmse(judged.base_models, judged.parts, jobs)
+    multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
     progress("locating", 0.92)
     case = Case(recordings, list(holdout), datasheet, start, selection, judged, sensors, seed, rig, multibody)
     return case.told(held)

@@ -17,9 +17,6 @@ from ers_mj.plants.skeletons import bodily
 from ers_mj.traces import Trace
 
 
-TIMESTEP = 2e-4  # [s] of a plant without contacts: within 0.004 deg RMS of the default's, at a quarter of the work
-
-
 @dataclass(frozen=True)
 class Rig:
     """What the shape of the MuJoCo plant follows from: the datasheet's parameters, and whether the output is an angle."""
@@ -30,11 +27,7 @@ class Rig:
     def plant(self, model: Model) -> MechanicalPlant:
         """The identified model as a MuJoCo plant: the rudder system where the datasheet tells its inertia, one lumped joint else."""
         shape = bodily(self.parameters, self.is_angle, model.values["b"])
-        settings = {"parameters": shape, "is_angle": self.is_angle}
-        plant = MechanicalPlant(lumped(model.values), model.effects_of(), **settings, timestep=TIMESTEP)
-        if plant.stiff:
-            return MechanicalPlant(plant.coefficients, plant.effects, **settings)
-        return plant
+        return MechanicalPlant(lumped(model.values), model.effects_of(), parameters=shape, is_angle=self.is_angle)
 
     def free_run(self, model: Model, trace: Trace) -> np.ndarray:
         """Output (N,) of the MuJoCo plant under a recording's input, from the initial state that the reduced model fits."""

