@@ -311,13 +311,13 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
         model = found.model
 
 
-def converged(found: Fit, rivals: Sequence[Fit], traces: Sequence[Trace], tau: float) -> Fit:
-    """The fit carried on to its valley's floor, from its own values and from the baseline values of its rivals.
+def converged(found: Fit, rival: Fit, traces: Sequence[Trace], tau: float) -> Fit:
+    """The fit carried on to its valley's floor, from its own values and from the baseline values of a rival.
 
     Where stick and slip fork, the cost has dents of about one block's cost, in which a single descent may rest.
     """
-    starts = [replace(found.model, values=rival.model.values) for rival in rivals]
-    ends = [descend(model, traces, OBSERVER_RATE, tau, 40, FLOOR) for model in (found.model, *starts)]
+    starts = found.model, replace(found.model, values=rival.model.values)
+    ends = [descend(model, traces, OBSERVER_RATE, tau, 40, FLOOR) for model in starts]
     return min(ends, key=lambda f: f.cost)
 
 

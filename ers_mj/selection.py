@@ -281,8 +281,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         ranked = sorted(map(judged, list(pool.map(finish, rough[:close])) + rough[close:]), key=lambda c: -c.worth)
         rivals = sum(c.worth > max(ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain), 0.0) for c in ranked)
         if rivals > 1:
-            close = [c.fit for c in ranked[:rivals]]
-            ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, [f for f in close if f is not c.fit], traces, tau))), ranked[:rivals])
+            best, second = ranked[0].fit, ranked[1].fit
+            ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is best else best, traces, tau))), ranked[:rivals])
     return sorted(ranked, key=lambda c: -c.worth)
 
 

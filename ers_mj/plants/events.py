@@ -38,6 +38,7 @@ RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
 ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
 EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows
 BRISTLE_CORNER = 0.03  # the same for a rudder that no friction slows: share of c_1 h below which it bounces out of sight
+STILL = 5e-5  # share of a bristle's friction within which its rudder rests
 LEAST_LEVEL = 0.2  # of the mean friction, which laws cannot lower a bristle's beyond
 FULL = 1.0 - 1e-4  # share of its friction's level at which a bristle counts as bent to the full
 CALM = 0.2  # share of a speed, or of a twist's distance to the ends of the play, that a leap over a whole sample must leave
@@ -715,6 +716,16 @@ def _grazes(c, x, z, m, h):
 
 
 @njit(nogil=True)
+def _still(c, on, p, lawful, t, x, m, drive, tau, a_emf):
+    """Whether a rudder on a bent bristle rests: in the corner, or within STILL of the bristle's whole bend from where it would."""
+    if m[0] == 0:
+        return x[1] == 0.0 and _violation(3, c, on, p, lawful, t, x, m) <= 0
+    small = STILL * (c[C_PLUS] + c[C_MINUS])
+    return (abs(x[1]) * math.sqrt(c[K_TWIST]) < small
+            and abs(_derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1]) < small)
+
+
+@njit(nogil=True)
 def _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
     """True where a slipping body may have stopped and gone on within the step from x to z: it brakes first, speeds up last."""
     if _has_bristle(c):
@@ -891,6 +902,15 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                 else:
                     if tau <= 0:
                         x = (x[0], x[1], drive - a_emf * _drive_speed(c, x), x[3], x[4])
+                    if bristle and m[3] == 0:
+                        j = drive + (x[2] - drive) * math.exp(-h / tau) if tau > 0 else x[2]
+                        z = (x[0], x[1], j, x[3], x[4])
+                        c[BIAS] = bias + load[k]
+                        still = _still(c, on, p, lawful, now, x, m, drive, tau, a_emf) and _still(c, on, p, lawful, now + h, z, m, drive, tau, a_emf)
+                        c[BIAS] = bias
+                        if still:
+                            x = z
+                            continue
                     z, _ = _segment(e, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, np.nan)
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * _drive_speed(c, z), z[3], z[4])
