@@ -279,11 +279,25 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             return sorted(map(judged, rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         ranked = sorted(map(judged, list(pool.map(finish, rough[:close])) + rough[close:]), key=lambda c: -c.worth)
-        rivals = sum(c.worth > max(ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain), 0.0) for c in ranked)
+        rivals = len(_rivals(ranked))
         if rivals > 1:
             best, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is best else best, traces, tau))), ranked[:rivals])
-    return sorted(ranked, key=lambda c: -c.worth)
+    return _simplest_first(sorted(ranked, key=lambda c: -c.worth))
+
+
+def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates that the best one does not beat clearly, itself among them."""
+    least = max(ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain), 0.0)
+    return [c for c in ranked if c.worth > least]
+
+
+def _simplest_first(ranked: list[Candidate]) -> list[Candidate]:
+    """Of rivals the one with the fewest parameters leads: which of them the worth prefers is a matter of the last dents of the search."""
+    if not ranked:
+        return ranked
+    first = min(_rivals(ranked) or ranked[:1], key=lambda c: c.fit.size)
+    return [first, *(c for c in ranked if c is not first)]
 
 
 @dataclass(frozen=True)
