@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.effects import EFFECTS, Effect
+from ers_mj.effects import BY_NAME, EFFECTS, Effect
 from ers_mj.identification import OBSERVER_RATE, STATES, Columns, Fit, Model, converged, fit, hopped, jacobian_of, residuals, score, tau_of
 from ers_mj.traces import BLOCK, Blocks, Trace
 
@@ -293,10 +293,13 @@ def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _simplest_first(ranked: list[Candidate]) -> list[Candidate]:
-    """Of rivals the one with the fewest parameters leads: which of them the worth prefers is a matter of the last dents of the search."""
+    """Of rivals the one with the fewest parameters leads: which of them the worth prefers is a matter of the last dents of the search.
+
+    What acts in one recording only comes behind what acts in all and explains as much.
+    """
     if not ranked:
         return ranked
-    first = min(_rivals(ranked) or ranked[:1], key=lambda c: c.fit.size)
+    first = min(_rivals(ranked) or ranked[:1], key=lambda c: (c.name in BY_NAME and BY_NAME[c.name].local, c.fit.size))
     return [first, *(c for c in ranked if c is not first)]
 
 
