@@ -55,9 +55,11 @@ def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0) -> Score
 def settled(model: Model, trace: Trace, tau: float) -> Model:
     """The model for one recording that it was not fitted to.
 
-    What only that recording can tell of an effect (the phase of a gust, the time of a knock) is fitted in it, from the first values of
-    ``local``; an effect whose values there are NaN stays away.
+    What only that recording can tell of an effect is fitted in it, from the first values of ``local``: the phase of a gust on its first
+    30 %, as a record state is, and the time of a knock on all of it. An effect whose values there are NaN stays away.
     """
+    if all(BY_NAME[name].wave for name in model.local or {}):
+        trace = trace.part(0, int(RECALIBRATED * trace.t.size))
     one = replace(model.of_records([0]), free=(), frozen=model.names)
     layout = one.layout()
     if not layout:
