@@ -138,7 +138,7 @@ class Model:
 
     def _tau_bounds(self) -> tuple[float, float]:
         known = self.scales.tau_e_datasheet
-        return (0.01 * known, 2.0 * known) if known else (1e-6, 1.0)
+        return (0.1 * known, 2.0 * known) if known else (1e-6, 1.0)
 
     def vector(self, layout: Sequence[Free]) -> np.ndarray:
         """The fitted numbers, transformed (logarithm of positive ones, others over their scale)."""
