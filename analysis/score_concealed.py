@@ -106,7 +106,7 @@ def main() -> None:
             rows.append(line(case, answer(arguments.folder / case, arguments.limit), truth))
         except (subprocess.SubprocessError, json.JSONDecodeError) as error:
             print(f"{case}: no answer ({str(error)[-200:]})", file=sys.stderr)
-            rows.append({"case": case, "labels": truth["labels"], "named": [], "verdict": "no answer", "wall_s": arguments.limit,
+            rows.append({"case": case, "labels": truth["labels"], "named": [], "verdict": "no answer", "wall_s": arguments.limit, "cpu_s": arguments.limit,
                          "visibility": truth.get("visibility_after_refit_sigma"), "where": [], "before": None, "after": None, "floor": None,
                          "significant": False})
         text = json.dumps(rows[-1])
