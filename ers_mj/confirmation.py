@@ -10,7 +10,7 @@ import numpy as np
 
 from ers_mj.baseline import Start
 from ers_mj.evaluation import Fold, Score, folds, paired_p, pooled, recalibrated, refits, scored
-from ers_mj.identification import Model, fit, score
+from ers_mj.identification import Fit, Model, fit, polished, score
 from ers_mj.selection import Selection
 from ers_mj.traces import Trace
 
@@ -44,7 +44,7 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         without, p, lesser_models = {}, {}, {}
         for name in model.names:
             if len(model.names) > 1:
-                less = fit(model.without_effect(name), start.traces, tau=selection.tau, steps=12).model
+                less = _without(name, model, start, selection.tau).model
                 lesser_models[name] = refits(less, parts, selection.tau, jobs)
             else:
                 lesser_models[name] = base_models
@@ -55,8 +55,12 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         if not failed:
             return selection, Confirmed(_scores(base_models, parts), after, without, p, after_models, base_models, parts, sentence)
         worst = max(failed, key=lambda n: p[n])
-        reduced = fit(model.without_effect(worst), start.traces, tau=selection.tau, steps=15)
+        reduced = _without(worst, model, start, selection.tau)
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
+
+
+def _without(name: str, model: Model, start: Start, tau: float) -> Fit:
+    return polished(fit(model.without_effect(name), start.traces, tau=tau, steps=15), start.traces)
 
 
 def _halves(after: Score, without: Score, parts: Sequence[Fold]) -> bool:

@@ -37,6 +37,7 @@ ROUGH, QUIET = 3.0, 0.02  # median misfit up to which, and C per block from whic
 HOPELESS = 0.02  # excess of C per block over a nested model at which a search is given up
 NEAR = 0.1  # half travels by which theta_0 may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
+FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
 CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 STATES = ("gain", "offset", "friction_level")
 
@@ -132,7 +133,7 @@ class Model:
     def _of_effect(self, name: str, parameter: Parameter, index: int, value: float, local: bool = False) -> Free:
         scale = 1.0 if parameter.positive else CLOCKED.get(parameter.kind, max(abs(value), 1e-12))
         most = 1.0 / self.scales.sample_time if parameter.kind == "frequency" else np.inf
-        least = SMALLEST * self.scales.noise if parameter.kind == "position" else 1e-12
+        least = {"position": SMALLEST * self.scales.noise, "frequency": FEWEST_CYCLES / self.scales.duration}.get(parameter.kind, 1e-12)
         return Free(name, parameter.name, index, parameter.positive, scale, max(parameter.lower, least) if parameter.positive
                     else parameter.lower, min(parameter.upper, most), local=local)
 

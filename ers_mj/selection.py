@@ -22,7 +22,7 @@ LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error o
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
-REFITTED = 7  # candidates of the screening that are refitted
+REFITTED = 12  # candidates of the screening that are refitted
 ELSEWHERE = 3  # and those that another place than the refitted baseline finds most promising
 RENEWED = 5  # of those, how many are fitted on with Jacobians of their own
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
@@ -30,6 +30,7 @@ LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the scr
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
+CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 MOST_ROUNDS = 2
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
@@ -295,12 +296,20 @@ def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
 def _simplest_first(ranked: list[Candidate]) -> list[Candidate]:
     """Of rivals the one with the fewest parameters leads: which of them the worth prefers is a matter of the last dents of the search.
 
-    What acts in one recording only comes behind what acts in all and explains as much.
+    What has a clock of its own (a gust, a knock) leads only where no law of the servo itself explains CLOCKED of what it does: a swing
+    bends to whatever a repeated excitation leaves over.
     """
     if not ranked:
         return ranked
-    first = min(_rivals(ranked) or ranked[:1], key=lambda c: (c.name in BY_NAME and BY_NAME[c.name].local, c.fit.size))
+    if _clocked(ranked[0]):
+        lawful = [c for c in ranked if not _clocked(c) and c.gain >= CLOCKED * ranked[0].gain and c.z >= LEAST_Z]
+        ranked = sorted(ranked, key=lambda c: c not in lawful)
+    first = min(_rivals(ranked) or ranked[:1], key=lambda c: (_clocked(c), c.fit.size))
     return [first, *(c for c in ranked if c is not first)]
+
+
+def _clocked(candidate: Candidate) -> bool:
+    return candidate.name in BY_NAME and BY_NAME[candidate.name].local
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ers_mj.effects.base import Load, Parameter, law
 
-CYCLES = range(1, 41)  # within the longest recording, from which a fit is begun: a sine fits within one cycle only
+CYCLES = range(3, 41)  # within the longest recording, from which a fit is begun: a sine fits within one cycle only
 
 
 class PeriodicGust(Load):
