@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.effects import BY_NAME, EFFECTS, Effect
+from ers_mj.effects import BY_NAME, Effect
 from ers_mj.identification import OBSERVER_RATE, STATES, Columns, Fit, Model, converged, fit, hopped, jacobian_of, residuals, score, tau_of
 from ers_mj.traces import BLOCK, Blocks, Trace
 
@@ -22,8 +22,8 @@ LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error o
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
-REFITTED = 12  # candidates of the screening that are refitted
-ELSEWHERE = 3  # and those that another place than the refitted baseline finds most promising
+MOST_SENT = 10  # candidates of the screening that are refitted, at most
+PROMISING = 0.25  # share of the best one's promise from which a candidate is refitted
 RENEWED = 5  # of those, how many are fitted on with Jacobians of their own
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
@@ -78,30 +78,32 @@ def tie(best: Candidate, other: Candidate) -> float:
 def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Begin]]]]:
     """The promising effects, each with the models to refit: for every place, those of its best starts.
 
-    From each place (the refitted baseline, and where else a fit may start from) the secant e(with effect) - e(without) is taken at
-    the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
+    From each place (the refitted baseline first, and where else a fit may start from) the secant e(with effect) - e(without) is taken
+    at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
     largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
-    a small effect beside the noise, the second a large one that the baseline could not swallow. The baseline sends REFITTED
-    effects on, every other place ELSEWHERE.
+    a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
+    the first place: MOST_SENT at most, those with PROMISING of the best one's promise.
     """
     tried: dict[str, list[list[Begin]]] = {}
-    sent: list[str] = []
-    for place, most in zip(places, (REFITTED, *[ELSEWHERE] * len(places))):
+    for place in places:
         e = residuals(place, traces, OBSERVER_RATE)
         if not np.all(np.isfinite(e)):
             continue
         (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
-        promises = {}
-        for effect in EFFECTS:
-            if effect.name not in exclude:
-                starts = _hopeful(place, effect, effect.starts(scales), targets, traces)
-                found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
+        promises, begins = {}, {}
+        for effect in (BY_NAME[name] for name in tried or BY_NAME if name not in exclude):
+            starts = _hopeful(place, effect, effect.starts(scales), targets, traces)
+            found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
+            if found:
                 found.sort(key=lambda p: -p[0])
-                if found:
-                    promises[effect.name] = found[0][0]
-                    tried.setdefault(effect.name, []).append([Begin(model, known) for _, model in found[:effect.tries]])
-        sent += sorted(promises, key=promises.get, reverse=True)[:most]
-    return [(name, tried[name]) for name in dict.fromkeys(sent)]
+                promises[effect.name] = found[0][0]
+                begins[effect.name] = [Begin(model, known) for _, model in found[:effect.tries]]
+        if not tried:
+            best = sorted(promises, key=promises.get, reverse=True)[:MOST_SENT]
+            tried = {name: [] for name in best if promises[name] >= PROMISING * promises[best[0]]}
+        for name in tried:
+            tried[name] += [begins[name]] if name in begins else []
+    return list(tried.items())
 
 
 def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
