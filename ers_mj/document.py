@@ -84,11 +84,12 @@ class Case:
         """The document, the evidence and the model."""
         base, model, traces = self.start.fit.model, self.model, self.start.traces
         samples = gather(base, model, traces)
-        found = places(samples, traces, self.selection.rounds, self.start.fit.cost, self.output_unit, self.input_unit)
         fits, record_state = self._fits(), self._record_state(held)
         explained = self._explained(fits)
         verdict = self._verdict(explained)
         missing = self._missing() if verdict == "missing_physics" else []
+        found = places(samples, traces, self.selection.rounds, self.start.fit.cost, [m["effect"] for m in missing], self.output_unit,
+                       self.input_unit)
         document = {
             "version": 1, "verdict": verdict, "sentence": self._sentence(verdict, missing, fits, found, explained),
             "where": [] if verdict == "consistent" else [self._place(p) for p in found],

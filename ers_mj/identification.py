@@ -289,24 +289,28 @@ def tau_of(misfit: np.ndarray) -> float:
 
 
 def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25,
-        ceiling: np.ndarray | None = None, known: Columns | None = None) -> Fit:
+        ceiling: np.ndarray | None = None, known: Columns | None = None, renewals: float = math.inf) -> Fit:
     """Minimise C over the model's free numbers, from the model's own values.
 
     ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
-    given up, since its start was a bad one. ``known`` are columns of a Jacobian taken near by, with which the search begins.
+    given up, since its start was a bad one. ``known`` are columns of a Jacobian taken near by, with which the search begins; after
+    ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further.
 
     Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
     mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
     more of a search that begins near the data: one bad block would send it back to the sum of squares.)
     """
-    now = math.inf
+    now, jacobian = math.inf, None
+    if known is not None:
+        layout = model.layout()
+        jacobian = jacobian_of(model, layout, model.vector(layout), residuals(model, traces, rate), traces, rate, known)
     while True:
         misfit = Blocks.of(traces).misfit(residuals(model, traces, rate))
         sound = np.all(np.isfinite(misfit))  # a runaway has one descent to find a motion
         level = float(np.exp(np.mean(np.log(misfit + tau)))) if sound else 0.0
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
-        found = descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, known)
+        found, jacobian, renewals = _descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, jacobian, renewals)
         if last or (ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size):
             return found
         model = found.model
@@ -368,15 +372,20 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
     return replace(found, model=min(ends, key=lambda e: e[0])[1]) if ends else found
 
 
-def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, known: Columns | None = None) -> Fit:
-    """Levenberg-Marquardt on C at one ``tau``, until a step along a fresh Jacobian gains less than ``tolerance``.
+def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float) -> Fit:
+    """Levenberg-Marquardt on C at one ``tau``, until a step along a fresh Jacobian gains less than ``tolerance``."""
+    return _descend(model, traces, rate, tau, steps, tolerance, None, math.inf)[0]
 
-    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised. A search that begins
-    with ``known`` columns ends where these, updated, lead no further.
+
+def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, jacobian: np.ndarray | None,
+             renewals: float) -> tuple[Fit, np.ndarray | None, float]:
+    """See ``descend``: the fit, the Jacobian that it ended with, and how many it may still take.
+
+    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised.
     """
     layout, blocks = model.layout(), Blocks.of(traces)
     z = model.vector(layout)
-    damping, calls = 1e-3, 1
+    damping, calls, fresh = 1e-3, 1, False
 
     def evaluate(z):
         e = residuals(model.at(layout, z), traces, rate)
@@ -388,15 +397,13 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
     e, m, cost = evaluate(z)
     if m is None:
         e, m = np.full(blocks.index.size, 1e6), np.full(blocks.counts.size, 1e12)
-    jacobian, fresh = None, False
-    if known is not None:
-        jacobian = jacobian_of(model, layout, z, e, traces, rate, known)
+    hessian = np.eye(z.size)
     for _ in range(steps):
-        if jacobian is None and known is not None:
-            break
         if jacobian is None:
+            if renewals <= 0:
+                break
             jacobian, fresh = jacobian_of(model, layout, z, e, traces, rate), True
-            calls += z.size
+            calls, renewals = calls + z.size, renewals - 1
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
         weighted = jacobian * weight[:, None]
         hessian, slope = weighted.T @ jacobian, weighted.T @ e
@@ -426,10 +433,10 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
         z, (e, m, cost) = goal, trial
         damping = max(damping / 8, 1e-9)
         if gain < tolerance:
-            if was_fresh or known is not None:
+            if was_fresh or renewals <= 0:
                 break
             jacobian = None
-    return Fit(model.at(layout, z), cost, m, hessian, calls)
+    return Fit(model.at(layout, z), cost, m, hessian, calls), jacobian, renewals
 
 
 def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None):

@@ -22,16 +22,17 @@ LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error o
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
-MOST_SENT = 10  # candidates of the screening that are refitted, at most
-PROMISING = 0.25  # share of the best one's promise from which a candidate is refitted
-RENEWED = 5  # of those, how many are fitted on with Jacobians of their own
+MOST_SENT, LATER = 10, 5  # candidates of the screening that are refitted at most, in the first round and beside an effect
+PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
+RENEWALS, LAPS = 2, 8  # Jacobians of their own with which the refits go on each lap, and the most laps
+PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
-MOST_ROUNDS = 2
+MOST_ROUNDS = 3
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
 
@@ -99,8 +100,9 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
                 promises[effect.name] = found[0][0]
                 begins[effect.name] = [Begin(model, known) for _, model in found[:effect.tries]]
         if not tried:
-            best = sorted(promises, key=promises.get, reverse=True)[:MOST_SENT]
-            tried = {name: [] for name in best if promises[name] >= PROMISING * promises[best[0]]}
+            best = sorted(promises, key=promises.get, reverse=True)[:LATER if place.names else MOST_SENT]
+            tried = {name: [] for name in best
+                     if promises[name] >= (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * promises[best[0]]}
         for name in tried:
             tried[name] += [begins[name]] if name in begins else []
     return list(tried.items())
@@ -238,7 +240,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
                anchors: Sequence[Mapping[str, float]] = (), least: float = 0.0) -> list[Candidate]:
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
 
-    They are left at their first refit where none has come near the ``least`` gain that matters.
+    They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow and a
+    mimic's short. Where none comes near the ``least`` gain that matters they are left at that.
     """
     reference = float(score(base.misfit, tau).sum())
 
@@ -246,7 +249,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         return float(score(found.misfit, tau).sum())
 
     def quick(begin):
-        return fit(begin.model, traces, tau=tau, steps=QUICK, ceiling=base.misfit, known=begin.known)
+        return fit(begin.model, traces, tau=tau, steps=QUICK, ceiling=base.misfit, known=begin.known, renewals=0)
 
     def refitted(starts):
         """The best fit by name from pairs (name, Begin), those with the most parameters begun first since they take longest."""
@@ -254,8 +257,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         ends = list(zip((name for name, _ in order), pool.map(quick, (begin for _, begin in order))))
         return {name: min((found for other, found in ends if other == name), key=total) for name, _ in starts}
 
-    def renew(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit)
+    def onward(item):
+        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=RENEWALS)
 
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
@@ -272,11 +275,15 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         most = max((reference - total(f) for f in first.values()), default=0.0)
         again = refitted([(name, begin) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
                           for begins in per_place for begin in begins[1:]])
-        best = [(name, min((ends[name] for ends in (first, again) if name in ends), key=total)) for name in first]
-        best.sort(key=lambda item: total(item[1]))
-        hopeful = [(name, found) for name, found in best if total(found) < reference][:RENEWED]
-        renewed = list(pool.map(renew, hopeful))
-        rough = sorted(renewed + [item for item in best if item[0] not in dict(hopeful)], key=lambda item: total(item[1]))
+        best = {name: min((ends[name] for ends in (first, again) if name in ends), key=total) for name in first}
+        running = list(best)
+        for _ in range(LAPS):
+            leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
+            pace = max(PACE * least, PACE_SHARE * leading)
+            ends = dict(pool.map(onward, ((name, best[name]) for name in running)))
+            running = [name for name in running if total(best[name]) - total(ends[name]) > pace]
+            best |= {name: found for name, found in ends.items() if total(found) < total(best[name])}
+        rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
             return sorted(map(judged, rough), key=lambda c: -c.worth)
@@ -284,8 +291,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         ranked = sorted(map(judged, list(pool.map(finish, rough[:close])) + rough[close:]), key=lambda c: -c.worth)
         rivals = len(_rivals(ranked))
         if rivals > 1:
-            best, second = ranked[0].fit, ranked[1].fit
-            ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is best else best, traces, tau))), ranked[:rivals])
+            lead, second = ranked[0].fit, ranked[1].fit
+            ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau))), ranked[:rivals])
     return _simplest_first(sorted(ranked, key=lambda c: -c.worth))
 
 

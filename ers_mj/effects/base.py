@@ -145,6 +145,7 @@ class Effect:
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     wave: ClassVar[tuple[int, int] | None] = None  # amplitude and phase: the screening finds both from a start's two quarter periods
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
+    dear: ClassVar[bool] = False  # a simulation takes many times as long as others: refitted only where it promises most
     sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
     follows_current: ClassVar[bool] = False  # its law changes as fast as the current, or within a small angle: half the segment length
     torque: ClassVar[Callable | None] = None

@@ -23,7 +23,7 @@ class Presliding(Friction):
         Parameter("x_s", "position", "level of friction over its stiffness at rest"),
         Parameter("zeta", "ratio", "damping ratio of that spring against the inertia", lower=0.005, upper=2.0, absent=0.2),
     )
-    tries = 4
+    tries, dear = 2, True
 
     def starts(self, scales):
         least, most = 2 * scales.noise, 0.02 * scales.position

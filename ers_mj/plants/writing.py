@@ -55,7 +55,7 @@ def motor_gain(skeleton: Skeleton, c: Coefficients) -> float:
 
 def _write_solver(spec: mujoco.MjSpec, h: float) -> None:
     spec.option.timestep = h
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
     for part in [*spec.joints, *spec.tendons]:
         part.solref_limit = part.solref_friction = [2 * h, 1.0]
         part.solimp_limit = part.solimp_friction = RIGID
