@@ -35,7 +35,7 @@ SOFT = 3  # directions along which a fit hops, of least curvature
 HOP_GAIN = 0.3  # of C that a hop must win to be followed by further ones
 ROUGH, QUIET = 3.0, 0.02  # median misfit up to which, and C per block from which, a fit hops
 HOPELESS = 0.02  # excess of C per block over a nested model at which a search is given up
-NEAR = 0.1  # half travels by which theta_0 may lie beyond the travel
+NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
 FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
 CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
@@ -103,8 +103,7 @@ class Model:
             positive = name not in ("theta_0", "b") or name == "b"
             lower, upper = (1e-9, np.inf)
             if name == "theta_0":
-                near = NEAR * self.scales.position
-                positive, lower, upper = False, self.scales.low - near, self.scales.high + near
+                positive, (lower, upper) = False, self._near_travel()
             if name == "emf_share":
                 lower, upper = 0.02, 0.999
             if name == "tau_e":
@@ -134,8 +133,13 @@ class Model:
         scale = 1.0 if parameter.positive else CLOCKED.get(parameter.kind, max(abs(value), 1e-12))
         most = 1.0 / self.scales.sample_time if parameter.kind == "frequency" else np.inf
         least = {"position": SMALLEST * self.scales.noise, "frequency": FEWEST_CYCLES / self.scales.duration}.get(parameter.kind, 1e-12)
-        return Free(name, parameter.name, index, parameter.positive, scale, max(parameter.lower, least) if parameter.positive
-                    else parameter.lower, min(parameter.upper, most), local=local)
+        lower = max(parameter.lower, least) if parameter.positive else parameter.lower
+        ends = self._near_travel() if parameter.on_travel else (lower, min(parameter.upper, most))
+        return Free(name, parameter.name, index, parameter.positive, scale, *ends, local=local)
+
+    def _near_travel(self) -> tuple[float, float]:
+        near = NEAR * self.scales.position
+        return self.scales.low - near, self.scales.high + near
 
     def _tau_bounds(self) -> tuple[float, float]:
         known = self.scales.tau_e_datasheet

@@ -24,7 +24,8 @@ LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that o
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 MOST_SENT, LATER = 10, 5  # candidates of the screening that are refitted at most, in the first round and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
-RENEWALS, LAPS = 2, 8  # Jacobians of their own with which the refits go on each lap, and the most laps
+RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
+LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
@@ -277,7 +278,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
                           for begins in per_place for begin in begins[1:]])
         best = {name: min((ends[name] for ends in (first, again) if name in ends), key=total) for name in first}
         running = list(best)
-        for _ in range(LAPS):
+        for _ in range(LATER_LAPS if base.model.names else LAPS):
             leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
             pace = max(PACE * least, PACE_SHARE * leading)
             ends = dict(pool.map(onward, ((name, best[name]) for name in running)))

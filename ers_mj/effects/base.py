@@ -97,7 +97,8 @@ class Parameter:
 
     ``kind`` names its dimension: torque, damping, stiffness, drag, cubic (all carried per inertia), position, speed,
     input, time, frequency, phase, ratio, count, per_position, per_position_squared. ``positive`` parameters are fitted in their
-    logarithm; those not ``fitted`` keep the value they start with; those ``per_record`` are another number in every recording.
+    logarithm; those not ``fitted`` keep the value they start with; those ``per_record`` are another number in every recording; those
+    ``on_travel`` are places that the travel reaches, or nearly.
     """
 
     name: str
@@ -109,6 +110,7 @@ class Parameter:
     absent: float = 0.0
     fitted: bool = True
     per_record: bool = False
+    on_travel: bool = False
 
 
 @dataclass(frozen=True)
