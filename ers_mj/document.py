@@ -245,11 +245,11 @@ class Case:
         known = self.datasheet.to_lumped() if self.datasheet is not None else {}
         y, u = self.output_unit, self.input_unit
         units = {"a_1": "1/s^2", "a_2": "1/s", "b": f"{y}/s^2/{u}", "c_1": f"{y}/s^2", "c_2": f"{y}/s^2", "theta_0": y, "tau_e": "s",
-                 "emf_share": "-"}
+                 "emf_share": "-", "ampere": f"{y}/s^2/A"}
         rows, errors = {}, self._errors()
         for name in BASE:
             fitted = ("base", name) in errors
-            if not fitted and name in ("tau_e", "emf_share"):
+            if not fitted and name in ("tau_e", "emf_share", "ampere"):
                 continue
             absent = name in ("a_1", "c_1") and self.model.values[name] == 0
             value = float(self.model.values[name]) if fitted or absent else None
@@ -265,7 +265,7 @@ class Case:
         """The combinations of Table 1's letters that position and voltage can tell (notes in the README)."""
         if self.datasheet is None or not self.datasheet.parameters:
             return {}
-        named = {"k_s/J": "a_1", "n K_t/(J R)": "b", "T_LH/J": "c_1", "F_c/J": "c_2", "L/R": "tau_e"}
+        named = {"k_s/J": "a_1", "n K_t/(J R)": "b", "T_LH/J": "c_1", "F_c/J": "c_2", "L/R": "tau_e", "n K_t/J": "ampere"}
         return {combination: rows[name] for combination, name in named.items() if name in rows}
 
     def _record_state(self, held: list[Trace]) -> list[dict]:

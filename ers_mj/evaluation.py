@@ -49,7 +49,7 @@ def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0) -> Score
     e = np.where(trace.valid, trace.y - free_run(model, trace, record), 0.0)[begin:]
     e = np.nan_to_num(e, nan=10 * float(np.nanstd(trace.y)))
     local = np.where(trace.valid, (trace.y - model.predict(trace, record, OBSERVER_RATE)) / trace.sigma, 0.0)
-    return Score(float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)))
+    return Score(float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([replace(trace, channels=())]).misfit(np.nan_to_num(local, nan=1e6)))
 
 
 def settled(model: Model, trace: Trace, tau: float) -> Model:
@@ -127,7 +127,7 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     pair = replace(model, states=None, local=known or None, free=(), frozen=held).with_state("gain", 2).with_state("friction_level", 2)
     if model.values["a_1"] > 0 or model.values["c_1"] > 0:
         pair = pair.with_state("offset", 2)
-    blank = replace(head, valid=np.zeros(head.t.size, bool), counts=np.zeros_like(head.counts))
+    blank = replace(head, valid=np.zeros(head.t.size, bool), counts=np.zeros_like(head.counts), channels=())
     misfit = Blocks.of([blank, head]).misfit(residuals(pair, [blank, head], OBSERVER_RATE))
     tau = tau_of(misfit[blank.counts.size:])
     found = fit(pair, [blank, head], tau=tau, steps=10)

@@ -23,7 +23,8 @@ from ers_mj.traces import Blocks, Trace, parabola_start, start_samples
 OBSERVER_RATE = 5.0  # [1/s]
 OBSERVER_STEP = 0.005  # [s] between corrections of the observer
 DIFFERENCE = 1e-4  # step of the finite differences in transformed parameters
-BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share")
+BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share", "ampere")
+SIGNED = ("b", "ampere")  # fitted by size, their sign kept
 STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
 POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
@@ -100,7 +101,7 @@ class Model:
         out = []
         held = {name for effect, _ in self.effects for name in BY_NAME[effect].absorbs}
         for name in (n for n in self.free if n not in held):
-            positive = name not in ("theta_0", "b") or name == "b"
+            positive = name != "theta_0"
             lower, upper = (1e-9, np.inf)
             if name == "theta_0":
                 positive, (lower, upper) = False, self._near_travel()
@@ -170,7 +171,7 @@ class Model:
             v = math.exp(min(q, 60.0)) if f.positive else q * f.scale
             v = min(max(v, f.lower), f.upper)
             if f.owner == "base":
-                values[f.name] = math.copysign(v, self.values["b"]) if f.name == "b" else v
+                values[f.name] = math.copysign(v, self.values[f.name]) if f.name in SIGNED else v
             elif f.owner in STATES:
                 states[f.owner][f.index] = v
             elif f.local:
@@ -238,13 +239,24 @@ class Model:
         plant, run = self._run(trace, record, rate, start)
         return plant.theta(trace.t, trace.u, **run) + self.offset(record)
 
+    def observed(self, trace: Trace, record: int, rate: float) -> list[np.ndarray]:
+        """What ``predict`` gives, and behind it what each further channel of the recording would show, (N,) each."""
+        plant, run = self._run(trace, record, rate, None)
+        theta, motion = plant.outputs(trace.t, trace.u, **run)
+        out = [theta + self.offset(record)]
+        for channel in trace.channels:
+            out.append({"speed": lambda: motion[:, 1], "motor": lambda: motion[:, 3],
+                        "current": lambda: plant.current(trace.t, motion) / self.values["ampere"]}[channel.kind]())
+        return out
+
     def first_orders(self, traces: Sequence[Trace], rate: float, name: str, starts: Sequence[np.ndarray]) -> np.ndarray:
-        """First-order change of the predictions (len(starts), all samples) by the law of one more effect, at each of its starts."""
+        """First-order change of the predicted outputs (len(starts), all residuals; none of the channels) by the law of one more effect, at each of its starts."""
         columns = []
         for k, trace in enumerate(traces):
             plant, run = self._run(trace, k, rate, None)
             path, clock = plant.path(trace.t, trace.u, **run), {key: run[key] for key in ("gain", "every")}
-            columns.append([plant.first_order(trace.t, path, name, start, **clock) for start in starts])
+            rest = np.zeros(trace.rows - trace.t.size)
+            columns.append([np.concatenate([plant.first_order(trace.t, path, name, start, **clock), rest]) for start in starts])
         return np.concatenate(columns, axis=1)
 
     def _run(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
@@ -274,11 +286,13 @@ class Fit:
 
 
 def residuals(model: Model, traces: Sequence[Trace], rate: float) -> np.ndarray:
-    """y - y_hat over all traces, in sigmas of each, 0 where a sample is not valid; NaN where the simulation ran away."""
+    """y - y_hat over all traces and their channels, in sigmas of each, 0 where a sample is missing; NaN where the simulation ran away."""
     parts = []
     for k, trace in enumerate(traces):
-        e = (trace.y - model.predict(trace, k, rate)) / trace.sigma
-        parts.append(np.where(trace.valid, e, 0.0))
+        theta, *others = model.observed(trace, k, rate)
+        parts.append(np.where(trace.valid, (trace.y - theta) / trace.sigma, 0.0))
+        for channel, seen in zip(trace.channels, others):
+            parts.append(np.where(np.isfinite(channel.values), (channel.values - seen) / channel.sigma, 0.0))
     return np.concatenate(parts)
 
 

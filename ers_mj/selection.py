@@ -113,14 +113,14 @@ def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, tr
     """Of many starts of a law, those that promise most to first order along the place's own motion."""
     if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or place.plant().coupled:
         return starts
-    sigma = np.concatenate([np.full(t.y.size, t.sigma) for t in traces])
-    valid = np.concatenate([t.valid for t in traces])
+    sigma = np.concatenate([np.full(t.rows, t.sigma) for t in traces])
+    valid = np.concatenate([np.pad(t.valid, (0, t.rows - t.t.size)) for t in traces])
     groups = _groups(effect, traces)
     waves = 2 if effect.wave else 1
     every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
     changes = np.where(valid, -place.first_orders(traces, OBSERVER_RATE, effect.name, every) / sigma, 0.0)
     if "record" in (names := [p.name for p in effect.parameters]):
-        record = np.repeat(np.arange(len(traces)), [t.y.size for t in traces])
+        record = np.repeat(np.arange(len(traces)), [t.rows for t in traces])
         changes *= np.array([s[names.index("record")] for s in every])[:, None] == record
     shares = [max(_mixed(_split(changes[i:i + waves], groups), target)[0] if effect.signed else _explained(changes[i], target, False)[0]
                   for target in targets) for i in range(0, len(every), waves)]
@@ -198,7 +198,7 @@ def _quarter(effect: Effect, start: np.ndarray) -> np.ndarray:
 
 def _groups(effect: Effect, traces: Sequence[Trace]) -> np.ndarray:
     """For each sample (N,) the number of what may have a phase of its own: its recording, or 0 for all."""
-    return np.repeat(np.arange(len(traces)) if effect.local and effect.wave else np.zeros(len(traces), int), [t.y.size for t in traces])
+    return np.repeat(np.arange(len(traces)) if effect.local and effect.wave else np.zeros(len(traces), int), [t.rows for t in traces])
 
 
 def _split(changes, groups: np.ndarray) -> np.ndarray:
@@ -209,8 +209,8 @@ def _split(changes, groups: np.ndarray) -> np.ndarray:
 def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int, float, float], ...]:
     """Spans (recording, begin [s], length [s]) around the blocks of largest misfit: where something may have knocked."""
     blocks = Blocks.of(traces)
-    record = np.repeat(np.arange(len(traces)), [t.counts.size for t in traces])
-    within = np.concatenate([np.arange(t.counts.size) for t in traces])
+    record = np.repeat(np.arange(len(traces)), [t.counts.size * (1 + len(t.channels)) for t in traces])
+    within = np.concatenate([np.tile(np.arange(t.counts.size), 1 + len(t.channels)) for t in traces])
     worst = np.argsort(-score(blocks.misfit(e), tau), kind="stable")[:HOTTEST]
     return tuple((int(record[b]), float(traces[record[b]].t[0] + within[b] * BLOCK), length) for b in worst for length in KNOCKS)
 

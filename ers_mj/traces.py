@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ers_mj.recording import Recording
-from ers_mj.symptoms import at_extreme, excursions, frozen_spans
+from ers_mj.symptoms import at_extreme, converter_step, excursions, frozen_spans
 
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
@@ -18,8 +18,20 @@ START_SAMPLES = 10
 
 
 @dataclass(frozen=True)
+class Channel:
+    """What another sensor saw, (N,) on the output's side of the gear: "current" [A], "speed" or "motor" angle; NaN where missing."""
+
+    kind: str
+    values: np.ndarray
+    sigma: float
+
+
+@dataclass(frozen=True)
 class Trace:
-    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the state it starts in, and the spans that its sensor lost."""
+    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the state it starts in, and the spans that its sensor lost.
+
+    ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output.
+    """
 
     name: str
     t: np.ndarray
@@ -34,6 +46,7 @@ class Trace:
     block: np.ndarray
     counts: np.ndarray
     lost: tuple[slice, ...] = ()
+    channels: tuple[Channel, ...] = ()
 
     @cached_property
     def sample_time(self) -> float:
@@ -44,8 +57,14 @@ class Trace:
         """Samples begin..end as a trace of their own."""
         cut = slice(begin, end)
         pick = lambda a: None if a is None else a[cut]  # noqa: E731
-        return make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
+        made = make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
                           pick(self.load), self.sigma, self.quantum)
+        return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels))
+
+    @property
+    def rows(self) -> int:
+        """Residuals that the recording gives: samples times (1 + channels)."""
+        return self.t.size * (1 + len(self.channels))
 
 
 def trace_of(recording: Recording, inertia: float | None) -> Trace:
@@ -61,7 +80,27 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     for span in lost:
         valid[span] = False
     trace = make_trace(recording.name, recording.t, recording.u, y, valid, recording.enable, load, sigma, recording.quantum)
-    return replace(trace, lost=lost)
+    return replace(trace, lost=lost, channels=_channels(recording, valid))
+
+
+def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
+    """The current, the speed and the motor's angle where a recording holds them and they vary.
+
+    The motor's angle is brought to the output's side of the gear by a straight line through both, so that ratio and zero are not judged.
+    """
+    found = []
+    for kind, values in (("current", recording.current), ("speed", recording.omega), ("motor", recording.theta_m)):
+        if values is None or recording.output_unit != "rad" and kind != "current":
+            continue
+        known = np.isfinite(values)
+        if known.mean() < 0.8 or np.ptp(values[known]) == 0:
+            continue
+        if kind == "motor":
+            both = known & valid
+            slope, zero = np.polyfit(recording.y[both], values[both], 1)
+            values = (values - zero) / slope
+        found.append(Channel(kind, np.ascontiguousarray(values), noise_sigma(values[known], converter_step(values[known]))))
+    return tuple(found)
 
 
 def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
@@ -117,10 +156,12 @@ class Blocks:
     def of(traces: Sequence[Trace]) -> Blocks:
         index, counts, base = [], [], 0
         for trace in traces:
-            index.append(trace.block + base)
-            counts.append(trace.counts)
-            base += trace.counts.size
-        return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0))
+            every = [trace.counts, *(np.bincount(trace.block[np.isfinite(c.values)], minlength=trace.counts.size) for c in trace.channels)]
+            for count in every:
+                index.append(trace.block + base)
+                counts.append(count)
+                base += count.size
+        return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0).astype(float))
 
     def misfit(self, e: np.ndarray) -> np.ndarray:
         """Mean squared residual (in sigmas) of each block."""

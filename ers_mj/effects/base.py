@@ -192,6 +192,10 @@ class Effect:
         """What the sensor reads (N,) at times t (N,) of the true output y (N,)."""
         return y
 
+    def winding(self, p: np.ndarray, c: Coefficients, t: np.ndarray, motion: np.ndarray, j: np.ndarray) -> np.ndarray:
+        """n K_t i / J (N,) of the winding's current where the law takes it from the drive acceleration j (N,) of a motion (N, 4)."""
+        return j
+
     def edit_spec(self, p: np.ndarray, c: Coefficients, twin: Twin) -> bool:
         """Write the effect's elements into the MJCF; False where the stepping has to apply its law instead.
 

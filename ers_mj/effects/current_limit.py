@@ -21,6 +21,9 @@ class CurrentLimit(Drive):
     def torque(p, theta, w, j, t):
         return min(max(j, -p[0]), p[0]) - j
 
+    def winding(self, p, c, t, motion, j):
+        return np.clip(j, -p[0], p[0])
+
     def edit_spec(self, p, c, twin):
         if np.isfinite(p[0]):
             most = p[0] / twin.ampere

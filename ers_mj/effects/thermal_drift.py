@@ -29,3 +29,6 @@ class ThermalDrift(Drive):
     def torque(p, theta, w, j, t):
         drift = -p[0] * math.expm1(-t / p[1])
         return -j * drift / (1.0 + drift)
+
+    def winding(self, p, c, t, motion, j):
+        return j / (1.0 - p[0] * np.expm1(-t / p[1]))

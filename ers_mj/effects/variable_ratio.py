@@ -38,3 +38,7 @@ class VariableRatio(Transmission):
         x = theta - p[2]
         change = max(p[0] * x + p[1] * x * x, LEAST - 1.0)
         return change * (j - (1.0 + change) * p[3] * w)
+
+    def winding(self, p, c, t, motion, j):
+        x = motion[:, 0] - c.theta_0
+        return j - np.maximum(p[0] * x + p[1] * x * x, LEAST - 1.0) * c.a_emf * motion[:, 1]

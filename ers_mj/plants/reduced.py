@@ -88,12 +88,24 @@ class ReducedModel:
         ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool. An observer beside a
         sensor effect runs twice: what the sensor adds on the first way is taken off the measurement on the second.
         """
-        theta = self._run(t, u, start, enable, load, y, gain, every, 1)[:, 0]
+        return self.outputs(t, u, start, enable=enable, load=load, y=y, gain=gain, every=every)[0]
+
+    def outputs(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> tuple[np.ndarray, np.ndarray]:
+        """As ``theta``, with the motion (N, 4) beside it: theta, omega, drive acceleration and motor side's angle."""
+        motion = self._run(t, u, start, enable, load, y, gain, every, 1)
+        theta = motion[:, 0]
         read = self.read(t, theta)
         if read is not theta and gain > 0:
-            theta = self._run(t, u, start, enable, load, y - (read - theta), gain, every, 1)[:, 0]
-            read = self.read(t, theta)
-        return read
+            motion = self._run(t, u, start, enable, load, y - (read - theta), gain, every, 1)
+            read = self.read(t, motion[:, 0])
+        return read, motion
+
+    def current(self, t: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """n K_t i / J (N,) of the winding's current along a motion (N, 4): what effects take from the drive acceleration is not in it."""
+        j = motion[:, 2]
+        for name, values in self.effects:
+            j = BY_NAME[name].winding(values, self.coefficients, t, motion, j)
+        return j
 
     def path(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
         """(N, 4): theta, omega, drive acceleration and motor side's angle of the run that ``theta`` makes."""
