@@ -467,7 +467,7 @@ def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitat
         words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas.{lead}")
     elif never:
         most = max(max(told[n]["channels_sigmas"].values()) for n in never)
-        words.append(f"Nor would {_listed([CALLED[c] for c in CHANNELS], "or")} ({most:.1g} sigmas at most): only a change of the rig can, such as taking the load off "
+        words.append(f"Nor would {_listed(CALLED.values(), 'or')} ({most:.1g} sigmas at most): only a change of the rig can, such as taking the load off "
                      "or turning it over.")
     return " ".join(words)
 
