@@ -1,166 +1,50 @@
-"""What to record next: the input, or the further channel, under which the explanations that are left differ most after a refit.
+"""What to record next: the input, or the further channel, that would settle what the recordings at hand leave open.
 
-T-optimal design (Atkinson and Fedorov 1975) in the currency of the diagnosis, the block cost C. Of each pair the richer model plays
-the rig and the other one answers, in the observer form that a diagnosis would judge it in. Its parameters may move to swallow the
-difference, as far as the recordings at hand let them: the curvature of their C is the price. What then remains is what
-another recording would tell. The best input is checked at full length, on noise, by true refits both ways.
+Where explanations are left, the input under which they differ most after a refit (design.py); where none is, the one that narrows
+the intervals of what was named. Everything is simulated within the limits that the recordings show.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from ers_mj.design import CHANNELS, DESIGN_RATE, SETTLED, Bench, Check, Design, Explanation, Pair, channels, checked, designed, solved
 from ers_mj.effects import BY_NAME
-from ers_mj.excitation import GENTLE, SHARES, Limits, excitations, signal
-from ers_mj.identification import DIFFERENCE, OBSERVER_RATE, STATES, Fit, Free, Model, tau_of
-from ers_mj.traces import Blocks, Trace, make_trace
+from ers_mj.excitation import GENTLE, SHARES, Limits, excitations
+from ers_mj.identification import STATES, Fit, Model, tau_of
+from ers_mj.traces import Blocks, Trace
 
 RIVALS = 2  # explanations beside the leader that an input is designed against, the most probable first
-DESIGN, DESIGN_SAMPLES = 3.0, 3000  # [s] and samples, whichever is longer, of the short recording that inputs are ranked on
-DESIGN_RATE, CHECK_RATE = 1000.0, 2000.0  # [Hz] up to which inputs are ranked and checked: the events between samples are exact
-REFITTED = 8  # inputs at most for which the linear refit is taken
-CHECKED = 2  # of these, how many at most are simulated at full length
-SETTLED = math.log(19.0)  # of C: odds at which the wrong one has a probability of 5 %
 PATIENCE = 10  # recordings of one kind that nobody wants to make more than
-STEPS = 8  # of a true refit
-LEAST_STEP = 0.01  # of C, at which it ends
-CHANNELS: Mapping[str, float | None] = {"i_A": 0.01, "theta_m_rad": None, "vin_V": 0.005}  # noise over the peak (None: the output's own)
+WIDER = 1.0  # of the travel seen, that is asked for at either end where the travel seen does not do
 CALLED = {"i_A": "the current (i_A)", "theta_m_rad": "the motor's angle (theta_m_rad)", "vin_V": "the supply voltage (vin_V)"}
 LOOSE = ("emf_share", "tau_e")  # numbers of the baseline that a datasheet knows better than any recording of the output
 
 
-@dataclass(frozen=True)
-class Explanation:
-    """A fitted model made ready for a recording that does not exist yet.
+def next_recording(leader: tuple[str, Fit], rivals: Sequence[tuple[str, Fit, float]], traces: Sequence[Trace],
+                   input_unit: str, output_unit: str) -> dict:
+    """{"sentence", "excitation", "separates", "expected_sigmas", "channel", "checked"}: what would settle most.
 
-    That recording is number 1 of two: what differs from one to the next is free in it. ``known`` (k, k) is the curvature of C over the
-    recordings at hand, in the numbers z (k,) of ``layout``.
-    """
-
-    name: str
-    model: Model
-    layout: Sequence[Free]
-    z: np.ndarray
-    known: np.ndarray
-
-    @staticmethod
-    def of(name: str, found: Fit) -> Explanation:
-        model = found.model.of_records([0, 0])
-        for state in found.model.states or {}:
-            model = model.with_state(state, 2)
-        layout = model.layout()
-        return Explanation(name, model, layout, model.vector(layout), _known(found, layout))
-
-    def at(self, z: np.ndarray) -> Model:
-        """The model with other numbers."""
-        return self.model.at(self.layout, z)
-
-
-def _known(found: Fit, layout: Sequence[Free]) -> np.ndarray:
-    """The curvature of the fit in the numbers of another layout; what belongs to one recording only is refitted beside them."""
-    old = found.model.layout()
-    if len(old) != found.size:
-        raise ValueError(f"the fit's curvature is of {found.size} numbers, its model has {len(old)}")
-    shared = [i for i, f in enumerate(old) if not f.local and f.owner not in STATES]
-    single = [i for i in range(len(old)) if i not in shared]
-    curvature = found.hessian[np.ix_(shared, shared)]
-    if single:
-        cross = found.hessian[np.ix_(shared, single)]
-        curvature = curvature - cross @ np.linalg.pinv(found.hessian[np.ix_(single, single)], rcond=1e-12) @ cross.T
-    place = {old[i].key: k for k, i in enumerate(shared)}
-    out = np.zeros((len(layout), len(layout)))
-    both = [(i, place[f.key]) for i, f in enumerate(layout) if not f.local and f.owner not in STATES and f.key in place]
-    new, known = ([pair[k] for pair in both] for k in (0, 1))
-    out[np.ix_(new, new)] = curvature[np.ix_(known, known)]
-    for i, f in enumerate(layout):
-        if f.prior and (f.local or f.owner in STATES):
-            out[i, i] += 1.0 / f.prior[1] ** 2
-    return out
-
-
-@dataclass
-class Bench:
-    """Where explanations are tried out: the limits, the noise [output unit], and the ``level`` of misfit that the leader leaves (1: noise)."""
-
-    limits: Limits
-    sigma: float
-    level: float
-    tau: float
-    simulations: int = 0
-
-    @property
-    def floor(self) -> float:
-        """What a block of misfit stands above in C."""
-        return self.tau + self.level
-
-    def trace(self, excitation: Mapping, duration: float, rate: float) -> Trace:
-        """An empty recording of an excitation."""
-        t, u = signal({**excitation, "duration_s": duration, "rate_hz": min(rate, excitation["rate_hz"])})
-        empty = make_trace("next", t, u, np.zeros(t.size), np.ones(t.size, bool), None, None, self.sigma, 0.0)
-        return replace(empty, start=(excitation["start"], 0.0))
-
-    def filled(self, model: Model, trace: Trace) -> Trace | None:
-        """The recording as the model would make it, without noise; None where the motion leaves the limits."""
-        self.simulations += 1
-        y = model.predict(trace, 1)
-        return replace(trace, y=y) if self.limits.holds(y) else None
-
-    def misses(self, model: Model, trace: Trace) -> np.ndarray:
-        """What the model misses of a filled recording (N,) [sigma], in observer form."""
-        self.simulations += 1
-        return (trace.y - model.predict(trace, 1, OBSERVER_RATE)) / trace.sigma
-
-    def slopes(self, one: Explanation, z: np.ndarray, e: np.ndarray, trace: Trace) -> np.ndarray:
-        """Finite differences (N, k) of ``misses``."""
-        columns = [(self.misses(one.at(z + DIFFERENCE * row), trace) - e) / DIFFERENCE for row in np.eye(z.size)]
-        return np.nan_to_num(np.column_stack(columns), nan=0.0, posinf=0.0, neginf=0.0)
-
-    def further(self, model: Model, trace: Trace) -> dict[str, np.ndarray]:
-        """What CHANNELS would read (N,): the motor's torque for the current, the motor's side, and the share of the supply that is left."""
-        self.simulations += 1
-        plant, run = model._run(trace, 1, OBSERVER_RATE, None)
-        path = plant.path(trace.t, trace.u, **run)
-        added = plant.read(trace.t, path[:, 0]) - path[:, 0]
-        if np.any(added):
-            path = plant.path(trace.t, trace.u, **{**run, "y": run["y"] - added})
-        theta, omega, drive, theta_m = path.T
-        current, supply = drive.copy(), np.ones(theta.size)
-        for name, values in plant.effects:
-            if _electric(name):
-                constants = tuple(BY_NAME[name].constants(values, plant.coefficients).tolist())
-                rows = zip(theta.tolist(), omega.tolist(), drive.tolist(), trace.t.tolist())
-                more = np.array([BY_NAME[name].torque.py_func(constants, *row) for row in rows])
-                current += more
-                if name == "supply_sag":
-                    supply += more / np.where(drive == 0.0, 1.0, drive)
-        return {"i_A": current, "theta_m_rad": theta_m if plant.coupled else theta, "vin_V": supply}
-
-    def cost(self, misfit: np.ndarray) -> float:
-        """C beyond the leader's of blocks that miss this much (B,) more than it does."""
-        return float(np.sum(np.log1p(misfit / self.floor)))
-
-
-def next_recording(leader: tuple[str, Fit], rivals: Sequence[tuple[str, Fit, float]], traces: Sequence[Trace], input_unit: str) -> dict:
-    """{"sentence", "excitation", "separates", "expected_sigmas", "checked"}, by simulation within the limits of the recordings.
+    ``expected_sigmas`` belongs to the rival that differs least: sqrt(2 C) of what remains after its refit.
 
     Args:
         leader: name and fit of the answer (of the baseline, where nothing is named).
         rivals: name, fit and probability of what the recordings do not exclude, on the same recordings.
         traces: the recordings at hand.
-        input_unit: of u.
+        input_unit, output_unit: of u and of the output.
     """
-    first = Explanation.of(*leader)
-    others = sorted((r for r in rivals if not _once(r[1].model)), key=lambda r: -r[2])[:RIVALS]
-    level, values = max(float(np.median(leader[1].misfit)), 1.0), leader[1].model.values
+    values, level = leader[1].model.values, max(float(np.median(leader[1].misfit)), 1.0)
     bench = Bench(Limits.of(traces, values["a_1"] > 0 or values["c_1"] > 0), float(np.median([t.sigma for t in traces])), level,
                   tau_of(leader[1].misfit))
+    first, units = Explanation.of(*leader), {"input_unit": input_unit, "output_unit": output_unit}
+    others = sorted((r for r in rivals if not _once(r[1].model)), key=lambda r: -r[2])[:RIVALS]
     if not others or _once(leader[1].model):
-        return _to_know_better(first, bench, input_unit)
-    return _to_separate(first, [Explanation.of(name, found) for name, found, _ in others], bench, input_unit)
+        return _to_know_better(first, bench, units)
+    return _to_separate(first, [Explanation.of(name, found) for name, found, _ in others], bench, units)
 
 
 def _once(model: Model) -> bool:
@@ -168,222 +52,37 @@ def _once(model: Model) -> bool:
     return any(p.name == "record" for name in model.names for p in BY_NAME[name].parameters)
 
 
-# -- telling explanations apart ---------------------------------------------------------------------------------------
+# -- where explanations are left --------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Two explanations: the one that plays the rig, which is the richer, and the one that answers."""
-
-    rig: Explanation
-    answer: Explanation
-
-    @staticmethod
-    def of(one: Explanation, other: Explanation) -> Pair:
-        return Pair(other, one) if other.z.size > one.z.size else Pair(one, other)
-
-
-@dataclass(frozen=True)
-class Check:
-    """What remains between two explanations after a true refit: in C, RMS [sigma], and how sure they are then told apart."""
-
-    cost: float
-    rms: float
-    sure: float
-    noisy: float
-    z: np.ndarray
-
-    @property
-    def sigmas(self) -> float:
-        """The z-score of a normal law that weighs as much as the cost."""
-        return math.sqrt(2 * max(self.cost, 0.0))
-
-
-def _to_separate(leader: Explanation, others: Sequence[Explanation], bench: Bench, input_unit: str) -> dict:
-    pairs, turns = [Pair.of(leader, other) for other in others], 0
-    ranked, tried = _ranked(pairs, bench)
-    best = None
-    for _, excitation in ranked:
-        checks = [_checked(pair, excitation, bench) for pair in pairs]
-        if None not in checks:
-            worst = min(c.cost for c in checks)
-            best, turns = ((worst, excitation, checks) if best is None or worst > best[0] else best), turns + 1
-        if turns == CHECKED:
-            break
-    names = [leader.name, *(o.name for o in others)]
+def _to_separate(leader: Explanation, others: Sequence[Explanation], bench: Bench, units: Mapping[str, str]) -> dict:
+    pairs = [Pair.of(leader, other) for other in others]
+    best = designed(pairs, bench)
     if best is None:
-        return {"sentence": f"No input was found that would move the rig within its travel and tell {_listed([_plain(n) for n in names])} apart.", "excitation": {},
-                "separates": [], "expected_sigmas": 0.0, "checked": {"tried": tried, "simulations": bench.simulations}}
-    least, excitation, checks = best
-    told = {other.name: _told(pair, check, excitation, bench) for other, pair, check in zip(others, pairs, checks)}
+        names = [_plain(e.name) for e in (leader, *others)]
+        return {"sentence": f"No input was found that keeps the rig within its travel and could tell {_listed(names)} apart.", "excitation": {},
+                "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": {"simulations": bench.simulations}}
+    told = {o.name: _told(pair, check, best.excitation, bench) for o, pair, check in zip(others, pairs, best.checks)}
     separated = [name for name, c in told.items() if c["cost"] * PATIENCE >= SETTLED]
+    hopeless = {o.name: pair for o, pair in zip(others, pairs) if o.name not in separated}
     channel = _best_channel(told)
-    chosen = {**excitation, "input_unit": input_unit}
-    return {"sentence": _said(leader.name, told, channel, chosen, tried), "excitation": chosen,
-            "separates": [leader.name, *separated] if separated else [], "expected_sigmas": math.sqrt(2 * max(least, 0.0)),
-            "channel": channel, "checked": {"against": told, "tried": tried, "simulations": bench.simulations}}
+    wide = {name: found for name, pair in hopeless.items() if (found := _with_wider_travel(pair, bench))} if channel is None else {}
+    chosen = {**best.excitation, **units}
+    words = _said(leader.name, told, channel, chosen, best.tried)
+    if channel is None:
+        words += _widened(leader.name, [*hopeless], wide, bench.limits, units)
+    return {"sentence": " ".join(words), "excitation": chosen if separated or channel else {},
+            "separates": [leader.name, *separated] if separated else [], "expected_sigmas": math.sqrt(2 * max(best.cost, 0.0)),
+            "channel": channel, "with_wider_travel": {name: {**found.excitation, **units} for name, found in wide.items()},
+            "checked": {"against": told, "under": chosen, "tried": best.tried, "simulations": bench.simulations}}
 
 
 def _told(pair: Pair, there: Check, excitation: dict, bench: Bench) -> dict:
     """What is told of one rival: both ways, and with further channels."""
-    back = _checked(Pair(pair.answer, pair.rig), excitation, bench)
-    return {"cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms, "probability_of_wrong": 1.0 / (1.0 + math.exp(there.cost)),
-            "chance_of_settling": there.sure, "cost_on_noise": there.noisy, "played_by": pair.rig.name,
-            "cost_the_other_way": back.cost if back else None, "channels_sigmas": _channels(pair, there, excitation, bench)}
-
-
-def _ranked(pairs: Sequence[Pair], bench: Bench) -> tuple[list[tuple[float, dict]], int]:
-    """Inputs by what remains of the least different pair after its linear refit, the best first, and how many were tried.
-
-    What remains without a refit is an upper bound, by which the search goes and ends; of a shape only its strongest that the
-    travel bears, and the next one below, are refitted.
-    """
-    length = min(bench.limits.duration, max(DESIGN, DESIGN_SAMPLES / min(bench.limits.rate_hz, DESIGN_RATE)))
-    rigs = list({id(p.rig): p.rig for p in pairs}.values())
-    bounds, tried = [], 0
-    for shares in (SHARES, GENTLE):
-        for shape in excitations(bench.limits, shares):
-            for excitation in shape:
-                tried += 1
-                trace = bench.trace(excitation, length, DESIGN_RATE)
-                filled = {id(rig): bench.filled(rig.model, trace) for rig in rigs}
-                if None in filled.values():
-                    continue
-                e = [bench.misses(p.answer.model, filled[id(p.rig)]) for p in pairs]
-                if np.all(np.isfinite(np.concatenate(e))):
-                    blocks = Blocks.of([trace])
-                    bounds.append((min(bench.cost(blocks.misfit(x)) for x in e), excitation, [filled[id(p.rig)] for p in pairs], e))
-        if bounds:
-            break
-    ranked = []
-    for bound, excitation, filled, e in _mixed(bounds)[:REFITTED]:
-        if len(ranked) >= CHECKED and bound <= sorted((r[0] for r in ranked), reverse=True)[CHECKED - 1]:
-            continue
-        left = math.inf
-        for pair, trace, miss in zip(pairs, filled, e):
-            slopes = bench.slopes(pair.answer, pair.answer.z, miss, trace)
-            left = min(left, _remains(miss, slopes, pair.answer.known, Blocks.of([trace]), bench))
-        ranked.append((left, excitation))
-    return sorted(ranked, key=lambda r: -r[0]), tried
-
-
-def _mixed(bounds: list) -> list:
-    """By their bound, the best of every shape before the second of any."""
-    bounds, turn, out = sorted(bounds, key=lambda b: -b[0]), {}, []
-    for b in bounds:
-        shape = tuple(v for k, v in b[1].items() if k not in ("amplitude", "peak_u"))
-        turn[shape] = turn.get(shape, 0) + 1
-        out.append((turn[shape], b))
-    return [b for _, b in sorted(out, key=lambda item: item[0])]
-
-
-def _remains(e: np.ndarray, slopes: np.ndarray, known: np.ndarray, blocks: Blocks, bench: Bench, gone: np.ndarray | float = 0.0) -> float:
-    """C that is left of e (N,) once the numbers have moved along their slopes (N, k), the price of that move included.
-
-    ``gone`` (k,) is how far they are already from where the recordings at hand have them.
-    """
-    move, best = np.zeros(known.shape[0]), math.inf
-    for _ in range(4):
-        m = blocks.misfit(e + slopes @ move)
-        best = min(best, bench.cost(m) + 0.5 * float((gone + move) @ known @ (gone + move)))
-        weight = (2.0 / ((bench.floor + m) * blocks.counts))[blocks.index]
-        weighted = slopes * weight[:, None]
-        move = -_solved(weighted.T @ slopes + known, weighted.T @ e + known @ (gone + np.zeros_like(move)))
-    return best
-
-
-def _solved(curvature: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """curvature^-1 slope, scaled, with what nothing determines left where it is."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-    scaled = curvature * np.outer(scale, scale)
-    return scale * np.linalg.solve(scaled + 1e-10 * np.eye(slope.size), scale * slope)
-
-
-def _checked(pair: Pair, excitation: dict, bench: Bench) -> Check | None:
-    """The pair at full length; None where one of the two leaves the travel."""
-    trace = bench.trace(excitation, excitation["duration_s"], CHECK_RATE)
-    rig, answer = (bench.filled(x.model, trace) for x in (pair.rig, pair.answer))
-    return None if rig is None or answer is None else _check(pair.answer, rig, bench)
-
-
-def _check(answer: Explanation, clean: Trace, bench: Bench) -> Check:
-    """True refit of the answer to what the rig would show, on its noise; the price of leaving what is known counts."""
-    noise = math.sqrt(bench.level) * np.random.default_rng(1).standard_normal(clean.y.size)
-    noisy = replace(clean, y=clean.y + clean.sigma * noise)
-    z, cost = _refitted(answer, noisy, bench)
-    blocks, own = Blocks.of([clean]), bench.level
-    e = bench.misses(answer.at(z), clean)
-    d = blocks.misfit(e)
-    price = 0.5 * float((z - answer.z) @ answer.known @ (z - answer.z))
-    expected = bench.cost(d) + price
-    spread = math.sqrt(float(np.sum(4 * own * d / blocks.counts / (bench.floor + d) ** 2))) + 1e-9
-    sure = 0.5 * math.erfc((SETTLED - expected) / spread / math.sqrt(2.0))
-    true = float(np.sum(np.log((bench.tau + blocks.misfit(noise)) / bench.floor)))
-    return Check(expected, float(np.sqrt(np.mean(e**2))), sure, cost - true, z)
-
-
-def _refitted(answer: Explanation, trace: Trace, bench: Bench) -> tuple[np.ndarray, float]:
-    """The numbers z that minimise C over the new recording plus the curvature of the old ones, and that sum."""
-    blocks, z, damping = Blocks.of([trace]), answer.z, 1e-3
-
-    def evaluate(z):
-        e = bench.misses(answer.at(z), trace)
-        if not np.all(np.isfinite(e)):
-            return e, None, math.inf
-        m = blocks.misfit(e)
-        return e, m, float(np.sum(np.log((bench.tau + m) / bench.floor))) + 0.5 * float((z - answer.z) @ answer.known @ (z - answer.z))
-
-    e, m, cost = evaluate(z)
-    for _ in range(STEPS if m is not None else 0):
-        slopes = bench.slopes(answer, z, e, trace)
-        weighted = slopes * (2.0 / ((bench.tau + m) * blocks.counts))[blocks.index][:, None]
-        curvature, slope = weighted.T @ slopes + answer.known, weighted.T @ e + answer.known @ (z - answer.z)
-        gain = 0.0
-        for _ in range(4):
-            step = np.clip(-_solved(curvature + damping * np.diag(np.diag(curvature)), slope), -1.0, 1.0)
-            goal = answer.at(z + step).vector(answer.layout)
-            trial = evaluate(goal)
-            if trial[2] < cost:
-                gain, z, (e, m, cost), damping = cost - trial[2], goal, trial, damping / 8
-                break
-            damping *= 10
-        if gain < LEAST_STEP:
-            break
-    return z, cost
-
-
-# -- further channels -------------------------------------------------------------------------------------------------
-
-
-def _channels(pair: Pair, check: Check, excitation: dict, bench: Bench) -> dict[str, float]:
-    """Sigmas that each further channel beside the angle would leave between the two, after one more linear refit of the answer.
-
-    Current and supply are taken as known up to a scale and an offset, the motor's angle up to an offset.
-    """
-    clean = bench.filled(pair.rig.model, bench.trace(excitation, excitation["duration_s"], CHECK_RATE))
-    one, blocks = pair.answer, Blocks.of([clean])
-    e, seen, read = bench.misses(one.at(check.z), clean), bench.further(pair.rig.model, clean), bench.further(one.at(check.z), clean)
-    slopes = bench.slopes(one, check.z, e, clean)
-    moved = [bench.further(one.at(check.z + DIFFERENCE * row), clean) for row in np.eye(check.z.size)]
-    both = Blocks(np.concatenate([blocks.index, blocks.index + blocks.counts.size]), np.tile(blocks.counts, 2))
-    out = {}
-    for name, noise in CHANNELS.items():
-        sigma = noise * float(np.max(np.abs(seen[name]))) if noise else clean.sigma
-        free = np.column_stack([read[name], np.ones(clean.t.size)] if noise else [np.ones(clean.t.size)])
-        columns = np.column_stack([(read[name] - x[name]) / DIFFERENCE for x in moved])
-        wide = np.block([[slopes, np.zeros(free.shape)], [columns / sigma, free / sigma]])
-        known, gone = np.zeros((wide.shape[1],) * 2), np.zeros(wide.shape[1])
-        known[:check.z.size, :check.z.size], gone[:check.z.size] = one.known, check.z - one.z
-        stacked = np.concatenate([e, (seen[name] - read[name]) / sigma])
-        out[name] = math.sqrt(2 * max(_remains(np.nan_to_num(stacked), np.nan_to_num(wide), known, both, bench, gone), 0.0))
-    return out
-
-
-def _electric(name: str) -> bool:
-    """Whether an effect's torque is the current's doing: a law of the drive that vanishes where no current is asked for."""
-    effect = BY_NAME[name]
-    return effect.subsystem == "drive" and bool(effect.torque) and all(
-        effect.torque.py_func((1.0,) * 4, x, 0.0, 0.0, 1.0) == 0.0 for x in (0.0, 0.1, 0.25))
+    back = checked(Pair(pair.answer, pair.rig), excitation, bench)
+    return {"played_by": pair.rig.name, "cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms,
+            "probability_of_wrong": 1.0 / (1.0 + math.exp(there.cost)), "chance_of_settling": there.sure, "cost_on_noise": there.noisy,
+            "cost_the_other_way": back.cost if back else None, "channels_sigmas": channels(pair, there, excitation, bench)}
 
 
 def _best_channel(told: Mapping[str, Mapping]) -> str | None:
@@ -396,10 +95,19 @@ def _best_channel(told: Mapping[str, Mapping]) -> str | None:
     return best if 0.5 * worst[best] ** 2 > max(SETTLED, 2 * min(c["cost"] for c in weak)) else None
 
 
+def _with_wider_travel(pair: Pair, bench: Bench) -> Design | None:
+    """The input that would settle it if the rig bore more travel than the recordings show; None where none would."""
+    limits, more = bench.limits, WIDER * (bench.limits.high - bench.limits.low)
+    wide = Bench(replace(limits, low=limits.low - more, high=limits.high + more), bench.sigma, bench.level, bench.tau)
+    best = designed([pair], wide)
+    bench.simulations += wide.simulations
+    return best if best is not None and best.cost >= SETTLED else None
+
+
 # -- where nothing is left to tell apart ------------------------------------------------------------------------------
 
 
-def _to_know_better(leader: Explanation, bench: Bench, input_unit: str) -> dict:
+def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str]) -> dict:
     """The input that narrows the intervals of the named effects most, or the baseline's where there are none."""
     wanted = [i for i, f in enumerate(leader.layout) if not f.local and f.owner not in STATES and f.name not in LOOSE]
     wanted = [i for i in wanted if leader.layout[i].owner != "base"] or wanted
@@ -423,53 +131,70 @@ def _to_know_better(leader: Explanation, bench: Bench, input_unit: str) -> dict:
             break
     if best is None:
         return {"sentence": "No other explanation is left, and no input was found that keeps the rig within its travel.", "excitation": {},
-                "separates": [], "expected_sigmas": 0.0, "checked": {"tried": tried, "simulations": bench.simulations}}
+                "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": {"tried": tried, "simulations": bench.simulations}}
     ratios = {leader.layout[i].name: float(a / b) for i, a, b in zip(wanted, best[1], before)}
     weakest = leader.layout[wanted[int(np.argmin(best[1] / before))]]
-    chosen = {**best[0], "input_unit": input_unit}
+    chosen = {**best[0], **units}
     whose = f"{weakest.name} of the {_plain(weakest.owner)}" if weakest.owner != "base" else weakest.name
     return {"sentence": f"No other explanation is left to tell apart. {_asked(chosen)} It would narrow the interval of {whose} to "
                         f"{ratios[weakest.name]:.0%} of today's.",
-            "excitation": chosen, "separates": [], "expected_sigmas": 0.0,
+            "excitation": chosen, "separates": [], "expected_sigmas": 0.0, "channel": None,
             "checked": {"interval_ratio": ratios, "tried": tried, "simulations": bench.simulations}}
 
 
 def _spreads(curvature: np.ndarray, wanted: Sequence[int]) -> np.ndarray:
     """Standard deviations of the wanted numbers where all of them are fitted."""
-    return np.sqrt(np.maximum([_solved(curvature, row)[i] for i, row in zip(wanted, np.eye(curvature.shape[0])[wanted])], 1e-300))
+    return np.sqrt(np.maximum([solved(curvature, row)[i] for i, row in zip(wanted, np.eye(curvature.shape[0])[wanted])], 1e-300))
 
 
 # -- words ------------------------------------------------------------------------------------------------------------
 
 
-def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitation: Mapping, tried: int) -> str:
-    """What to record, what it would settle, and what it would not."""
+def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitation: Mapping, tried: int) -> list[str]:
+    """What to record, what it would settle, and what it would not, in sentences."""
     settled = [n for n, c in told.items() if c["cost"] >= SETTLED]
-    often = {n: math.ceil(SETTLED / c["cost"]) for n, c in told.items() if n not in settled and c["cost"] * PATIENCE >= SETTLED}
+    often = [n for n, c in told.items() if n not in settled and c["cost"] * PATIENCE >= SETTLED]
     never = [n for n in told if n not in settled and n not in often]
-    words = []
-    if settled or often:
-        words.append(_asked(excitation))
-    for n in settled:
+    words = [_asked(excitation)] if settled or often else []
+    for n in (*settled, *often):
         c = told[n]
+        then = (f"the wrong one would keep a probability of {max(c['probability_of_wrong'], 1e-4):.1g} at most" if n in settled
+                else f"{math.ceil(SETTLED / c['cost'])} such recordings would settle it")
         words.append(f"After a refit {_plain(leader)} and {_plain(n)} still differ there by {c['rms_sigma']:.2g} times the noise, "
-                     f"{c['sigmas']:.2g} sigmas: the wrong one would keep a probability of {max(c['probability_of_wrong'], 1e-4):.1g} at most.")
-    for n, times in often.items():
-        words.append(f"After a refit {_plain(leader)} and {_plain(n)} differ there by {told[n]['rms_sigma']:.2g} times the noise, "
-                     f"{told[n]['sigmas']:.2g} sigmas: {times} such recordings would settle it.")
-    for n in never:
-        words.append(f"No input within the limits of these recordings ({tried} simulated) tells {_plain(leader)} and {_plain(n)} apart by the "
-                     f"output alone: after a refit {told[n]['rms_sigma']:.1g} times the noise is left.")
-    weak = [n for n in told if n not in settled]
+                     f"{c['sigmas']:.2g} sigmas: {then}.")
+        if c["cost_the_other_way"] is not None and c["cost_the_other_way"] < min(SETTLED, c["cost"]):
+            rich, plain = (_plain(x) for x in ((leader, n) if c["played_by"] == leader else (n, leader)))
+            words.append(f"Should it be {plain}, though, {rich} can still pass for it.")
+    if never:
+        left = max(told[n]["rms_sigma"] for n in never)
+        words.append(f"No input within the limits of these recordings ({tried} simulated) tells {_listed(map(_plain, (leader, *never)))} apart by "
+                     f"the output alone: after a refit {left:.1g} times the noise is left.")
     if channel:
-        sigmas = min(told[n]["channels_sigmas"][channel] for n in weak)
-        lead = "" if words and excitation and (settled or often) else f" {_asked(excitation)}"
-        words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas.{lead}")
+        sigmas = min(c["channels_sigmas"][channel] for n, c in told.items() if n not in settled)
+        words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas." + ("" if settled or often else f" {_asked(excitation)}"))
     elif never:
         most = max(max(told[n]["channels_sigmas"].values()) for n in never)
-        words.append(f"Nor would {_listed(CALLED.values(), 'or')} ({most:.1g} sigmas at most): only a change of the rig can, such as taking the load off "
+        words.append(f"Nor would {_listed(CALLED.values(), 'or')}, {most:.1g} sigmas at most.")
+    return words
+
+
+def _widened(leader: str, hopeless: Sequence[str], wide: Mapping[str, Design], limits: Limits, units: Mapping[str, str]) -> list[str]:
+    """What more travel would do for whom, and what is left where nothing does."""
+    more = WIDER * (limits.high - limits.low)
+    low, high = (_in_degrees(x, units["output_unit"]) for x in (limits.low - more, limits.high + more))
+    words = []
+    for name, found in wide.items():
+        asked = _asked({**found.excitation, **units})
+        words.append(f"If the rig bears a travel from {low} to {high}: {asked[0].lower()}{asked[1:-1]}, which would tell {_plain(leader)} and "
+                     f"{_plain(name)} apart at {math.sqrt(2 * found.cost):.2g} sigmas.")
+    if stuck := [name for name in hopeless if name not in wide]:
+        words.append(f"{_listed(map(_plain, (leader, *stuck))).capitalize()} can only be told apart by a change of the rig, such as taking the load off "
                      "or turning it over.")
-    return " ".join(words)
+    return words
+
+
+def _in_degrees(x: float, unit: str) -> str:
+    return f"{math.degrees(x):.3g} deg" if unit == "rad" else f"{x:.3g} {unit}"
 
 
 def _asked(excitation: Mapping) -> str:
@@ -487,6 +212,6 @@ def _plain(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _listed(names, last: str = "and") -> str:
+def _listed(names: Iterable[str], last: str = "and") -> str:
     names = list(names)
     return f" {last} ".join(filter(None, [", ".join(names[:-1]), names[-1]]))

@@ -94,7 +94,7 @@ class Case:
             "version": 1, "verdict": verdict, "sentence": self._sentence(verdict, missing, fits, found, explained),
             "where": [] if verdict == "consistent" else [self._place(p) for p in found],
             "missing": missing, "remainder": self._remainder(verdict, explained), "record_state": record_state, "fit": fits,
-            "parameters": self._parameters(), "next_recording": next_recording(*self._rivals(), self.start.traces, self.input_unit),
+            "parameters": self._parameters(), "next_recording": next_recording(*self._rivals(), self.start.traces, self.input_unit, self.output_unit),
             "data": self._data(), "seed": self.seed, "versions": _versions(),
         }
         if verdict == "unexplained":

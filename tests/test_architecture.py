@@ -8,9 +8,9 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
 ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "simulation", "traces",
          "excitation", "replay", "model_file", "rendering", "window", "identification", "guess", "baseline", "selection", "isolability", "intervals",
-         "evaluation", "evidence", "advice", "localisation", "confirmation", "multibody", "document", "diagnosis",
+         "evaluation", "evidence", "design", "advice", "localisation", "confirmation", "multibody", "document", "diagnosis",
          "validation", "display", "validity", "frames", "figures", "page", "maps", "report", "validation_report", "commands", "cli"]
-SILENT = {"advice", "excitation", "isolability", "identification", "guess", "baseline", "selection", "isolability", "intervals", "evaluation", "localisation", "confirmation", "multibody",
+SILENT = {"advice", "design", "excitation", "isolability", "identification", "guess", "baseline", "selection", "isolability", "intervals", "evaluation", "localisation", "confirmation", "multibody",
           "document", "diagnosis", "validation", "validity", "effects", "plants", "excitation", "replay", "model_file", "rendering", "window", "frames"}
 
 
