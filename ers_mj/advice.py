@@ -20,6 +20,7 @@ from ers_mj.traces import Blocks, Trace
 
 RIVALS = 2  # explanations beside the leader that an input is designed against, the most probable first
 PATIENCE = 10  # recordings of one kind that nobody wants to make more than
+NESTED = 0.5  # share of what is left one way, below which what is left the other way shows that one explanation contains the other
 WIDER = 1.0  # of the travel seen, that is asked for at either end where the travel seen does not do
 CALLED = {"i_A": "the current (i_A)", "theta_m_rad": "the motor's angle (theta_m_rad)", "vin_V": "the supply voltage (vin_V)"}
 LOOSE = ("emf_share", "tau_e")  # numbers of the baseline that a datasheet knows better than any recording of the output
@@ -63,10 +64,10 @@ def _to_separate(leader: Explanation, others: Sequence[Explanation], bench: Benc
         return {"sentence": f"No input was found that keeps the rig within its travel and could tell {_listed(names)} apart.", "excitation": {},
                 "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": {"simulations": bench.simulations}}
     told = {o.name: _told(pair, check, best.excitation, bench) for o, pair, check in zip(others, pairs, best.checks)}
-    separated = [name for name, c in told.items() if c["cost"] * PATIENCE >= SETTLED]
+    separated = [name for name, c in told.items() if c["recordings_needed"]]
     hopeless = {o.name: pair for o, pair in zip(others, pairs) if o.name not in separated}
     channel = _best_channel(told)
-    wide = {name: found for name, pair in hopeless.items() if (found := _with_wider_travel(pair, bench))} if channel is None else {}
+    wide = {name: found for name, pair in hopeless.items() if not told[name]["nested"] and (found := _with_wider_travel(pair, bench))} if channel is None else {}
     chosen = {**best.excitation, **units}
     words = _said(leader.name, told, channel, chosen, best.tried)
     if channel is None:
@@ -78,11 +79,19 @@ def _to_separate(leader: Explanation, others: Sequence[Explanation], bench: Benc
 
 
 def _told(pair: Pair, there: Check, excitation: dict, bench: Bench) -> dict:
-    """What is told of one rival: both ways, and with further channels."""
+    """What is told of one rival: both ways, and with further channels.
+
+    Where the richer of the two passes for the plainer one (``nested``), what is left the other way is what its further numbers, as they were
+    fitted, would show. Unless one recording settles that, they are taken for chance.
+    """
     back = checked(Pair(pair.answer, pair.rig), excitation, bench)
+    nested = back is not None and pair.rig.z.size > pair.answer.z.size and back.cost < NESTED * there.cost
+    needed = math.ceil(SETTLED / max(there.cost, 1e-9))
     return {"played_by": pair.rig.name, "cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms,
-            "probability_of_wrong": 1.0 / (1.0 + math.exp(there.cost)), "chance_of_settling": there.sure, "cost_on_noise": there.noisy,
-            "cost_the_other_way": back.cost if back else None, "channels_sigmas": channels(pair, there, excitation, bench)}
+            "probability_of_wrong": 1.0 / (1.0 + math.exp(min(there.cost, 700.0))), "chance_of_settling": there.sure, "cost_on_noise": there.noisy,
+            "cost_the_other_way": back.cost if back else None, "nested": nested,
+            "recordings_needed": needed if needed <= (1 if nested else PATIENCE) else None,
+            "channels_sigmas": channels(pair, there, excitation, bench)}
 
 
 def _best_channel(told: Mapping[str, Mapping]) -> str | None:
@@ -152,26 +161,25 @@ def _spreads(curvature: np.ndarray, wanted: Sequence[int]) -> np.ndarray:
 
 def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitation: Mapping, tried: int) -> list[str]:
     """What to record, what it would settle, and what it would not, in sentences."""
-    settled = [n for n, c in told.items() if c["cost"] >= SETTLED]
-    often = [n for n, c in told.items() if n not in settled and c["cost"] * PATIENCE >= SETTLED]
-    never = [n for n in told if n not in settled and n not in often]
-    words = [_asked(excitation)] if settled or often else []
-    for n in (*settled, *often):
+    hopeful = [n for n, c in told.items() if c["recordings_needed"]]
+    never = [n for n in told if n not in hopeful]
+    words = [_asked(excitation)] if hopeful else []
+    for n in hopeful:
         c = told[n]
-        then = (f"the wrong one would keep a probability of {max(c['probability_of_wrong'], 1e-4):.1g} at most" if n in settled
-                else f"{math.ceil(SETTLED / c['cost'])} such recordings would settle it")
+        then = (f"the wrong one would keep a probability of {max(c['probability_of_wrong'], 1e-4):.1g} at most" if c["recordings_needed"] == 1
+                else f"{c['recordings_needed']} such recordings would settle it")
         words.append(f"After a refit {_plain(leader)} and {_plain(n)} still differ there by {c['rms_sigma']:.2g} times the noise, "
                      f"{c['sigmas']:.2g} sigmas: {then}.")
-        if c["cost_the_other_way"] is not None and c["cost_the_other_way"] < min(SETTLED, c["cost"]):
-            rich, plain = (_plain(x) for x in ((leader, n) if c["played_by"] == leader else (n, leader)))
-            words.append(f"Should it be {plain}, though, {rich} can still pass for it.")
+        if c["nested"]:
+            rich, plain = (leader, n) if c["played_by"] == leader else (n, leader)
+            words.append(f"Should it be {_plain(plain)}, though, {_plain(rich)} can still pass for it.")
     if never:
         left = max(told[n]["rms_sigma"] for n in never)
         words.append(f"No input within the limits of these recordings ({tried} simulated) tells {_listed(map(_plain, (leader, *never)))} apart by "
                      f"the output alone: after a refit {left:.1g} times the noise is left.")
     if channel:
-        sigmas = min(c["channels_sigmas"][channel] for n, c in told.items() if n not in settled)
-        words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas." + ("" if settled or often else f" {_asked(excitation)}"))
+        sigmas = min(c["channels_sigmas"][channel] for c in told.values() if c["cost"] < SETTLED)
+        words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas." + ("" if hopeful else f" {_asked(excitation)}"))
     elif never:
         most = max(max(told[n]["channels_sigmas"].values()) for n in never)
         words.append(f"Nor would {_listed(CALLED.values(), 'or')}, {most:.1g} sigmas at most.")
