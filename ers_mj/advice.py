@@ -21,8 +21,11 @@ from ers_mj.traces import Blocks, Trace
 RIVALS = 2  # explanations beside the leader that an input is designed against, the most probable first
 PATIENCE = 10  # recordings of one kind that nobody wants to make more than
 NESTED = 0.5  # share of what is left one way, below which what is left the other way shows that one explanation contains the other
+NOISY = 4.0  # median misfit from which what the answer leaves is no longer the noise
 WIDER = 1.0  # of the travel seen, that is asked for at either end where the travel seen does not do
 CALLED = {"i_A": "the current (i_A)", "theta_m_rad": "the motor's angle (theta_m_rad)", "vin_V": "the supply voltage (vin_V)"}
+VAGUE = 3.0  # standard deviation (of a logarithm, or over the value) of a number of which nothing is known
+WORTH = 0.95  # of today's interval: one that stays wider is not worth a recording of its own
 LOOSE = ("emf_share", "tau_e")  # numbers of the baseline that a datasheet knows better than any recording of the output
 
 
@@ -69,7 +72,7 @@ def _to_separate(leader: Explanation, others: Sequence[Explanation], bench: Benc
     channel = _best_channel(told)
     wide = {name: found for name, pair in hopeless.items() if not told[name]["nested"] and (found := _with_wider_travel(pair, bench))} if channel is None else {}
     chosen = {**best.excitation, **units}
-    words = _said(leader.name, told, channel, chosen, best.tried)
+    words = _said(leader.name, told, channel, chosen, best.tried, "the noise" if bench.level < NOISY else "what the answer itself leaves")
     if channel is None:
         words += _widened(leader.name, [*hopeless], wide, bench.limits, units)
     return {"sentence": " ".join(words), "excitation": chosen if separated or channel else {},
@@ -87,7 +90,7 @@ def _told(pair: Pair, there: Check, excitation: dict, bench: Bench) -> dict:
     back = checked(Pair(pair.answer, pair.rig), excitation, bench)
     nested = back is not None and pair.rig.z.size > pair.answer.z.size and back.cost < NESTED * there.cost
     needed = math.ceil(SETTLED / max(there.cost, 1e-9))
-    return {"played_by": pair.rig.name, "cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms,
+    return {"played_by": pair.rig.name, "cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms, "rms_over_left": there.rms / math.sqrt(bench.level),
             "probability_of_wrong": 1.0 / (1.0 + math.exp(min(there.cost, 700.0))), "chance_of_settling": there.sure, "cost_on_noise": there.noisy,
             "cost_the_other_way": back.cost if back else None, "nested": nested,
             "recordings_needed": needed if needed <= (1 if nested else PATIENCE) else None,
@@ -120,7 +123,8 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
     """The input that narrows the intervals of the named effects most, or the baseline's where there are none."""
     wanted = [i for i, f in enumerate(leader.layout) if not f.local and f.owner not in STATES and f.name not in LOOSE]
     wanted = [i for i in wanted if leader.layout[i].owner != "base"] or wanted
-    before = _spreads(leader.known, wanted)
+    vague = np.eye(leader.z.size) / VAGUE**2
+    before = _spreads(leader.known + vague, wanted)
     best, tried = None, 0
     for shares in (SHARES, GENTLE):
         for shape in excitations(bench.limits, shares):
@@ -132,7 +136,7 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
                 e = bench.misses(leader.model, trace)
                 slopes, blocks = bench.slopes(leader, leader.z, e, trace), Blocks.of([trace])
                 weight = (2.0 / (bench.floor * blocks.counts))[blocks.index]
-                after = _spreads(leader.known + (slopes * weight[:, None]).T @ slopes, wanted)
+                after = _spreads(leader.known + vague + (slopes * weight[:, None]).T @ slopes, wanted)
                 if best is None or np.sum(np.log(after)) < np.sum(np.log(best[1])):
                     best = excitation, after
                 break
@@ -143,12 +147,13 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
                 "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": {"tried": tried, "simulations": bench.simulations}}
     ratios = {leader.layout[i].name: float(a / b) for i, a, b in zip(wanted, best[1], before)}
     weakest = leader.layout[wanted[int(np.argmin(best[1] / before))]]
-    chosen = {**best[0], **units}
+    chosen, checked = {**best[0], **units}, {"interval_ratio": ratios, "tried": tried, "simulations": bench.simulations}
     whose = f"{weakest.name} of the {_plain(weakest.owner)}" if weakest.owner != "base" else weakest.name
-    return {"sentence": f"No other explanation is left to tell apart. {_asked(chosen)} It would narrow the interval of {whose} to "
-                        f"{ratios[weakest.name]:.0%} of today's.",
-            "excitation": chosen, "separates": [], "expected_sigmas": 0.0, "channel": None,
-            "checked": {"interval_ratio": ratios, "tried": tried, "simulations": bench.simulations}}
+    sentence = f"No other explanation is left to tell apart. {_asked(chosen)} It would narrow the interval of {whose} to {ratios[weakest.name]:.0%} of today's."
+    if ratios[weakest.name] > WORTH:
+        sentence, chosen = (f"No other explanation is left to tell apart, and none of {tried} inputs within the limits of these recordings would narrow "
+                            "an interval by much: another recording of the same kind would confirm this one."), {}
+    return {"sentence": sentence, "excitation": chosen, "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": checked}
 
 
 def _spreads(curvature: np.ndarray, wanted: Sequence[int]) -> np.ndarray:
@@ -159,7 +164,7 @@ def _spreads(curvature: np.ndarray, wanted: Sequence[int]) -> np.ndarray:
 # -- words ------------------------------------------------------------------------------------------------------------
 
 
-def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitation: Mapping, tried: int) -> list[str]:
+def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitation: Mapping, tried: int, unit: str) -> list[str]:
     """What to record, what it would settle, and what it would not, in sentences."""
     hopeful = [n for n, c in told.items() if c["recordings_needed"]]
     never = [n for n in told if n not in hopeful]
@@ -168,15 +173,15 @@ def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitat
         c = told[n]
         then = (f"the wrong one would keep a probability of {max(c['probability_of_wrong'], 1e-4):.1g} at most" if c["recordings_needed"] == 1
                 else f"{c['recordings_needed']} such recordings would settle it")
-        words.append(f"After a refit {_plain(leader)} and {_plain(n)} still differ there by {c['rms_sigma']:.2g} times the noise, "
+        words.append(f"After a refit {_plain(leader)} and {_plain(n)} still differ there by {c['rms_over_left']:.2g} times {unit}, "
                      f"{c['sigmas']:.2g} sigmas: {then}.")
         if c["nested"]:
             rich, plain = (leader, n) if c["played_by"] == leader else (n, leader)
             words.append(f"Should it be {_plain(plain)}, though, {_plain(rich)} can still pass for it.")
     if never:
-        left = max(told[n]["rms_sigma"] for n in never)
+        left = max(told[n]["rms_over_left"] for n in never)
         words.append(f"No input within the limits of these recordings ({tried} simulated) tells {_listed(map(_plain, (leader, *never)))} apart by "
-                     f"the output alone: after a refit {left:.1g} times the noise is left.")
+                     f"the output alone: after a refit {left:.1g} times {unit} is left.")
     if channel:
         sigmas = min(c["channels_sigmas"][channel] for c in told.values() if c["cost"] < SETTLED)
         words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas." + ("" if hopeful else f" {_asked(excitation)}"))

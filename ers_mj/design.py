@@ -24,6 +24,7 @@ REFITTED = 8  # inputs at most for which the linear refit is taken
 CHECKED = 2  # of these, how many at most are simulated at full length
 SETTLED = math.log(19.0)  # of C: odds at which the wrong one has a probability of 5 %
 STEPS, JACOBIANS = 8, 2  # of a true refit, at most
+UNSEEN = 1e-12  # curvature of a number that no recording shows
 LEAST_STEP = 0.05  # of C, at which it ends
 CHANNELS: Mapping[str, float | None] = {"i_A": 0.01, "theta_m_rad": None, "vin_V": 0.005}  # noise over the peak (None: the output's own)
 
@@ -203,8 +204,8 @@ def designed(pairs: Sequence[Pair], bench: Bench) -> Design | None:
 def ranked(pairs: Sequence[Pair], bench: Bench) -> tuple[list[tuple[float, dict]], int]:
     """Inputs by what remains of the least different pair after its linear refit, the best first, and how many were tried.
 
-    What remains without a refit is an upper bound, by which the search goes and ends; of a shape only its strongest that the
-    travel bears, and the next one below, are refitted.
+    What remains without a refit is an upper bound, by which the search goes, from the best of every shape to the second of any.
+    The short recording of the ranking may stay within a travel that the whole one leaves, so this is looked at first.
     """
     length = min(bench.limits.duration, max(DESIGN, DESIGN_SAMPLES / min(bench.limits.rate_hz, DESIGN_RATE)))
     rigs = list({id(p.rig): p.rig for p in pairs}.values())
@@ -223,9 +224,12 @@ def ranked(pairs: Sequence[Pair], bench: Bench) -> tuple[list[tuple[float, dict]
                     bounds.append((min(bench.cost(blocks.misfit(x)) for x in e), excitation, [filled[id(p.rig)] for p in pairs], e))
         if bounds:
             break
-    found = []
-    for bound, excitation, filled, e in _mixed(bounds)[:REFITTED]:
-        if len(found) >= CHECKED and bound <= sorted((r[0] for r in found), reverse=True)[CHECKED - 1]:
+    found: list[tuple[float, dict]] = []
+    for bound, excitation, filled, e in _mixed(bounds):
+        if len(found) == REFITTED or (len(found) >= CHECKED and bound <= sorted(left for left, _ in found)[-CHECKED]):
+            continue
+        long = bench.trace(excitation, excitation["duration_s"], DESIGN_RATE)
+        if any(bench.filled(x.model, long) is None for pair in pairs for x in (pair.rig, pair.answer)):
             continue
         left = math.inf
         for pair, trace, miss in zip(pairs, filled, e):
@@ -262,7 +266,8 @@ def remains(e: np.ndarray, slopes: np.ndarray, known: np.ndarray, blocks: Blocks
 
 def solved(curvature: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """curvature^-1 slope, scaled, with what nothing determines left where it is."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
+    diagonal = np.diag(curvature)
+    scale = np.where(diagonal > UNSEEN, 1.0 / np.sqrt(np.maximum(diagonal, UNSEEN)), 0.0)
     scaled = curvature * np.outer(scale, scale)
     return scale * np.linalg.solve(scaled + 1e-10 * np.eye(slope.size), scale * slope)
 

@@ -66,18 +66,18 @@ def multisine(t: np.ndarray, duration: float, from_hz: float, to_hz: float, sine
 
 
 def chirp(t: np.ndarray, duration: float, from_hz: float, to_hz: float) -> np.ndarray:
-    """A sine whose frequency grows linearly over the duration."""
-    return np.sin(2 * np.pi * (from_hz * t + 0.5 * (to_hz - from_hz) / duration * t**2))
+    """A cosine whose frequency grows linearly over the duration: from its peak, so that a rig without a spring does not set out one way."""
+    return np.cos(2 * np.pi * (from_hz * t + 0.5 * (to_hz - from_hz) / duration * t**2))
 
 
 def square(t: np.ndarray, duration: float, period_s: float) -> np.ndarray:
-    """Up and down in halves of a period, each period a little further."""
-    return _grade(t, duration, period_s) * np.where(_turn(t, period_s) < 0.5, 1.0, -1.0)
+    """Up and down in halves of a period, each period a little further, the first half cut in two for the sake of rigs without a spring."""
+    return _grade(t, duration, period_s) * np.where(np.abs(_turn(t, period_s) - 0.5) < 0.25, -1.0, 1.0)
 
 
 def triangle(t: np.ndarray, duration: float, period_s: float) -> np.ndarray:
-    """Slow ramps up and down from zero: breakaway, creep and return."""
-    return _grade(t, duration, period_s) * 2 / np.pi * np.arcsin(np.sin(2 * np.pi * t / period_s))
+    """Slow ramps down and up: breakaway, creep and return."""
+    return _grade(t, duration, period_s) * 2 / np.pi * np.arcsin(np.cos(2 * np.pi * t / period_s))
 
 
 def steps(t: np.ndarray, duration: float, hold_s: float) -> np.ndarray:
