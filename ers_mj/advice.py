@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ers_mj.design import CHANNELS, DESIGN_RATE, SETTLED, Bench, Check, Design, Explanation, Pair, channels, checked, designed, solved
+from ers_mj.design import CHANNELS, DESIGN_RATE, SETTLED, VAGUE, Bench, Check, Design, Explanation, Pair, chances, channels, checked, designed, solved
 from ers_mj.effects import BY_NAME
 from ers_mj.excitation import GENTLE, SHARES, Limits, excitations
 from ers_mj.identification import STATES, Fit, Model, tau_of
@@ -24,7 +24,6 @@ NESTED = 0.5  # share of what is left one way, below which what is left the othe
 NOISY = 4.0  # median misfit from which what the answer leaves is no longer the noise
 WIDER = 1.0  # of the travel seen, that is asked for at either end where the travel seen does not do
 CALLED = {"i_A": "the current (i_A)", "theta_m_rad": "the motor's angle (theta_m_rad)", "vin_V": "the supply voltage (vin_V)"}
-VAGUE = 3.0  # standard deviation (of a logarithm, or over the value) of a number of which nothing is known
 WORTH = 0.95  # of today's interval: one that stays wider is not worth a recording of its own
 LOOSE = ("emf_share", "tau_e")  # numbers of the baseline that a datasheet knows better than any recording of the output
 
@@ -89,12 +88,16 @@ def _told(pair: Pair, there: Check, excitation: dict, bench: Bench) -> dict:
     """
     back = checked(Pair(pair.answer, pair.rig), excitation, bench)
     nested = back is not None and pair.rig.z.size > pair.answer.z.size and back.cost < NESTED * there.cost
-    needed = math.ceil(SETTLED / max(there.cost, 1e-9))
-    return {"played_by": pair.rig.name, "cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms, "rms_over_left": there.rms / math.sqrt(bench.level),
-            "probability_of_wrong": 1.0 / (1.0 + math.exp(min(there.cost, 700.0))), "chance_of_settling": there.sure, "cost_on_noise": there.noisy,
+    slopes = bench.slopes(pair.answer, there.z, there.e, there.clean)
+    costs = chances(pair, there, slopes, bench)
+    low, middle, high = (float(c) for c in np.quantile(costs, (0.1, 0.5, 0.9)))
+    needed = math.ceil(SETTLED / max(min(there.cost, middle), 1e-9))
+    return {"played_by": pair.rig.name, "cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms,
+            "rms_over_left": there.rms / math.sqrt(bench.level), "probability_of_wrong": 1.0 / (1.0 + math.exp(min(there.cost, 700.0))),
+            "cost_range": [low, high], "chance_of_settling": float(np.mean(costs > SETTLED)), "cost_on_noise": there.noisy,
             "cost_the_other_way": back.cost if back else None, "nested": nested,
             "recordings_needed": needed if needed <= (1 if nested else PATIENCE) else None,
-            "channels_sigmas": channels(pair, there, excitation, bench)}
+            "channels_sigmas": channels(pair, there, slopes, bench)}
 
 
 def _best_channel(told: Mapping[str, Mapping]) -> str | None:
@@ -171,8 +174,8 @@ def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitat
     words = [_asked(excitation)] if hopeful else []
     for n in hopeful:
         c = told[n]
-        then = (f"the wrong one would keep a probability of {max(c['probability_of_wrong'], 1e-4):.1g} at most" if c["recordings_needed"] == 1
-                else f"{c['recordings_needed']} such recordings would settle it")
+        then = (f"one of them would keep less than 5 %, with a chance of {min(c['chance_of_settling'], 0.99):.0%}" if c["recordings_needed"] == 1
+                else f"{c['recordings_needed']} such recordings would be needed to settle it")
         words.append(f"After a refit {_plain(leader)} and {_plain(n)} still differ there by {c['rms_over_left']:.2g} times {unit}, "
                      f"{c['sigmas']:.2g} sigmas: {then}.")
         if c["nested"]:

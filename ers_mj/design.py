@@ -24,6 +24,8 @@ REFITTED = 8  # inputs at most for which the linear refit is taken
 CHECKED = 2  # of these, how many at most are simulated at full length
 SETTLED = math.log(19.0)  # of C: odds at which the wrong one has a probability of 5 %
 STEPS, JACOBIANS = 8, 2  # of a true refit, at most
+DRAWS = 32  # of the rig's numbers
+VAGUE = 3.0  # standard deviation (of a logarithm, or over the value) of a number of which nothing is known
 UNSEEN = 1e-12  # curvature of a number that no recording shows
 LEAST_STEP = 0.05  # of C, at which it ends
 CHANNELS: Mapping[str, float | None] = {"i_A": 0.01, "theta_m_rad": None, "vin_V": 0.005}  # noise over the peak (None: the output's own)
@@ -159,15 +161,16 @@ class Pair:
 class Check:
     """What remains between two explanations after a true refit.
 
-    ``cost`` is the C expected, ``rms`` the difference [sigma], ``sure`` the chance that noise leaves the wrong one less than 5 %, ``noisy`` the
-    C on the noisy recording that was simulated, ``z`` the answer's numbers.
+    ``cost`` is the C expected, ``rms`` the difference [sigma], ``noisy`` the C on the noisy recording that was simulated, ``z`` the answer's
+    numbers, ``clean`` the recording without noise and ``e`` what the refitted answer misses of it (N,) [sigma].
     """
 
     cost: float
     rms: float
-    sure: float
     noisy: float
     z: np.ndarray
+    clean: Trace
+    e: np.ndarray
 
     @property
     def sigmas(self) -> float:
@@ -284,15 +287,25 @@ def _check(answer: Explanation, clean: Trace, bench: Bench) -> Check:
     noise = math.sqrt(bench.level) * np.random.default_rng(1).standard_normal(clean.y.size)
     noisy = replace(clean, y=clean.y + clean.sigma * noise)
     z, cost = _refitted(answer, noisy, bench)
-    blocks, own = Blocks.of([clean]), bench.level
+    blocks = Blocks.of([clean])
     e = bench.misses(answer.at(z), clean)
-    d = blocks.misfit(e)
     price = 0.5 * float((z - answer.z) @ answer.known @ (z - answer.z))
-    expected = bench.cost(d) + price
-    spread = math.sqrt(float(np.sum(4 * own * d / blocks.counts / (bench.floor + d) ** 2))) + 1e-9
-    sure = 0.5 * math.erfc((SETTLED - expected) / spread / math.sqrt(2.0))
     true = float(np.sum(np.log((bench.tau + blocks.misfit(noise)) / bench.floor)))
-    return Check(expected, float(np.sqrt(np.mean(e**2))), sure, cost - true, z)
+    return Check(bench.cost(blocks.misfit(e)) + price, float(np.sqrt(np.mean(e**2))), cost - true, z, clean, e)
+
+
+def chances(pair: Pair, check: Check, slopes: np.ndarray, bench: Bench) -> np.ndarray:
+    """C (DRAWS,) that remains were the rig's numbers others, as far as the recordings at hand leave them open; the answer refits each time.
+
+    To first order, as everything here: what the rig's own model would miss of itself with other numbers, the answer misses as well.
+    ``slopes`` are the answer's at its refitted numbers.
+    """
+    rig, blocks = pair.rig, Blocks.of([check.clean])
+    own = bench.slopes(rig, rig.z, bench.misses(rig.model, check.clean), check.clean)
+    root = np.linalg.cholesky(np.linalg.inv(rig.known + np.eye(rig.z.size) / VAGUE**2))
+    draws = np.random.default_rng(2).standard_normal((DRAWS, rig.z.size)) @ root.T
+    gone = check.z - pair.answer.z
+    return np.array([remains(check.e - own @ np.clip(d, -1.0, 1.0), slopes, pair.answer.known, blocks, bench, gone) for d in draws])
 
 
 def _refitted(answer: Explanation, trace: Trace, bench: Bench) -> tuple[np.ndarray, float]:
@@ -335,15 +348,13 @@ def _refitted(answer: Explanation, trace: Trace, bench: Bench) -> tuple[np.ndarr
 # -- further channels --------------------------------------------------------------------------------------------------
 
 
-def channels(pair: Pair, check: Check, excitation: dict, bench: Bench) -> dict[str, float]:
+def channels(pair: Pair, check: Check, slopes: np.ndarray, bench: Bench) -> dict[str, float]:
     """Sigmas that each further channel beside the angle would leave between the two, after one more linear refit of the answer.
 
     Current and supply are taken as known up to a scale and an offset, the motor's angle up to an offset.
     """
-    clean = bench.filled(pair.rig.model, bench.trace(excitation, excitation["duration_s"], CHECK_RATE))
-    one, blocks = pair.answer, Blocks.of([clean])
-    e, seen, read = bench.misses(one.at(check.z), clean), bench.further(pair.rig.model, clean), bench.further(one.at(check.z), clean)
-    slopes = bench.slopes(one, check.z, e, clean)
+    one, clean, e, blocks = pair.answer, check.clean, check.e, Blocks.of([check.clean])
+    seen, read = bench.further(pair.rig.model, clean), bench.further(one.at(check.z), clean)
     moved = [bench.further(one.at(check.z + DIFFERENCE * row), clean) for row in np.eye(check.z.size)]
     both = Blocks(np.concatenate([blocks.index, blocks.index + blocks.counts.size]), np.tile(blocks.counts, 2))
     out = {}
