@@ -9,6 +9,7 @@ same kind, with the one advised; and C that separates the best wrong member from
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 import numpy as np
 
@@ -81,9 +82,7 @@ def main() -> None:
 
 def _after(fits, traces, new):
     """Every member fitted again with one recording more."""
-    from dataclasses import replace
-
-    new = replace(new, start=fitted_start(next(iter(fits.values())).model, new))
+    new = replace(new, start=fitted_start(next(iter(fits.values())).model, new))  # by one model for all, as a diagnosis does
     return {n: fit(f.model, [*traces, new], steps=20) for n, f in fits.items()}
 
 

@@ -24,7 +24,7 @@ REFITTED = 8  # inputs at most for which the linear refit is taken
 CHECKED = 2  # of these, how many at most are simulated at full length
 SETTLED = math.log(19.0)  # of C: odds at which the wrong one has a probability of 5 %
 STEPS, JACOBIANS = 8, 2  # of a true refit, at most
-DRAWS = 32  # of the rig's numbers
+DRAWS, FAR = 32, 0.3  # of the rig's numbers, and how far a draw may take one of them (its slopes bend)
 VAGUE = 3.0  # standard deviation (of a logarithm, or over the value) of a number of which nothing is known
 UNSEEN = 1e-12  # curvature of a number that no recording shows
 LEAST_STEP = 0.05  # of C, at which it ends
@@ -305,7 +305,7 @@ def chances(pair: Pair, check: Check, slopes: np.ndarray, bench: Bench) -> np.nd
     root = np.linalg.cholesky(np.linalg.inv(rig.known + np.eye(rig.z.size) / VAGUE**2))
     draws = np.random.default_rng(2).standard_normal((DRAWS, rig.z.size)) @ root.T
     gone = check.z - pair.answer.z
-    return np.array([remains(check.e - own @ np.clip(d, -1.0, 1.0), slopes, pair.answer.known, blocks, bench, gone) for d in draws])
+    return np.array([remains(check.e - own @ np.clip(d, -FAR, FAR), slopes, pair.answer.known, blocks, bench, gone) for d in draws])
 
 
 def _refitted(answer: Explanation, trace: Trace, bench: Bench) -> tuple[np.ndarray, float]:

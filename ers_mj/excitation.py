@@ -1,7 +1,8 @@
 """What a rig can be asked to do next: open-loop inputs within the limits that its recordings show, each rebuilt from a few numbers.
 
-An excitation is a dictionary {"kind", parameters of that kind, "amplitude", "offset", "peak_u", "duration_s", "rate_hz", "start"};
-its input is u(t) = offset + amplitude * wave(t), with |wave| <= 1 and ``start`` the output at which the rig should rest before.
+An excitation is a dictionary {"kind", parameters of that kind, "amplitude", "offset", "peak_u", "duration_s", "lead_s", "rate_hz", "start"};
+its input is u(t) = offset + amplitude * wave(t - lead_s), with |wave| <= 1 and ``start`` the output at which the rig should rest
+before. During the lead nothing acts, so that the state in which a recording begins does not depend on its explanation.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ MARGIN = 0.05  # of the travel seen, by which a simulated motion may leave it at
 ONE_SIDED = 0.05  # of the peak: an input that goes no further below zero is taken for one that must not
 SHORTEST, LONGEST = 2.0, 10.0  # [s] of a recording that is asked for
 SHARES, GENTLE = (1.0, 0.65, 0.35), (0.2, 0.1, 0.05)  # of the input's range: those tried first, and where all of them leave the travel
+LEAD, LEAD_SAMPLES = 0.1, 20  # [s] and samples, whichever is longer, before the wave begins: twice what an initial state is taken from
 TOP = 0.2  # of the sample rate: the highest frequency that is asked for
 LEAST_LEVEL = 0.3  # of a graded wave's first cycle
 LEVELS = np.array([1, 0, -1, 0.5, -0.75, 0, 0.75, -0.5, 0, 1, -1, 0.25, 0, -0.25, 0.5, -0.5])  # of the steps, in their order
@@ -125,7 +127,9 @@ def signal(excitation: Mapping) -> tuple[np.ndarray, np.ndarray]:
     """
     t = np.arange(round(excitation["duration_s"] * excitation["rate_hz"])) / excitation["rate_hz"]
     wave, names = WAVES[excitation["kind"]]
-    shape = wave(t, excitation["duration_s"], *(excitation[name] for name in names))
+    rest = excitation["lead_s"]
+    acting, shape = t >= rest - 1e-9, np.zeros(t.size)
+    shape[acting] = wave(t[acting] - rest, excitation["duration_s"] - rest, *(excitation[name] for name in names))
     return t, excitation["offset"] + excitation["amplitude"] * np.clip(shape, -1.0, 1.0)
 
 
@@ -151,7 +155,7 @@ def excitations(limits: Limits, shares: Sequence[float] = SHARES) -> list[list[d
     def at(shape, share):
         amplitude = _floored(share * half)
         return {**shape, "amplitude": amplitude, "offset": middle, "peak_u": abs(middle) + amplitude, "duration_s": limits.duration,
-                "rate_hz": limits.rate_hz, "start": limits.start}
+                "lead_s": max(LEAD, LEAD_SAMPLES / limits.rate_hz), "rate_hz": limits.rate_hz, "start": limits.start}
 
     return [[at(shape, share) for share in shares] for shape in shapes(limits)]
 
