@@ -93,8 +93,8 @@ def _told(pair: Pair, there: Check, excitation: dict, bench: Bench) -> dict:
     low, middle, high = (float(c) for c in np.quantile(costs, (0.1, 0.5, 0.9)))
     needed = math.ceil(SETTLED / max(min(there.cost, middle), 1e-9))
     return {"played_by": pair.rig.name, "cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms,
-            "rms_over_left": there.rms / math.sqrt(bench.level), "probability_of_wrong": 1.0 / (1.0 + math.exp(min(there.cost, 700.0))),
-            "cost_range": [low, high], "chance_of_settling": float(np.mean(costs > SETTLED)), "cost_on_noise": there.noisy,
+            "rms_over_left": there.rms / math.sqrt(bench.level), "probability_of_wrong": 1.0 / (1.0 + math.exp(min(max(there.cost, 0.0), 700.0))),
+            "cost_range": [low, high], "cost_of_forks": there.forked, "chance_of_settling": float(np.mean(costs > SETTLED)), "cost_on_noise": there.noisy,
             "cost_the_other_way": back.cost if back else None, "nested": nested,
             "recordings_needed": needed if needed <= (1 if nested else PATIENCE) else None,
             "channels_sigmas": channels(pair, there, slopes, bench)}

@@ -112,6 +112,20 @@ class Bench:
         self.simulations += 1
         return (trace.y - model.predict(trace, 1, OBSERVER_RATE)) / trace.sigma
 
+    def noise(self, trace: Trace) -> np.ndarray:
+        """What the rig's sensor and its unexplained rest add to a recording (N,) [sigma], the same every time."""
+        return math.sqrt(self.level) * np.random.default_rng(1).standard_normal(trace.t.size)
+
+    def forked(self, model: Model, clean: Trace) -> float:
+        """C that a model leaves of its own recording beyond the noise, which reaches it by way of the observer and of the initial state.
+
+        Under some inputs stick and slip fork on so little; what looks like a difference between explanations there is chance.
+        """
+        noise, blocks, (theta, omega) = self.noise(clean), Blocks.of([clean]), clean.start
+        e = self.misses(model, replace(clean, y=clean.y + clean.sigma * noise, start=(theta + clean.sigma, omega)))
+        more = np.sum(np.log((self.tau + blocks.misfit(e)) / (self.tau + blocks.misfit(noise))))
+        return max(float(more), 0.0) if np.isfinite(more) else math.inf
+
     def slopes(self, one: Explanation, z: np.ndarray, e: np.ndarray, trace: Trace) -> np.ndarray:
         """Finite differences (N, k) of ``misses``."""
         columns = [(self.misses(one.at(z + DIFFERENCE * row), trace) - e) / DIFFERENCE for row in np.eye(z.size)]
@@ -161,11 +175,12 @@ class Pair:
 class Check:
     """What remains between two explanations after a true refit.
 
-    ``cost`` is the C expected, ``rms`` the difference [sigma], ``noisy`` the C on the noisy recording that was simulated, ``z`` the answer's
+    ``cost`` is the C expected, net of what the rig's own model may leave (``forked``), ``rms`` the difference [sigma], ``noisy`` the C on the noisy recording that was simulated, ``z`` the answer's
     numbers, ``clean`` the recording without noise and ``e`` what the refitted answer misses of it (N,) [sigma].
     """
 
     cost: float
+    forked: float
     rms: float
     noisy: float
     z: np.ndarray
@@ -237,7 +252,7 @@ def ranked(pairs: Sequence[Pair], bench: Bench) -> tuple[list[tuple[float, dict]
         left = math.inf
         for pair, trace, miss in zip(pairs, filled, e):
             slopes = bench.slopes(pair.answer, pair.answer.z, miss, trace)
-            left = min(left, remains(miss, slopes, pair.answer.known, Blocks.of([trace]), bench))
+            left = min(left, remains(miss, slopes, pair.answer.known, Blocks.of([trace]), bench) - bench.forked(pair.rig.model, trace))
         found.append((left, excitation))
     return sorted(found, key=lambda r: -r[0]), tried
 
@@ -279,19 +294,20 @@ def checked(pair: Pair, excitation: dict, bench: Bench) -> Check | None:
     """The pair at full length; None where one of the two leaves the travel."""
     trace = bench.trace(excitation, excitation["duration_s"], CHECK_RATE)
     rig, answer = (bench.filled(x.model, trace) for x in (pair.rig, pair.answer))
-    return None if rig is None or answer is None else _check(pair.answer, rig, bench)
+    return None if rig is None or answer is None else _check(pair, rig, bench)
 
 
-def _check(answer: Explanation, clean: Trace, bench: Bench) -> Check:
+def _check(pair: Pair, clean: Trace, bench: Bench) -> Check:
     """True refit of the answer to what the rig would show, on its noise; the price of leaving what is known counts."""
-    noise = math.sqrt(bench.level) * np.random.default_rng(1).standard_normal(clean.y.size)
+    answer, forked = pair.answer, bench.forked(pair.rig.model, clean)
+    noise = bench.noise(clean)
     noisy = replace(clean, y=clean.y + clean.sigma * noise)
     z, cost = _refitted(answer, noisy, bench)
     blocks = Blocks.of([clean])
     e = bench.misses(answer.at(z), clean)
     price = 0.5 * float((z - answer.z) @ answer.known @ (z - answer.z))
     true = float(np.sum(np.log((bench.tau + blocks.misfit(noise)) / bench.floor)))
-    return Check(bench.cost(blocks.misfit(e)) + price, float(np.sqrt(np.mean(e**2))), cost - true, z, clean, e)
+    return Check(bench.cost(blocks.misfit(e)) + price - forked, forked, float(np.sqrt(np.mean(e**2))), cost - true, z, clean, e)
 
 
 def chances(pair: Pair, check: Check, slopes: np.ndarray, bench: Bench) -> np.ndarray:
@@ -305,7 +321,7 @@ def chances(pair: Pair, check: Check, slopes: np.ndarray, bench: Bench) -> np.nd
     root = np.linalg.cholesky(np.linalg.inv(rig.known + np.eye(rig.z.size) / VAGUE**2))
     draws = np.random.default_rng(2).standard_normal((DRAWS, rig.z.size)) @ root.T
     gone = check.z - pair.answer.z
-    return np.array([remains(check.e - own @ np.clip(d, -FAR, FAR), slopes, pair.answer.known, blocks, bench, gone) for d in draws])
+    return np.array([remains(check.e - own @ np.clip(d, -FAR, FAR), slopes, pair.answer.known, blocks, bench, gone) for d in draws]) - check.forked
 
 
 def _refitted(answer: Explanation, trace: Trace, bench: Bench) -> tuple[np.ndarray, float]:

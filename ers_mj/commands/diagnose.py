@@ -87,6 +87,9 @@ def _write(folder: Path, document: dict, found: object, progress: Progress) -> l
     following = (document.get("next_recording") or {}).get("excitation")
     following = (document.get("next_recording") or {}).get("excitation")
     following = (document.get("next_recording") or {}).get("excitation")
+    following = (document.get("next_recording") or {}).get("excitation")
+    following = (document.get("next_recording") or {}).get("excitation")
+    following = (document.get("next_recording") or {}).get("excitation")
     return write_results(folder, {
         "diagnosis.json": lambda path: write_text(path, as_json(document) + "\n"),
         "report.html": lambda path: write_text(path, page),
