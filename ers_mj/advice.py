@@ -15,7 +15,7 @@ import numpy as np
 from ers_mj.design import CHANNELS, DESIGN_RATE, SETTLED, VAGUE, Bench, Check, Design, Explanation, Pair, chances, channels, checked, designed, solved
 from ers_mj.effects import BY_NAME
 from ers_mj.excitation import GENTLE, SHARES, Limits, excitations
-from ers_mj.identification import STATES, Fit, Model, tau_of
+from ers_mj.identification import DIFFERENCE, STATES, Fit, Model, tau_of
 from ers_mj.traces import Blocks, Trace
 
 RIVALS = 2  # explanations beside the leader that an input is designed against, the most probable first
@@ -25,6 +25,9 @@ NOISY = 4.0  # median misfit from which what the answer leaves is no longer the 
 WIDER = 1.0  # of the travel seen, that is asked for at either end where the travel seen does not do
 CALLED = {"i_A": "the current (i_A)", "theta_m_rad": "the motor's angle (theta_m_rad)", "vin_V": "the supply voltage (vin_V)"}
 WORTH = 0.95  # of today's interval: one that stays wider is not worth a recording of its own
+SEEN = 0.5  # share of VAGUE below which a number counts as seen at all: what no recording shows may not be there
+WIDEST = 0.1  # step of the differences at most, which are as wide as a number is unknown: stick and slip that fork make no slope
+FORKED = 1.0  # of C that a model may leave of its own recording, on noise
 LOOSE = ("emf_share", "tau_e")  # numbers of the baseline that a datasheet knows better than any recording of the output
 
 
@@ -97,7 +100,7 @@ def _told(pair: Pair, there: Check, excitation: dict, bench: Bench) -> dict:
             "cost_range": [low, high], "cost_of_forks": there.forked, "chance_of_settling": float(np.mean(costs > SETTLED)), "cost_on_noise": there.noisy,
             "cost_the_other_way": back.cost if back else None, "nested": nested,
             "recordings_needed": needed if needed <= (1 if nested else PATIENCE) else None,
-            "channels_sigmas": channels(pair, there, slopes, bench)}
+            "channels_sigmas": channels(pair, there, slopes, bench) if there.cost < SETTLED else {}}
 
 
 def _best_channel(told: Mapping[str, Mapping]) -> str | None:
@@ -128,25 +131,28 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
     wanted = [i for i in wanted if leader.layout[i].owner != "base"] or wanted
     vague = np.eye(leader.z.size) / VAGUE**2
     before = _spreads(leader.known + vague, wanted)
+    wanted, before = [i for i, x in zip(wanted, before) if x < SEEN * VAGUE], before[before < SEEN * VAGUE]
+    by = np.full(leader.z.size, DIFFERENCE)
+    by[wanted] = np.clip(before, DIFFERENCE, WIDEST)
     best, tried = None, 0
     for shares in (SHARES, GENTLE):
         for shape in excitations(bench.limits, shares):
             for excitation in shape:
                 tried += 1
                 trace = bench.filled(leader.model, bench.trace(excitation, excitation["duration_s"], DESIGN_RATE))
-                if trace is None:
+                if trace is None or bench.forked(leader.model, trace) > FORKED:
                     continue
-                e = bench.misses(leader.model, trace)
-                slopes, blocks = bench.slopes(leader, leader.z, e, trace), Blocks.of([trace])
+                e, blocks = bench.misses(leader.model, trace), Blocks.of([trace])
+                slopes = bench.slopes(leader, leader.z, e, trace, by)
                 weight = (2.0 / (bench.floor * blocks.counts))[blocks.index]
                 after = _spreads(leader.known + vague + (slopes * weight[:, None]).T @ slopes, wanted)
-                if best is None or np.sum(np.log(after)) < np.sum(np.log(best[1])):
+                if wanted and (best is None or np.sum(np.log(after)) < np.sum(np.log(best[1]))):
                     best = excitation, after
                 break
         if best:
             break
     if best is None:
-        return {"sentence": "No other explanation is left, and no input was found that keeps the rig within its travel.", "excitation": {},
+        return {"sentence": "No other explanation is left, and no input was found that keeps the rig within its travel and would tell more.", "excitation": {},
                 "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": {"tried": tried, "simulations": bench.simulations}}
     ratios = {leader.layout[i].name: float(a / b) for i, a, b in zip(wanted, best[1], before)}
     weakest = leader.layout[wanted[int(np.argmin(best[1] / before))]]
@@ -204,8 +210,9 @@ def _widened(leader: str, hopeless: Sequence[str], wide: Mapping[str, Design], l
         words.append(f"If the rig bears a travel from {low} to {high}: {asked[0].lower()}{asked[1:-1]}, which would tell {_plain(leader)} and "
                      f"{_plain(name)} apart at {math.sqrt(2 * found.cost):.2g} sigmas.")
     if stuck := [name for name in hopeless if name not in wide]:
-        words.append(f"{_listed(map(_plain, (leader, *stuck))).capitalize()} can only be told apart by a change of the rig, such as taking the load off "
-                     "or turning it over.")
+        at_load = all(BY_NAME[name].subsystem == "load" for name in (leader, *stuck) if name in BY_NAME)
+        words.append(f"Only a change of the rig can tell {_listed(map(_plain, (leader, *stuck)))} apart"
+                     + (", such as taking the load off or turning it over." if at_load else "."))
     return words
 
 

@@ -126,9 +126,10 @@ class Bench:
         more = np.sum(np.log((self.tau + blocks.misfit(e)) / (self.tau + blocks.misfit(noise))))
         return max(float(more), 0.0) if np.isfinite(more) else math.inf
 
-    def slopes(self, one: Explanation, z: np.ndarray, e: np.ndarray, trace: Trace) -> np.ndarray:
-        """Finite differences (N, k) of ``misses``."""
-        columns = [(self.misses(one.at(z + DIFFERENCE * row), trace) - e) / DIFFERENCE for row in np.eye(z.size)]
+    def slopes(self, one: Explanation, z: np.ndarray, e: np.ndarray, trace: Trace, by: np.ndarray | None = None) -> np.ndarray:
+        """Finite differences (N, k) of ``misses``, over steps ``by`` (k,)."""
+        by = np.full(z.size, DIFFERENCE) if by is None else by
+        columns = [(self.misses(one.at(z + row), trace) - e) / step for row, step in zip(np.diag(by), by)]
         return np.nan_to_num(np.column_stack(columns), nan=0.0, posinf=0.0, neginf=0.0)
 
     def further(self, model: Model, trace: Trace) -> dict[str, np.ndarray]:

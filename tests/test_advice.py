@@ -5,6 +5,7 @@ import pytest
 
 from ers_mj.advice import next_recording
 from ers_mj.baseline import baseline
+from ers_mj.commands.diagnose import _input_table
 from ers_mj.datasheet import Datasheet
 from ers_mj.design import SETTLED
 from ers_mj.excitation import SHARES, WAVES, Limits, excitations, signal
@@ -148,3 +149,11 @@ def test_without_a_rival_the_weakest_number_is_narrowed(late):
     advice = advised(late, "sensor_lag")
     assert advice["separates"] == [] and 0.0 < advice["checked"]["interval_ratio"]["T"] < 1.0
     assert "T of the sensor lag" in advice["sentence"]
+
+
+def test_the_input_is_written_as_a_table(late):
+    excitation = advised(late, "input_delay", "sensor_lag")["excitation"]
+    lines = _input_table(excitation).splitlines()
+    t, u = signal(excitation)
+    assert lines[0] == "t_s,u_V" and len(lines) == t.size + 1
+    assert np.allclose([float(line.split(",")[1]) for line in lines[1:]], u, rtol=1e-5, atol=1e-9)

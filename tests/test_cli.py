@@ -193,7 +193,7 @@ def test_diagnose_writes_its_files_and_tells(place, monkeypatch, capsys):
     calls = stub(monkeypatch)
     assert cli.main("diagnose good.csv --holdout second.csv --datasheet good.toml --seed 5 --jobs 2 --out res".split()) == 0
     out, err = capsys.readouterr()
-    assert sorted(p.name for p in (place / "res").iterdir()) == ["diagnosis.json", "model.toml", "next_recording.csv", "plant.xml", "report.html"]
+    assert sorted(p.name for p in (place / "res").iterdir()) == ["diagnosis.json", "model.toml", "plant.xml", "report.html"]
     document = json.loads((place / "res/diagnosis.json").read_text())
     assert document["fit"]["heldout_rmse_after_rad"] is None and document["seed"] == 5
     assert read_datasheet(place / "res/model.toml").lumped["b"] == 1.0
