@@ -169,7 +169,7 @@ class Case:
         return {"effect": name, "sentence": effect.describe(shown), "subsystem": effect.subsystem, "parameters": parameters,
                 "evidence": {"heldout_rmse_without_rad": with_and_without[1], "heldout_rmse_with_rad": with_and_without[0],
                              "delta_bic": 2 * gain - size * math.log(max(without.misfit.size, 2)), "p_value": c.p[name]},
-                "alternatives": self._alternatives(name)}
+                "probability": self._found(name)[1].get(name), "alternatives": self._alternatives(name)}
 
     def _effect_parameters(self, name: str):
         values, errors = dict(self.model.effects_of())[name], self._errors()
@@ -203,30 +203,28 @@ class Case:
 
     def _alternatives(self, name: str) -> list[dict]:
         """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer on them."""
-        ranked = self._found(name)
-        weights = probabilities({c.name: c.fit for c in ranked}) if ranked else {}
+        ranked, weights = self._found(name)
         others = [c for c in ranked[1:] if weights[c.name] > TIED]
         apart = isolability(ranked[0].fit, [c.fit for c in others], self.start.traces) if others else []
         return [{"effect": c.name, "probability": weights[c.name],
-                 "why_not_excluded": f"costs {d.cost:.2f} more than {name} where {ranked[0].gain:.1f} are explained; the two simulations differ "
-                                     f"by {d.sigmas:.2g} times the noise on these recordings",
+                 "why_not_excluded": f"costs {abs(d.cost):.2f} {'more' if d.cost >= 0 else 'less'} than {name}, which explains {ranked[0].gain:.1f}; the two "
+                                     f"simulations differ by {d.sigmas:.2g} times the noise on these recordings",
                  "difference_sigma": d.sigmas, "cost_difference": d.cost} for c, d in zip(others, apart)]
 
-    def _found(self, name: str) -> list[Candidate]:
-        """The effects that were compared when this one was found, itself first."""
+    def _found(self, name: str) -> tuple[list[Candidate], dict[str, float]]:
+        """The effects that were compared when this one was found, itself first, and their probabilities."""
         for ranked in self.selection.rounds:
             named = [c for c in ranked if c.name in BY_NAME and c.gain > 0]
             if named and named[0].name == name:
-                return named
-        return []
+                return named, probabilities({c.name: c.fit for c in named})
+        return [], {}
 
     def _rivals(self) -> tuple[tuple[str, Fit], list[tuple[str, Fit, float]]]:
         """The answer and what the recordings do not exclude in its place, with probabilities: of the effect with the least certain name."""
         chosen = self.selection.chosen
         best = (" and ".join(self.model.names) or "baseline", chosen), []
         for name in self.model.names or [ranked[0].name for ranked in self.selection.rounds[-1:] if ranked and self._left() > SIGNIFICANT]:
-            ranked = self._found(name)
-            weights = probabilities({c.name: c.fit for c in ranked}) if ranked else {}
+            ranked, weights = self._found(name)
             rivals = [(c.name, c.fit, weights[c.name]) for c in ranked[1:] if weights[c.name] > TIED]
             if sum(r[2] for r in rivals) > sum(r[2] for r in best[1]):
                 best = (name, ranked[0].fit), rivals
