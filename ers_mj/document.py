@@ -10,20 +10,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj import __version__
+from ers_mj.advice import next_recording
 from ers_mj.baseline import Start
 from ers_mj.confirmation import Confirmed
 from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.evaluation import free_run, pooled, recalibrated, scored
 from ers_mj.evidence import Evidence, RecordView, Rung
-from ers_mj.excitation import next_recording
-from ers_mj.identification import BASE, STATES, Model, residuals, score, with_starts
+from ers_mj.identification import BASE, STATES, Fit, Model, residuals, score, with_starts
 from ers_mj.intervals import standard_errors
+from ers_mj.isolability import isolability, probabilities
 from ers_mj.localisation import Place, gather, places, residual_map, shaded
 from ers_mj.multibody import Rig
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.recording import Recording
-from ers_mj.selection import Candidate, Selection, tie
+from ers_mj.selection import Candidate, Selection
 from ers_mj.simulation import PER_INERTIA, unit_of
 from ers_mj.traces import Blocks, Trace
 
@@ -94,7 +95,7 @@ class Case:
             "version": 1, "verdict": verdict, "sentence": self._sentence(verdict, missing, fits, found, explained),
             "where": [] if verdict == "consistent" else [self._place(p) for p in found],
             "missing": missing, "remainder": self._remainder(verdict, explained), "record_state": record_state, "fit": fits,
-            "parameters": self._parameters(), "next_recording": next_recording(self._rivals(), self.start.traces, self.input_unit),
+            "parameters": self._parameters(), "next_recording": next_recording(*self._rivals(), self.start.traces, self.input_unit, self.output_unit),
             "data": self._data(), "seed": self.seed, "versions": _versions(),
         }
         if verdict == "unexplained":
@@ -169,7 +170,7 @@ class Case:
         return {"effect": name, "sentence": effect.describe(shown), "subsystem": effect.subsystem, "parameters": parameters,
                 "evidence": {"heldout_rmse_without_rad": with_and_without[1], "heldout_rmse_with_rad": with_and_without[0],
                              "delta_bic": 2 * gain - size * math.log(max(without.misfit.size, 2)), "p_value": c.p[name]},
-                "alternatives": self._alternatives(name)}
+                "probability": self._found(name)[1].get(name), "alternatives": self._alternatives(name)}
 
     def _effect_parameters(self, name: str):
         values, errors = dict(self.model.effects_of())[name], self._errors()
@@ -202,26 +203,33 @@ class Case:
                 "alternatives": []}
 
     def _alternatives(self, name: str) -> list[dict]:
-        """Candidates of the round in which the effect was found that fit no worse beyond chance."""
-        for ranked in self.selection.rounds:
-            mine = next((c for c in ranked if c.name == name), None)
-            if mine is None or mine is not ranked[0]:
-                continue
-            rivals = [(c, tie(mine, c)) for c in ranked if c.name != name and c.name in BY_NAME]
-            tied = [(c, weight) for c, weight in rivals if weight > TIED]
-            total = 1.0 + sum(w for _, w in tied)
-            return [{"effect": c.name, "probability": w / total,
-                     "why_not_excluded": f"explains these recordings within {abs(mine.gain - c.gain):.2f} of {mine.gain:.1f}"}
-                    for c, w in tied]
-        return []
+        """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer on them."""
+        ranked, weights = self._found(name)
+        others = [c for c in ranked[1:] if weights[c.name] > TIED]
+        apart = isolability(ranked[0].fit, [c.fit for c in others], self.start.traces) if others else []
+        return [{"effect": c.name, "probability": weights[c.name],
+                 "why_not_excluded": f"costs {abs(d.cost):.2f} {'more' if d.cost >= 0 else 'less'} than {name}, which explains {ranked[0].gain:.1f}; the two "
+                                     f"simulations differ by {d.sigmas:.2g} times the noise on these recordings",
+                 "difference_sigma": d.sigmas, "cost_difference": d.cost} for c, d in zip(others, apart)]
 
-    def _rivals(self) -> tuple[Candidate, Candidate] | None:
-        """The strongest pair of explanations that these recordings cannot tell apart."""
+    def _found(self, name: str) -> tuple[list[Candidate], dict[str, float]]:
+        """The effects that were compared when this one was found, itself first, and their probabilities."""
         for ranked in self.selection.rounds:
             named = [c for c in ranked if c.name in BY_NAME and c.gain > 0]
-            if len(named) > 1 and named[0].name in self.model.names and tie(named[0], named[1]) > TIED:
-                return named[0], named[1]
-        return None
+            if named and named[0].name == name:
+                return named, probabilities({c.name: c.fit for c in named})
+        return [], {}
+
+    def _rivals(self) -> tuple[tuple[str, Fit], list[tuple[str, Fit, float]]]:
+        """The answer and what the recordings do not exclude in its place, with probabilities: of the effect with the least certain name."""
+        chosen = self.selection.chosen
+        best = (" and ".join(self.model.names) or "baseline", chosen), []
+        for name in self.model.names or [ranked[0].name for ranked in self.selection.rounds[-1:] if ranked and self._left() > SIGNIFICANT]:
+            ranked, weights = self._found(name)
+            rivals = [(c.name, c.fit, weights[c.name]) for c in ranked[1:] if weights[c.name] > TIED]
+            if sum(r[2] for r in rivals) > sum(r[2] for r in best[1]):
+                best = (name, ranked[0].fit), rivals
+        return best
 
     def _errors(self) -> dict:
         """95 % intervals of every fitted number, by (owner, name)."""
