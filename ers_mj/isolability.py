@@ -33,7 +33,7 @@ class Distance:
 def isolability(leader: Fit, others: Sequence[Fit], traces: Sequence[Trace]) -> list[Distance]:
     """The distance of each other explanation: one simulation of the recordings each, and one of the leader."""
     e, out = residuals(leader.model, traces, OBSERVER_RATE), []
-    seen = np.concatenate([t.valid for t in traces])
+    seen = np.concatenate([t.seen for t in traces])
     for other in others:
         apart = (residuals(other.model, traces, OBSERVER_RATE) - e)[seen]
         d = _runs(score(other.misfit, 1.0) - score(leader.misfit, 1.0))

@@ -62,6 +62,11 @@ class Trace:
         return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels))
 
     @property
+    def seen(self) -> np.ndarray:
+        """Which of its residuals (rows,) a sensor saw."""
+        return np.concatenate([self.valid, *(np.isfinite(c.values) for c in self.channels)])
+
+    @property
     def rows(self) -> int:
         """Residuals that the recording gives: samples times (1 + channels)."""
         return self.t.size * (1 + len(self.channels))
