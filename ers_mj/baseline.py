@@ -13,7 +13,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.errors import InputError
 from ers_mj.guess import guesses
-from ers_mj.identification import Fit, Model, descend, fit, hopped, tau_of, with_starts
+from ers_mj.identification import Fit, Model, descend, fit, hopped, tau_of, with_starts, without_spikes
 from ers_mj.traces import Trace
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
@@ -71,7 +71,7 @@ def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Seq
     """Fit, with the initial states fitted before and after."""
     traces = with_starts(model, traces)
     first = fit(model, traces)
-    traces = with_starts(first.model, traces)
+    traces = with_starts(first.model, without_spikes(first.model, traces))
     found = fit(first.model, traces, tau=tau_of(first.misfit))
     return hopped(found, traces, tau_of(found.misfit), jobs, restart=True)
 

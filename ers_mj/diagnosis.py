@@ -14,7 +14,7 @@ from ers_mj.baseline import baseline
 from ers_mj.confirmation import confirmed
 from ers_mj.datasheet import Datasheet
 from ers_mj.document import Case, Diagnosis
-from ers_mj.identification import polished
+from ers_mj.identification import polished, without_spikes
 from ers_mj.multibody import Rig
 from ers_mj.recording import Recording
 from ers_mj.selection import select
@@ -47,12 +47,12 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     traces = [trace_of(r, inertia) for r in recordings]
     progress("fitting the baseline", 0.03)
     start = baseline(traces, datasheet, first.output_unit == "rad", jobs)
-    sensors = _symptoms(traces, 2 * start.fit.model.scales.position)
+    sensors = _symptoms(start.traces, 2 * start.fit.model.scales.position)
     chosen = select(start.fit, start.traces, anchors=start.anchors, jobs=jobs, progress=progress)
     start = replace(start, fit=polished(start.fit, start.traces))
     chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
     progress("judging on held-out data", 0.75)
-    held = [trace_of(r, inertia) for r in holdout]
+    held = without_spikes(start.fit.model, [trace_of(r, inertia) for r in holdout])
     selection, judged = confirmed(start, chosen, held, jobs)
     progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")

@@ -18,6 +18,7 @@ import numpy as np
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Parameter, Scales
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.symptoms import excursions
 from ers_mj.traces import Blocks, Trace, parabola_start, start_samples
 
 OBSERVER_RATE = 5.0  # [1/s]
@@ -39,6 +40,7 @@ HOPELESS = 0.02  # excess of C per block over a nested model at which a search i
 NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
 FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
+SPIKE = 3.5, 0.9, 5  # times nine tenths of the changes of a model's error (8 sigma where that is noise), at most so many samples
 CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 STATES = ("gain", "offset", "friction_level")
 
@@ -469,6 +471,15 @@ def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None)
         jacobian[:, k] = (residuals(model.at(layout, shifted), traces, rate) - e) / DIFFERENCE
     jacobian[~np.isfinite(jacobian)] = 0.0
     return jacobian
+
+
+def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
+    """The traces without the spikes that stand out of the model's error: a rudder's own error is smooth, however wrong the model is."""
+    out = []
+    for k, trace in enumerate(traces):
+        e = np.where(trace.valid, (trace.y - model.predict(trace, k, OBSERVER_RATE)) / trace.sigma, np.nan)
+        out.append(trace.without(excursions(e, 1.0, *SPIKE)) if np.isfinite(e[trace.valid]).all() else trace)
+    return out
 
 
 def with_starts(model: Model, traces: Sequence[Trace]) -> list[Trace]:

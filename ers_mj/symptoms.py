@@ -113,25 +113,26 @@ def _refined(gaps: np.ndarray, step: float) -> float:
 # -- samples that are not the signal's -----------------------------------------------------------------------
 
 
-def excursions(y: np.ndarray, sigma: float) -> list[slice]:
-    """Spans of at most LONGEST_EXCURSION samples in which y (N,) jumps away from its course and back again.
+def excursions(y: np.ndarray, sigma: float, times: float = JUMP, usual: float = 0.98,
+               longest: int = LONGEST_EXCURSION) -> list[slice]:
+    """Spans of at most ``longest`` samples in which y (N,) jumps away from its course and back again.
 
-    A jump is a change from sample to sample that differs from the usual one around it by more than JUMP noise levels ``sigma``, and
-    by far more than quick motion does in this recording.
+    A jump is a change from sample to sample that differs from the usual one around it by more than ``times`` noise levels ``sigma``, and
+    as many times what a share ``usual`` of the changes in this recording stays below: quick motion.
     """
     known = np.flatnonzero(np.isfinite(y))
     change = np.diff(y[known])
     if change.size < 2 * NEIGHBOURS:
         return []
     jump = change - median_filter(change, 2 * CALM_CHANGES + 1, mode="nearest")
-    least = JUMP * max(sigma, float(np.quantile(np.abs(jump), 0.98)))
+    least = times * max(sigma, float(np.quantile(np.abs(jump), usual)))
     large = np.flatnonzero(np.abs(jump) > least)
     out, end = [], -1
     for i, k in enumerate(large):
         if k < end:
             continue
         for back in large[i + 1:]:
-            if back - k > LONGEST_EXCURSION:
+            if back - k > longest:
                 break
             if abs(jump[k] + jump[back]) < 0.5 * abs(jump[k]):
                 out.append(slice(int(known[k + 1]), int(known[back]) + 1))

@@ -61,6 +61,16 @@ class Trace:
                           pick(self.load), self.sigma, self.quantum)
         return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels))
 
+    def without(self, spans: Sequence[slice]) -> Trace:
+        """The trace with further spans lost."""
+        if not spans:
+            return self
+        valid = self.valid.copy()
+        for span in spans:
+            valid[span] = False
+        made = make_trace(self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum)
+        return replace(made, start=self.start, channels=self.channels, lost=(*self.lost, *spans))
+
     @property
     def seen(self) -> np.ndarray:
         """Which of its residuals (rows,) a sensor saw."""
@@ -81,11 +91,9 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
     stuck = [s for s in frozen_spans(y, recording.quantum) if not at_extreme(y, s)]
     lost = (*excursions(np.where(recording.valid, y, np.nan), sigma), *stuck)
-    valid = recording.valid.copy()
-    for span in lost:
-        valid[span] = False
-    trace = make_trace(recording.name, recording.t, recording.u, y, valid, recording.enable, load, sigma, recording.quantum)
-    return replace(trace, lost=lost, channels=_channels(recording, valid))
+    trace = make_trace(recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum)
+    trace = trace.without(lost)
+    return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid))
 
 
 def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
@@ -112,10 +120,13 @@ def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
     """A trace with its blocks of BLOCK seconds and its initial state."""
     block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
     counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
-    observed = np.where(valid, y, np.nan)
-    n = start_samples(t)
-    start = parabola_start(t[:n], observed[:n])
-    return Trace(name, t, u, observed, valid, enable, load, sigma, quantum, start, block, counts)
+    trace = Trace(name, t, u, np.where(valid, y, np.nan), valid, enable, load, sigma, quantum, (0.0, 0.0), block, counts)
+    return replace(trace, start=_started(trace))
+
+
+def _started(trace: Trace) -> tuple[float, float]:
+    n = start_samples(trace.t)
+    return parabola_start(trace.t[:n], trace.y[:n])
 
 
 def start_samples(t: np.ndarray) -> int:
