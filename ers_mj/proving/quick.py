@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 
 from ers_mj.proving.catalogue import put_effects, samples_of
-from ers_mj.proving.laws import (BRI, BUS, CONTROLLER, CUR, LAG, STATES, TH, THM, W, WM, bristle_rate, current_rate, dry,
+from ers_mj.proving.laws import (APP, BRI, BUS, CONTROLLER, CUR, LAG, STATES, TH, THM, W, WM, bristle_rate, current_rate, dry,
                                  free_torques, friction_level, inertia, pid, plant_of, quantise, sensed, slow_rates)
 
 STAND_S = 0.25
@@ -172,7 +172,7 @@ def march(plant, u_in, target, c, closed, dt, substeps, noise, stuck, spike, gai
     p = plant[0]
     h, samples = dt / substeps, u_in.size
     out, y, work, memory = np.zeros((5, samples)), np.zeros(STATES), np.zeros((4, STATES)), np.zeros(3)
-    y[TH] = y[THM] = y[LAG] = p.theta_0
+    y[TH] = y[THM] = y[LAG] = y[APP] = p.theta_0
     y[BUS] = p.sag_V
     delay, late = int(round(p.delay_s / h)), int(round(p.lag_s / h))
     window = max(2 * late, 1) if p.lag_form == 3.0 else late + 1

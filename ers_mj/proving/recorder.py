@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from ers_mj.proving.catalogue import put_effects, samples_of
-from ers_mj.proving.laws import (BRI, BUS, CONTROLLER, CUR, LAG, STATES, TABLE_1, TH, THM, W, WM, bristle_rate, current_rate, dry, free_torques,
+from ers_mj.proving.laws import (APP, BRI, BUS, CONTROLLER, CUR, LAG, STATES, TABLE_1, TH, THM, W, WM, bristle_rate, current_rate, dry, free_torques,
                                  friction_level, inertia, motor_torque, plant_of, slow_rates)
 from ers_mj.proving.mechanism import LIGHT, mechanism
 from ers_mj.proving.quick import STAND_S, Run, take
@@ -77,7 +77,7 @@ def record(params: Mapping[str, float], effects: Sequence[Mapping], t: np.ndarra
 
 def _relaxed(laws: np.ndarray) -> np.ndarray:
     y = np.zeros(STATES)
-    y[[TH, THM, LAG]] = laws["theta_0"][0]
+    y[[TH, THM, LAG, APP]] = laws["theta_0"][0]
     y[BUS] = laws["sag_V"][0]
     return y
 
