@@ -52,16 +52,18 @@ FREE = ("J", "B", "K_e", "k_s", "T_LH", "F_c", "theta_0")
 """What angle and voltage can tell of Eq. (1): R, K_t and the ordinary L are held."""
 
 
+def moved(params, x):
+    """Parameters FREE moved by x: relative, theta_0 in radians."""
+    values = {name: float(params[name] * np.exp(v)) for name, v in zip(FREE[:-1], x)}
+    return params | values | {"theta_0": params["theta_0"] + x[-1]}
+
+
 def refit(servo, runs, rounds=5):
     """[rms over sigma] a record that the effect-free Eq. (1) leaves: Levenberg-Marquardt on log parameters, noise-free angles."""
     sigma = servo["sensor"]["noise_sigma_eff_rad"]
 
-    def moved(x):
-        values = {name: float(servo["params"][name] * np.exp(v)) for name, v in zip(FREE[:-1], x)}
-        return servo["params"] | values | {"theta_0": servo["params"]["theta_0"] + x[-1]}
-
     def residuals(x):
-        return [(simulate(moved(x), [], r["t"], with_it.u, step=ROUGH).clean - with_it.clean) / sigma
+        return [(simulate(moved(servo["params"], x), [], r["t"], with_it.u, step=ROUGH).clean - with_it.clean) / sigma
                 for r, with_it in zip(servo["records"], runs)]
 
     x, parts, damping = np.zeros(len(FREE)), residuals(np.zeros(len(FREE))), 1e-3
@@ -81,3 +83,31 @@ def refit(servo, runs, rounds=5):
         if gain < 1e-3 * np.sum(flat**2):
             break
     return [float(np.sqrt(np.mean(part**2))) for part in parts]
+
+
+class Ruler:
+    """Measures effects on one servo by the quick simulator: at once by projection, or by the refit itself."""
+
+    def __init__(self, servo: dict):
+        self.servo, self.sigma = servo, servo["sensor"]["noise_sigma_eff_rad"]
+        self.runs = [run(servo, record, k, [], ROUGH) for k, record in enumerate(servo["records"])]
+        columns = []
+        for e in np.eye(len(FREE)):
+            pairs = [[simulate(moved(servo["params"], way * 1e-4 * e), [], r["t"], x.u, step=ROUGH).true for way in (1, -1)]
+                     for r, x in zip(servo["records"], self.runs)]
+            columns.append(np.concatenate([up - down for up, down in pairs]))
+        self.basis = np.linalg.qr(np.stack(columns, 1) + 0.0)[0]
+
+    def projected(self, effects: list[dict]) -> float:
+        """[sigma] rms of what the effects move, less what small changes of the parameters can imitate."""
+        step, moved_by = step_for(effects), []
+        for number, record in enumerate(self.servo["records"]):
+            with_it = run(self.servo, record, number, effects, step)
+            moved_by.append(with_it.clean - bare(self.servo, record, with_it.u, step))
+        change = np.concatenate(moved_by)
+        return float(np.sqrt(np.mean((change - self.basis @ (self.basis.T @ change)) ** 2)) / self.sigma)
+
+    def refitted(self, effects: list[dict]) -> float:
+        """[sigma] rms that the refitted effect-free model leaves."""
+        step = step_for(effects)
+        return pooled(self.servo, refit(self.servo, [run(self.servo, r, k, effects, step) for k, r in enumerate(self.servo["records"])], 4))
