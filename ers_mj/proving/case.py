@@ -17,7 +17,7 @@ from ers_mj.proving.strength import clutter, conceal
 
 KINDS = {"null": 0.25, "single": 0.5, "several": 0.15, "outside": 0.1}
 RATES, WEIGHTS = (200, 250, 500, 1000, 2000), (0.15, 0.1, 0.2, 0.4, 0.15)
-FINE_STEP, ROUGH_STEP = 1.2e-5, 2.5e-5  # [s] between which MuJoCo's step is drawn; the package's own is 5e-5
+FINE_STEP, ROUGH_STEP = 1.5e-5, 2.5e-5  # [s] between which MuJoCo's step is drawn; the package's own is 5e-5
 ROD = 0.5  # share of the variable ratios that are the rod linkage of mjcf/
 
 

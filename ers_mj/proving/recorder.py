@@ -2,7 +2,7 @@
 
 MuJoCo's step v += h a, q += h v is second order if q is read as the angle half a step later. So the laws take q as the
 middle of the coming step, and what is observed is q - h v / 2. The winding's current and every other state of the laws is
-stepped by Heun's rule at 10 us or less, with the speed running on as in the last step.
+stepped by Heun's rule at 15 us or less, with the speed running on as in the last step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ers_mj.proving.laws import (APP, BRI, BUS, CONTROLLER, CUR, LAG, STATES, TA
 from ers_mj.proving.mechanism import LIGHT, mechanism
 from ers_mj.proving.quick import STAND_S, Run, take
 
-FINEST = 1e-5  # [s] the longest step of current and sensor
+FINEST = 1.5e-5  # [s] the longest step of current and sensor
 N = TABLE_1["n"]
 
 
