@@ -1,4 +1,4 @@
-"""The rudder system of mjcf/ as the generator uses it: bodies, linkage, spring, preload, dry friction and play are MuJoCo's.
+"""The rudder system of mjcf/ as the generator uses it: bodies, linkage, spring, dry friction and play are MuJoCo's.
 
 What MuJoCo has no element for is left to `recorder.py`, which sets two torques (on the rotor, on the rudder) and the levels of dry
 friction at every step. All numbers come from a record of `laws.PLANT`.
@@ -17,7 +17,6 @@ from ers_mj.proving.laws import TABLE_1
 
 LINKAGES = ("constant", "rod")
 ARM, ROD = 0.01417, 0.042  # [m] rocker arm and rod between its pins, as mjcf/ has them
-LEVER = 1e-6  # [kg m^2] either lever of the preload; one of them moves along with the rudder
 SMALL = 3.2e-4  # of the motor's share of J in the nut and in the rocker, each
 LIGHT = 0.05  # of J left to the motor's bodies where a ratio of the generator's own moves the rest as armature
 RIGID = [0.9999, 0.9999, 0.001, 0.5, 2.0]
@@ -96,23 +95,22 @@ def _gear(spec: mujoco.MjSpec, linkage: str, two: bool) -> None:
 
 
 def _inertia(spec: mujoco.MjSpec, p: np.void) -> None:
-    """J shared among rotor, nut, rocker, rudder and a lever; an appendage takes its own from the rudder's."""
+    """J shared among rotor, nut, rocker and rudder; an appendage takes its own from the rudder's."""
     motor = p["J"] * (LIGHT if p["ratio_form"] > 0 else p["share_J"])
     nut = rocker = SMALL * motor
-    rudder = p["J"] * (1.0 - p["share_J"]) - LEVER - p["app_J"]
+    rudder = p["J"] * (1.0 - p["share_J"]) - p["app_J"]
     spec.body("nut").mass = nut / ARM**2
-    parts = {"motor": (motor - nut - rocker) / TABLE_1["n"] ** 2, "rocker": rocker, "rudder": rudder, "lever_up": LEVER, "lever_down": LEVER}
+    parts = {"motor": (motor - nut - rocker) / TABLE_1["n"] ** 2, "rocker": rocker, "rudder": rudder}
     for body, size in parts.items():
         spec.body(body).inertia = [size] * 3
 
 
 def _spring(spec: mujoco.MjSpec, p: np.void) -> None:
-    """The spring as the tendon's stiffness, the preload as two levers, each pressed on a stop at theta_0."""
+    """The spring as the tendon's stiffness; its preload is the recorder's, so the levers of mjcf/ go."""
     rest, tendon = float(p["theta_0"]), spec.tendon("rudder_angle")
     tendon.stiffness, tendon.springlength = [p["k_s"], 0.0, 0.0], [rest, rest]
-    for way, sign, ends in (("up", -1.0, [rest, 1e6]), ("down", 1.0, [-1e6, rest])):
-        spec.joint(f"lever_{way}").range = ends
-        spec.actuator(f"preload_{way}").biasprm[0] = sign * p["T_LH"]
+    for way in ("up", "down"):
+        spec.delete(spec.body(f"lever_{way}"))
 
 
 def _damping(spec: mujoco.MjSpec, p: np.void, laws: np.ndarray) -> None:
@@ -150,9 +148,9 @@ def _native(spec: mujoco.MjSpec, p: np.void, laws: np.ndarray, two: bool, h: flo
 
 def _pose(theta: float, linkage: str) -> dict[str, float]:
     """Joint positions with the rudder at theta, the play centred."""
-    n, levers = TABLE_1["n"], {"lever_up": theta, "lever_down": theta}
+    n = TABLE_1["n"]
     if linkage == "constant":
-        return levers | {"rocker": theta, "rotor": n * theta, "nut": ARM * theta}
+        return {"rocker": theta, "rotor": n * theta, "nut": ARM * theta}
     rise = ARM * (1.0 - math.cos(theta))
     nut = ARM * math.sin(theta) + ROD - math.sqrt(ROD**2 - rise**2)
-    return levers | {"rocker": theta, "nut": nut, "rotor": nut * n / ARM, "rod": math.asin(rise / ROD)}
+    return {"rocker": theta, "nut": nut, "rotor": nut * n / ARM, "rod": math.asin(rise / ROD)}

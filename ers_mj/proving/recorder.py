@@ -21,6 +21,7 @@ from ers_mj.proving.mechanism import LIGHT, mechanism
 from ers_mj.proving.quick import STAND_S, Run, take
 
 FINEST = 1.5e-5  # [s] the longest step of current and sensor
+TOUCH = 1e-7  # [rad] from theta_0 within which the rudder stands on it
 N = TABLE_1["n"]
 
 
@@ -116,6 +117,25 @@ def fast_rates(p, y, u, gain, dy):
 
 
 @njit(cache=True)
+def preload(p, x, w, h, drive, level):
+    """(torque, dry friction) [N m] of T_LH Sgn(theta - theta_0) in a step that begins at x = theta - theta_0 with speed w.
+
+    Where theta_0 is passed the torque is the mean over the step. Where the rudder stops there, under a torque `drive` within
+    the band, T_LH is one more dry friction, which MuJoCo solves as a set.
+    """
+    after = x + h * w
+    push_on = p.J * (1.0 - p.two * p.share_J) * w / h + drive
+    near = min(abs(x), abs(after)) < TOUCH
+    if near or x * after < 0.0:
+        if abs(push_on) <= level + p.T_LH:
+            return 0.0, p.T_LH
+        if near:
+            return p.T_LH * np.sign(push_on), 0.0
+        return p.T_LH * (x + after) / (abs(x) + abs(after)), 0.0
+    return p.T_LH * np.sign(x), 0.0
+
+
+@njit(cache=True)
 def push(laws, y, work, speeds, count, h, parts, out, substeps, delay, gain, ring, qpos, qvel, ctrl, frictionloss, joint_friction,
          joint_armature, places):
     """Carry the states of the laws over MuJoCo's coming step number `count`, and set the torques and friction that act in it."""
@@ -157,8 +177,11 @@ def push(laws, y, work, speeds, count, h, parts, out, substeps, delay, gain, rin
         joint_armature[places[0]] = j + p.app_J - p.J * (1.0 - p.share_J + LIGHT)
         tau -= 0.5 * slope * middle[W] ** 2
     up, down = dry(p, middle, middle[W], 1.0, False), dry(p, middle, middle[W], -1.0, False)
-    frictionloss[places[5]] = 0.5 * (up + down)
     tau -= 0.5 * (up - down)
+    drive = tau if p.two > 0.0 else tau + tau_m
+    pressed, held = preload(p, start[TH] - p.theta_0, start[W], h, drive, 0.5 * (up + down))
+    frictionloss[places[5]] = 0.5 * (up + down) + held
+    tau -= pressed
     if p.two > 0.0:
         up, down = dry(p, middle, middle[WM], 1.0, True), dry(p, middle, middle[WM], -1.0, True)
         joint_friction[places[0]] = 0.5 * (up + down)
