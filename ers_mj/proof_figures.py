@@ -74,7 +74,7 @@ def _accuracy(bins: Sequence[Mapping], rows: Sequence[Mapping], width: float) ->
         ax.plot([middle, middle], b["ci95"], color=AFTER, linewidth=1.2)
         ax.annotate(f"{b['right']}/{b['of']}", (middle, share), xytext=(5, 5), textcoords="offset points", fontsize=8.5, color=INK)
     for r in rows:
-        if r["kind"] == "single":
+        if r["kind"] == "single" and np.isfinite(r["visibility"]):
             fits = bool(r["named"]) and class_of(r["named"][0]) == class_of(r["labels"][0])
             ax.plot([np.clip(r["visibility"], 0.02, MOST_SIGMA)], [1.06 if fits else -0.06], "o", markersize=4, alpha=0.6, color=AFTER if fits else BEFORE)
     ax.set_xscale("log")

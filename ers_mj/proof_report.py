@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ers_mj import figures, page
-from ers_mj.display import NONE, figure as digits
+from ers_mj.display import NONE, figure as digits, missing
 from ers_mj.proof_figures import drawn
 from ers_mj.proving.scoring import NOTHING, first
 
@@ -35,7 +35,7 @@ def table_of(results: Mapping) -> list[tuple[str, str, str]]:
         if n:
             ends = results["ci95"].get(name)
             out.append((told, f"{k} of {n}", f"{k / n:.2f}" + (f" [{ends[0]:.2f}, {ends[1]:.2f}]" if ends else "")))
-    for owner, told in (("baseline", "95 % intervals of the baseline's parameters hold the truth"), ("effect", "95 % intervals of effects' parameters hold it")):
+    for owner, told in (("baseline", "95 % intervals of the baseline's parameters hold the truth"), ("baseline_alone", "the same, neither effect nor clutter"), ("effect", "95 % intervals of effects' parameters hold it")):
         c = results["parameters"][owner]["all"]
         if c["of"]:
             out.append((told, f"{c['inside']} of {c['of']}", f"{c['coverage']:.2f} [{c['ci95'][0]:.2f}, {c['ci95'][1]:.2f}]"))
@@ -51,6 +51,7 @@ def proof_page(results: Mapping, rows: Sequence[Mapping], about: Mapping[str, st
     body = "\n".join([
         page.header("consistent", "What the diagnosis can do", "ers prove", headline(results), _tiles(results)),
         page.section("Shares", "Wilson's intervals. An answer that failed or ran out of time counts as wrong.", shares),
+        page.section("Beside what the rigs have of their own", REAL, _real(results)),
         page.section("Pictures", "", pictures), page.section("Parameters", PARAMETERS, _parameters(results)),
         page.section("Every case", "What was concealed, how much of it a refitted model leaves, what was answered.", _cases(rows)),
         f"<footer><p>{told}</p></footer>"])
@@ -81,12 +82,23 @@ def _parameters(results: Mapping) -> str:
     return page.table(["parameter", ">95 % interval holds the truth", ">median relative error"], rows)
 
 
+REAL = ("Effects concealed in real recordings. What is named in the untouched records is the rig's own; a concealed effect counts as found where its "
+        "class is named at all.")
+
+
+def _real(results: Mapping) -> str:
+    rows = [((page.text(x["rig"]), page.named(x["concealed"]), digits(x["strength"]), "yes" if x["found"] else "no",
+              page.named(" + ".join(x["named"]) or NOTHING)), "") for x in results.get("concealed_in_real", [])]
+    own = "; ".join(f"{rig}: {', '.join(names) or NOTHING}" for rig, names in results.get("own", {}).items())
+    return f"<p>{page.named(own)}</p>" + page.table(["rig", "concealed", ">strength (SI)", "found", "named"], rows) if rows or own else ""
+
+
 def _cases(rows: Sequence[Mapping]) -> str:
     lines = []
     for r in rows:
         truth = " + ".join(r["labels"]) or NOTHING
         answer = " + ".join(r["named"]) or first(r)
         over = digits(r["after"] / r["floor"]) if r["after"] is not None and r["floor"] else NONE
-        lines.append(((r["case"], r["kind"], page.named(truth) + (" (rod)" if r["linkage"] == "rod" else ""), digits(r["visibility"]),
+        lines.append(((r["case"], r["kind"], page.named(truth) + (" (rod)" if r["linkage"] == "rod" else ""), NONE if missing(r["visibility"]) else digits(r["visibility"]),
                        page.named(answer) + (" (flagged)" if r["significant"] else ""), over, NONE if r["cpu_s"] is None else digits(r["cpu_s"])), ""))
     return page.table(["case", "kind", "concealed", ">left [sigma]", "answered", ">error / floor", ">processor [s]"], lines)

@@ -52,6 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     tasks, settings = _tasks(arguments)
     from ers_mj.proving.conduct import conduct
+    from ers_mj.proving.real import scored_real
     from ers_mj.proving.scoring import row_of, scored
 
     try:
@@ -63,9 +64,8 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
         print(f"ers: stopped; {kept}", file=sys.stderr)
         return STOPPED
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
-    if arguments.real:
-        from ers_mj.proving.real import scored_real as scored  # noqa: F811
-    results = plain({**scored(rows), "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)})
+    scores = scored(rows) if arguments.real is None else scored_real(rows)
+    results = plain({**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)})
     told = _told(results)
     files = _write(folder, results, rows, told) if keeps else []
     print(as_json(results) if arguments.json else "\n".join([*told, *(["", bold("written"), *(f"  {path}" for path in files)] if files else [])]))
@@ -130,8 +130,19 @@ def _told(results: dict) -> list[str]:
         lines.append(f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]")
     lines += ["", bold("concealed -> named first")]
     lines += [f"  {truth:58} {', '.join(f'{k} x {name}' if k > 1 else name for name, k in named.items())}" for truth, named in results["confusion"].items()]
+    lines += _told_real(results) if "concealed_in_real" in results else []
     over, cpu, wall = results["error_over_floor"], results["cpu_s"], results["wall_s"]
     lines += ["", f"held-out error over noise floor: median {over['median']:.3g}, 90 % below {over['p90']:.3g}"] if over.get("median") else [""]
     if cpu:
         lines.append(f"time a case: median {cpu['median']:.1f} s of one processor, at most {cpu['max']:.1f} s (by the clock {wall['median']:.1f} and {wall['max']:.1f} s)")
     return lines + [f"no answer: {failure}" for failure in results["failures"]]
+
+
+def _told_real(results: dict) -> list[str]:
+    """What was concealed in real records and found again beside what the rigs have of their own."""
+    lines = ["", bold("the rigs as they are")]
+    lines += [f"  {rig:12} {', '.join(names) or 'nothing'}" for rig, names in results["own"].items()]
+    lines += ["", bold("concealed in them")]
+    for x in results["concealed_in_real"]:
+        lines.append(f"  {x['rig']:12} {x['concealed']:22} {x['strength']:<10.3g} {'found' if x['found'] else '-':7} {', '.join(x['named']) or 'nothing'}")
+    return lines

@@ -44,12 +44,17 @@ def row_of(truth: Mapping, answer: Mapping) -> dict:
     missing = document.get("missing") or []
     where = [entry.get("label") for entry in document.get("where") or [] if entry.get("axis") == "subsystem"]
     return {"case": truth["case"], "kind": truth["kind"], "labels": truth["labels"], "linkage": truth.get("linkage"),
-            "clutter": [e["label"] for e in truth.get("clutter", [])], "visibility": truth["visibility_after_refit_sigma"],
+            "clutter": [e["label"] for e in truth.get("clutter", [])], "rig": truth.get("rig"), "size": truth.get("size"),
+            "strength": truth["effects"][0]["strength"] if truth.get("effects") else None, "visibility": _or_nan(truth["visibility_after_refit_sigma"]),
             "named": [m["effect"] for m in missing], "verdict": document.get("verdict") or NO_ANSWER, "error": answer.get("error"),
             "significant": bool(remainder.get("significant")), "where": where[:1], "beliefs": beliefs(missing),
             "before": fit.get("heldout_rmse_before_rad"), "after": fit.get("heldout_rmse_after_rad"), "floor": fit.get("noise_floor_rad"),
             "cpu_s": answer.get("cpu_s"), "wall_s": answer.get("wall_s"), "peak_MiB": answer.get("peak_MiB"),
             "parameters": covered(truth, document)}
+
+
+def _or_nan(x: float | None) -> float:
+    return float("nan") if x is None else x
 
 
 def beliefs(missing: Sequence[Mapping]) -> list[tuple[str, float]]:
@@ -153,9 +158,11 @@ def _over_floor(rows: Iterable[Mapping]) -> dict:
 
 
 def _parameters(rows: Iterable[Mapping]) -> dict:
-    """Error and coverage of the 95 % intervals, by parameter and pooled over the baseline's and the effects'."""
+    """Error and coverage of the 95 % intervals, by parameter and pooled: the baseline's, the same where nothing at all is concealed (clutter
+    moves parameters, too), the effects'."""
     entries = [e for r in rows for e in r["parameters"]]
-    out = {}
+    bare = [e for r in rows for e in r["parameters"] if e["owner"] == "baseline" and not r["labels"] and not r["clutter"]]
+    out = {"baseline_alone": {"all": _coverage(bare)}}
     for owner in ("baseline", "effect"):
         mine = [e for e in entries if e["owner"] == owner]
         out[owner] = {"all": _coverage(mine)} | {name: _coverage([e for e in mine if e["name"] == name]) for name in dict.fromkeys(e["name"] for e in mine)}
