@@ -61,8 +61,11 @@ def conduct(folder: Path, tasks: Sequence[Task], settings: dict, *, force: bool 
 
 
 def _make(folder: Path, tasks: Sequence[Task], jobs: int, progress: Progress) -> None:
-    """Make the cases in processes of their own."""
-    if not tasks:
+    """Make the cases, here or in processes of their own."""
+    if min(jobs, len(tasks)) <= 1:
+        for k, task in enumerate(tasks):
+            progress(f"making case {k + 1} of {len(tasks)}", MAKING * k / len(tasks))
+            _made(folder, task)
         return
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_deaf)
