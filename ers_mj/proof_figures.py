@@ -13,7 +13,7 @@ from ers_mj.proving.scoring import NO_ANSWER, NOTHING, OUTSIDE, UNEXPLAINED, cla
 
 LAST = (NOTHING, UNEXPLAINED, NO_ANSWER)
 DARK = 0.55  # of the colour scale, from which numbers are white
-MOST_SIGMA = 300.0
+MOST_SIGMA = 100.0
 
 
 def drawn(results: Mapping, rows: Sequence[Mapping]) -> dict[str, str]:
@@ -54,7 +54,7 @@ def _confusion(table: Mapping[str, Mapping[str, int]], width: float) -> Figure:
             ax.plot([j - 0.5, j + 0.5, j + 0.5, j - 0.5, j - 0.5], [i - 0.5, i - 0.5, i + 0.5, i + 0.5, i - 0.5], color=AFTER, linewidth=1.1)
         if count:
             ax.text(j, i, f"{count:.0f}", ha="center", va="center", fontsize=8.5, color="white" if share[i, j] > DARK else INK)
-    ax.set_xticks(range(len(columns)), [c.replace("_", " ") for c in columns], rotation=90, fontsize=8)
+    ax.set_xticks(range(len(columns)), [c.replace("_", " ") for c in columns], rotation=90, fontsize=8 if width == WIDE else 6.5)
     ax.set_yticks(range(len(rows)), [r.replace("_", " ") for r in rows], fontsize=8)
     ax.set_xlim(-0.55, len(columns) - 0.45)
     ax.set_ylim(len(rows) - 0.45, -0.55)
@@ -72,12 +72,15 @@ def _accuracy(bins: Sequence[Mapping], rows: Sequence[Mapping], width: float) ->
         middle, share = np.sqrt(low * high), b["right"] / b["of"]
         ax.plot([low, high], [share, share], color=AFTER, linewidth=2.2, solid_capstyle="butt")
         ax.plot([middle, middle], b["ci95"], color=AFTER, linewidth=1.2)
-        ax.annotate(f"{b['right']}/{b['of']}", (middle, share), xytext=(5, 5), textcoords="offset points", fontsize=8.5, color=INK)
+        ax.annotate(f"{b['right']}/{b['of']}", (middle, share), xytext=(5, 5 if share < 0.9 else -13), textcoords="offset points", fontsize=8.5, color=INK)
     for r in rows:
         if r["kind"] == "single" and np.isfinite(r["visibility"]):
             fits = bool(r["named"]) and class_of(r["named"][0]) == class_of(r["labels"][0])
             ax.plot([np.clip(r["visibility"], 0.02, MOST_SIGMA)], [1.06 if fits else -0.06], "o", markersize=4, alpha=0.6, color=AFTER if fits else BEFORE)
     ax.set_xscale("log")
+    ticks = [t for t in (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if t >= 0.8 * ax.get_xlim()[0]]
+    ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    ax.minorticks_off()
     ax.set_ylim(-0.12, 1.12)
     ax.set_yticks(np.arange(0, 1.01, 0.25))
     ax.set_xlabel("left after refit [sigma of the noise]")
@@ -111,6 +114,7 @@ def _histogram(groups: Sequence[tuple[str, Sequence[float]]], label: str, width:
     edges = np.geomspace(low, high, 25)
     for _, values in groups:
         ax.hist(values, bins=edges, color=AFTER, alpha=0.85)
+    ax.margins(y=0.18)
     _line(ax, float(np.median(every)))
     ax.set_xscale("log")
     ticks = [t for t in (0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 200, 300, 1000) if low <= t <= high]

@@ -27,10 +27,12 @@ def hash_of(content: bytes) -> str:
 
 
 def code_hash(*folders: str) -> str:
-    """Hash of the package's sources, of these folders within it (all but proving/ where none is named)."""
+    """Hash of the package's sources: of these folders within it, or of all that diagnoses where none is named."""
     root = Path(__file__).resolve().parents[1]
-    files = sorted(p for p in root.rglob("*.py") if (p.relative_to(root).parts[0] in folders if folders else p.relative_to(root).parts[0] != "proving"))
-    return hash_of(b"".join(p.relative_to(root).as_posix().encode() + p.read_bytes() for p in files))
+    parts = {p: p.relative_to(root).parts for p in sorted(root.rglob("*.py"))}
+    proof = ("proving", "prove.py", "proof_")
+    chosen = [p for p, names in parts.items() if (names[0] in folders if folders else not any(name.startswith(proof) for name in names))]
+    return hash_of(b"".join(p.relative_to(root).as_posix().encode() + p.read_bytes() for p in chosen))
 
 
 def begin(folder: Path, settings: Mapping, force: bool) -> bool:
