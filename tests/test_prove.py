@@ -176,7 +176,7 @@ def test_a_second_run_keeps_what_is_there(tmp_path, asked):
 
 def test_answers_of_other_code_are_asked_anew(tmp_path, asked, monkeypatch):
     conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
-    monkeypatch.setattr(conduct, "code_hash", lambda *folders: sealing.code_hash(*folders) if folders else "other")
+    monkeypatch.setattr(conduct, "hash_of_diagnosis", lambda: "other")
     conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
     assert len(asked) == 6
 

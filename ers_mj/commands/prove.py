@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import tempfile
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,6 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     tasks, settings = _tasks(arguments)
+    _heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
     from ers_mj.proving.scoring import row_of, scored
@@ -88,6 +91,12 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     plans = case.plans(arguments.cases or CASES, arguments.seed)
     tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in plans]
     return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(plans)}
+
+
+def _heed_terminate() -> None:
+    """Let a plain kill stop as Ctrl-C does: no diagnosis under way is left behind."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _tell(line: str) -> None:

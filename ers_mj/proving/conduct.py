@@ -8,12 +8,12 @@ from __future__ import annotations
 import multiprocessing
 import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
 from ers_mj.proving.asking import LIMIT, Asker
-from ers_mj.proving.sealing import answer_of, begin, code_hash, has_case, keep_answer, keep_case, opened, seal
+from ers_mj.proving.sealing import answer_of, begin, has_case, hash_of_diagnosis, hash_of_maker, keep_answer, keep_case, opened, seal
 
 Progress = Callable[[str, float], None]
 MAKING = 0.4  # share of the bar
@@ -48,14 +48,14 @@ def conduct(folder: Path, tasks: Sequence[Task], settings: dict, *, force: bool 
         InputError: the folder holds something else, or the sealed truth was touched.
         KeyboardInterrupt: stopped; what was made and answered is kept.
     """
-    settings = {**settings, "limit_s": limit, "made_by": code_hash("proving")}
+    settings = {**settings, "limit_s": limit, "made_by": hash_of_maker()}
     if begin(folder, settings, force):
         tell(f"{folder}: goes on where it was left")
     names = [task.name for task in tasks]
     _make(folder, [task for task in tasks if not has_case(folder, task.name)], jobs, progress)
     digest = seal(folder, names)
     tell(f"the truth of {len(names)} cases is sealed, sha256 {digest}")
-    code = code_hash()
+    code = hash_of_diagnosis()
     _ask(folder, [name for name in names if answer_of(folder, name, code) is None], Asker(code, limit), jobs, progress)
     return Proof(opened(folder, digest), {name: answer_of(folder, name, code) or {} for name in names}, digest)
 
@@ -65,23 +65,11 @@ def _make(folder: Path, tasks: Sequence[Task], jobs: int, progress: Progress) ->
     if min(jobs, len(tasks)) <= 1:
         for k, task in enumerate(tasks):
             progress(f"making case {k + 1} of {len(tasks)}", MAKING * k / len(tasks))
-            _made(folder, task)
+            _made((folder, task))
         return
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_deaf)
-    try:
-        pending = {pool.submit(_made, folder, task): task.name for task in tasks}
-        while pending:
-            progress(f"making case {len(tasks) - len(pending) + 1} of {len(tasks)}", MAKING * (1 - len(pending) / len(tasks)))
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                future.result()
-                pending.pop(future)
-    except BaseException:
-        for process in list((pool._processes or {}).values()):
-            process.terminate()
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    pool.shutdown()
+    with multiprocessing.get_context("spawn").Pool(min(jobs, len(tasks)), initializer=_deaf) as pool:  # left early, it ends its processes
+        for k, _ in enumerate(pool.imap_unordered(_made, [(folder, task) for task in tasks])):
+            progress(f"making case {k + 2} of {len(tasks)}", MAKING * (k + 1) / len(tasks))
 
 
 def _deaf() -> None:
@@ -89,7 +77,8 @@ def _deaf() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _made(folder: Path, task: Task) -> None:
+def _made(job: tuple[Path, Task]) -> None:
+    folder, task = job
     keep_case(folder, task.name, *task.make(*task.what))
 
 

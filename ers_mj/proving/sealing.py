@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from ers_mj.errors import InputError
 from ers_mj.tables import reason, write_whole
 
 SETTINGS, SEALED, ANSWERS = "settings.json", "sealed", "answers"
+JUDGES = ("sealing.py", "asking.py", "conduct.py", "scoring.py", "parameters.py")  # of proving/: they make no case
 WRITTEN = ("results.json", "report.html", "summary.txt")  # by the command, at the end
 
 
@@ -26,13 +27,20 @@ def hash_of(content: bytes) -> str:
     return sha256(content).hexdigest()
 
 
-def code_hash(*folders: str) -> str:
-    """Hash of the package's sources: of these folders within it, or of all that diagnoses where none is named."""
+def hash_of_maker() -> str:
+    """Hash of the sources that make cases."""
+    return _hash_of_sources(lambda names: names[0] == "proving" and names[-1] not in JUDGES)
+
+
+def hash_of_diagnosis() -> str:
+    """Hash of the sources that diagnose: all but those of the proof."""
+    return _hash_of_sources(lambda names: not any(name.startswith(("proving", "prove.py", "proof_")) for name in names))
+
+
+def _hash_of_sources(wanted: Callable[[tuple[str, ...]], bool]) -> str:
     root = Path(__file__).resolve().parents[1]
     parts = {p: p.relative_to(root).parts for p in sorted(root.rglob("*.py"))}
-    proof = ("proving", "prove.py", "proof_")
-    chosen = [p for p, names in parts.items() if (names[0] in folders if folders else not any(name.startswith(proof) for name in names))]
-    return hash_of(b"".join(p.relative_to(root).as_posix().encode() + p.read_bytes() for p in chosen))
+    return hash_of(b"".join("/".join(names).encode() + p.read_bytes() for p, names in parts.items() if wanted(names)))
 
 
 def begin(folder: Path, settings: Mapping, force: bool) -> bool:
