@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ers_mj.proving.catalogue import (CATALOGUE, CONTACT, DEAD, HYPERBOLIC, LIMIT, LOAD, RIGID, STRIBECK, Effect, between, choose)
+from ers_mj.proving.catalogue import CONTACT, DEAD, HYPERBOLIC, LIMIT, LOAD, RIGID, STRIBECK, Effect, between, choose
 
 TEXTBOOK: Mapping[str, Callable[[dict], bool]] = {
     "presliding": lambda s: s["delta"] == 1.0 and s["v_d_rad_s"] == 0.0,
@@ -21,7 +21,6 @@ TEXTBOOK: Mapping[str, Callable[[dict], bool]] = {
     "voltage_saturation": lambda s: s["form"] == "hard",
     "current_limit": lambda s: s["form"] == LIMIT[0],
     "drive_dead_zone": lambda s: s["form"] != DEAD[3],
-    "thermal_drift": lambda s: False,
     "supply_sag": lambda s: s["form"] == "motor's current" and s["tau_s"] == 0.0,
     "hinge_moment_cubic": lambda s: s["form"] == "k3 x^3",
     "load_disturbance": lambda s: s["form"] == "rect",
@@ -53,8 +52,3 @@ def _twist(rng: np.random.Generator, name: str) -> dict:
     if name == "inductance":
         return {"saturation_per_A": between(rng, 0.03, 0.2)}
     return {}
-
-
-def effect_named(name: str) -> Effect:
-    """The catalogue's entry."""
-    return CATALOGUE[name]

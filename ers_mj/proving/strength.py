@@ -26,7 +26,7 @@ def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) ->
     low, high = np.log(_lowest(effect, ruler)), np.log(effect.high)
     as_list = lambda s: [{"label": name, "strength": float(np.exp(s)), "shape": shape}]  # noqa: E731
     guess, _ = nearest(lambda s: ruler.projected(as_list(s)), target, 0.5 * (low + high), low, high, TRIES)
-    found, left = nearest(lambda s: ruler.refitted(as_list(s)), target, guess, low, high, 2)
+    found, left = nearest(lambda s: ruler.refitted(as_list(s)), target, guess, low, high, 3)
     return as_list(found)[0] | {"strength_name": effect.strength_name, "target_sigma": target, "quick_visibility_sigma": left}
 
 
