@@ -1,8 +1,5 @@
 """The event-exact integrator against an independent scheme, against itself at a finer step, and in the stick band."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +8,8 @@ from ers_mj.effects import EFFECTS
 from ers_mj.effects.base import Scales
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.proving import quick
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 TABLE_1 = read_datasheet("table1")
 T = np.arange(0.0, 4.0, 1e-3)
 SCALES = Scales(position=0.4, low=0.15, high=0.4, speed=4.0, acceleration=110.0, input=10.0, sample_time=1e-3, noise=1e-4, quantum=0.0,
