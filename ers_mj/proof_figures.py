@@ -89,9 +89,9 @@ def _accuracy(bins: Sequence[Mapping], rows: Sequence[Mapping], width: float) ->
 
 
 def _reliability(bins: Sequence[Mapping], width: float) -> Figure:
-    side = min(width, 4.6)
-    figure = Figure(figsize=(side, 0.95 * side), layout="constrained")
+    figure = Figure(figsize=(width, 4.4), layout="constrained")
     ax = figure.subplots()
+    ax.set_aspect("equal", anchor="W")
     ax.plot([0, 1], [0, 1], color=FAINT, linewidth=1.0, linestyle=(0, (3, 3)))
     x, share = [b["probability"] for b in bins], [b["right"] / b["of"] for b in bins]
     ax.plot(x, share, "o-", color=AFTER, linewidth=1.3)
@@ -122,6 +122,7 @@ def _histogram(groups: Sequence[tuple[str, Sequence[float]]], label: str, width:
     ax.minorticks_off()
     ax.set_xlabel(label)
     ax.set_ylabel("cases")
+    ax.yaxis.get_major_locator().set_params(integer=True)
     return figure
 
 
