@@ -20,6 +20,8 @@ TOLD = {
 
 def headline(results: Mapping) -> str:
     """One sentence."""
+    if told := results.get("concealed_in_real"):
+        return f"{sum(x['found'] for x in told)} of {len(told)} effects concealed in real recordings are found again."
     k, n = results["of"].get("top1_class", (0, 0))
     null, nulls = results["of"].get("false_alarm_rate", (0, 0))
     parts = [f"{k} of {n} concealed single effects are named right by class"] if n else []

@@ -303,6 +303,16 @@ def test_every_rig_is_diagnosed_as_it_is_first():
     assert [(p.rig, p.label) for p in plans[:3]] == [(rig, None) for rig in real.RIGS] and {(p.rig, p.label) for p in plans} == set(real.COVERAGE)
 
 
+def test_a_rig_as_it_is_raises_no_false_alarm():
+    rows = []
+    for kind, labels, named in (("untouched", [], ["end_stop"]), ("single", ["input_delay"], ["end_stop", "sensor_lag"]), ("single", ["bias_torque"], [])):
+        truth, answer = truth_and_answer(kind, labels, named)
+        rows.append(scoring.row_of({**truth, "rig": "throttle", "visibility_after_refit_sigma": None}, answer))
+    results = real.scored_real(rows)
+    assert (results["found"], results["false_alarm_rate"], results["counts"]["null"], results["cases"]) == (0.5, None, 0, 3)
+    assert results["own"] == {"throttle": ["end_stop"]} and results["concealed_in_real"][0]["others"] == []
+
+
 # -- the command -----------------------------------------------------------------------------------------------
 
 

@@ -133,7 +133,8 @@ def _told(results: dict) -> list[str]:
     counts = ", ".join(f"{n} {kind}" for kind, n in results["counts"].items() if n)
     lines = ["", bold(headline(results)), f"{results['cases']} cases ({counts}), seed {results['seed']}", ""]
     lines += [f"  {told:58}{count:>11}   {share}" for told, count, share in table_of(results)]
-    lines += ["", bold("named right by class, against what the refit leaves [sigma]")]
+    if results["accuracy"]:
+        lines += ["", bold("named right by class, against what the refit leaves [sigma]")]
     for b in results["accuracy"]:
         top = f"{b['to_sigma']:g}" if b["to_sigma"] else "more"
         lines.append(f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]")

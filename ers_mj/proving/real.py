@@ -24,6 +24,7 @@ FILES = {"emps": ("train.csv", "test_pulses.csv"), "throttle": ("aprbs_25s.csv",
 EFFECTS = ("input_delay", "sensor_lag", "sensor_quantisation", "sensor_dropout", "bias_torque")
 COVERAGE = [(rig, name) for rig in RIGS for name in (None, *EFFECTS)]
 LATE = {"emps": (0.002, 0.03), "throttle": (0.02, 0.1), "sts3215": (0.02, 0.1)}  # [s] delay or lag, a few samples and more
+UNTOUCHED = "untouched"  # the kind of a case that is a rig as it is: what is named there is no false alarm
 ALSO = ("torque_enable", "vin_V", "pulse_V")  # columns handed on as they are
 
 
@@ -71,7 +72,7 @@ def make(plan: RealPlan, folder: Path, seed: int) -> tuple[dict[str, str], dict]
         moved.append(change)
     size = None if plan.label in (None, "bias_torque") else float(np.sqrt(np.nanmean(np.concatenate(moved) ** 2)))
     effects = [{"label": plan.label, "strength": strength, "shape": {"form": "rounded down" if plan.label == "sensor_quantisation" else ""}}] if plan.label else []
-    truth = {"case": plan.name, "kind": "single" if plan.label else "null", "labels": [plan.label] if plan.label else [], "rig": plan.rig,
+    truth = {"case": plan.name, "kind": "single" if plan.label else UNTOUCHED, "labels": [plan.label] if plan.label else [], "rig": plan.rig,
              "effects": effects, "size": size, "size_unit": y.rpartition("_")[2], "visibility_after_refit_sigma": None, "seed": [seed, plan.index]}
     return {f"rec{k + 1}.csv": _csv(record) for k, record in enumerate(touched)}, truth
 
@@ -157,17 +158,18 @@ def _csv(record: Mapping[str, np.ndarray]) -> str:
 
 def scored_real(rows: Sequence[dict]) -> dict:
     """The shares of the contract, and those that count here: what was concealed found again beside what the rig has of its own."""
-    own = {r["rig"]: r for r in rows if r["kind"] == "null"}
+    own = {r["rig"]: r for r in rows if r["kind"] == UNTOUCHED}
     told = []
-    for r in (r for r in rows if r["kind"] == "single"):
+    singles = [r for r in rows if r["kind"] == "single"]
+    for r in singles:
         alone = own.get(r["rig"], {"named": [], "floor": None})
         its_own, named = {class_of(n) for n in alone["named"]}, {class_of(n) for n in r["named"]}
-        r["visibility"] = r["size"] / alone["floor"] if r["size"] and alone["floor"] else float("nan")
-        told.append({"case": r["case"], "rig": r["rig"], "concealed": r["labels"][0], "strength": r["strength"], "named": r["named"],
+        over = r["size"] / alone["floor"] if r["size"] and alone["floor"] else None
+        told.append({"case": r["case"], "rig": r["rig"], "concealed": r["labels"][0], "strength": r["strength"], "size_over_floor": over, "named": r["named"],
                      "found": class_of(r["labels"][0]) in named, "was_its_own": class_of(r["labels"][0]) in its_own,
                      "own_kept": sum(c in named for c in its_own), "own": len(its_own),
                      "others": sorted(n for n in r["named"] if class_of(n) not in its_own | {class_of(r["labels"][0])})})
     fresh = [x for x in told if not x["was_its_own"]]
-    return {**scored(rows), "found": sum(x["found"] for x in told) / len(told) if told else None,
+    return {**scored(singles), "cases": len(rows), "untouched": len(own), "found": sum(x["found"] for x in told) / len(told) if told else None,
             "found_new": sum(x["found"] for x in fresh) / len(fresh) if fresh else None, "found_new_of": len(fresh),
             "own": {rig: r["named"] for rig, r in own.items()}, "concealed_in_real": told}
