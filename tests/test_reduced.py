@@ -1,8 +1,5 @@
 """The event-exact integrator against an independent scheme, against itself at a finer step, and in the stick band."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +8,8 @@ from ers_mj.effects import EFFECTS
 from ers_mj.effects.base import Scales
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.proving import quick
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 TABLE_1 = read_datasheet("table1")
 T = np.arange(0.0, 4.0, 1e-3)
 SCALES = Scales(position=0.4, low=0.15, high=0.4, speed=4.0, acceleration=110.0, input=10.0, sample_time=1e-3, noise=1e-4, quantum=0.0,
@@ -26,10 +23,9 @@ def table_1(**changes):
 @pytest.mark.parametrize("inductance", [1.6e-3, 2e-4])
 @pytest.mark.parametrize("name", ["multisine", "chirp", "ramp", "steps"])
 def test_baseline_equals_an_independent_scheme_at_a_far_smaller_step(name, inductance):
-    plant = pytest.importorskip("independent_plant", reason="analysis/ is not beside the tests")
     u = INPUTS[name](T)
     parameters = dict(TABLE_1.parameters) | {"L": inductance}
-    truth = plant.simulate(parameters, [], T, u, step=1e-5, stand=0.0).true
+    truth = quick.simulate(parameters, [], T, u, step=1e-5, stand=0.0).true
     ours = table_1(tau_e=inductance / parameters["R"]).simulate(T, u).theta
     assert np.degrees(np.max(np.abs(ours - truth))) < 1e-3
 
@@ -37,10 +33,9 @@ def test_baseline_equals_an_independent_scheme_at_a_far_smaller_step(name, induc
 @pytest.mark.parametrize("x_s_deg", [1.0, 0.2])
 @pytest.mark.parametrize("name", ["multisine", "steps"])
 def test_presliding_equals_an_independent_lugre(name, x_s_deg):
-    plant = pytest.importorskip("independent_plant", reason="analysis/ is not beside the tests")
     u, shape = INPUTS[name](T), {"form": "LuGre, constant bristle damping", "bristle_damping_ratio": 0.4}
     lugre = {"label": "presliding", "strength": x_s_deg, "shape": shape}
-    truth = plant.simulate(dict(TABLE_1.parameters), [lugre], T, u, step=5e-6, stand=0.0).true
+    truth = quick.simulate(dict(TABLE_1.parameters), [lugre], T, u, step=5e-6, stand=0.0).true
     ours = ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.4]))]).simulate(T, u).theta
     assert np.degrees(np.max(np.abs(ours - truth))) < 3e-3
 
