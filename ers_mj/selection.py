@@ -34,6 +34,7 @@ NEAR_LEAST = 0.5  # share of the gain that matters below which the best first re
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 MOST_ROUNDS = 3
+RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
 
@@ -347,7 +348,30 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
         current, _ = hopped(fit(current.model, traces, tau=tau, steps=20), traces, tau, jobs)
+        current = _exchanged(current, rounds[:-1], traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau)
+
+
+def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
+    """With earlier effects exchanged for their rivals of that round where these do better beside what came later."""
+    def instead(candidate):
+        name = candidate.name
+        model = without.with_effect(name, dict(candidate.fit.model.effects)[name])
+        if BY_NAME[name].local:
+            model = replace(model, local={**model.local, name: candidate.fit.model.local[name]})
+        return fit(model, traces, tau=tau, steps=12)
+
+    for ranked in rounds:
+        if ranked[0].name not in current.model.names:
+            continue
+        rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names
+                  and c.gain >= RIVAL * ranked[0].gain][:MOST_RIVALS]
+        without = current.model.without_effect(ranked[0].name)
+        with ThreadPoolExecutor(jobs) as pool:
+            best = min(pool.map(instead, rivals), key=lambda f: f.cost, default=current)
+        if best.cost < current.cost - LEAST_GAIN * current.misfit.size:
+            current = best
+    return current
 
 
 def _pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> Fit:
