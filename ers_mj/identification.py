@@ -40,7 +40,8 @@ HOPELESS = 0.02  # excess of C per block over a nested model at which a search i
 NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
 FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
-SPIKE = 3.5, 0.9, 5  # times nine tenths of the changes of a model's error (8 sigma where that is noise), at most so many samples
+SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
+SPIKE_SAMPLES, SPIKE_TIME = 5, 0.005  # length of a spike at most, and [s]
 CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 STATES = ("gain", "offset", "friction_level")
 
@@ -358,7 +359,7 @@ def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restar
         return descend(start, begun, OBSERVER_RATE, tau, 12, 0.03), begun
 
     for _ in range(MOST_HOPS):
-        if float(np.median(found.misfit)) > ROUGH or float(np.mean(score(found.misfit, tau))) < QUIET:
+        if not near_noise(found) or float(np.mean(score(found.misfit, tau))) < QUIET:
             break
         layout = found.model.layout()
         z, (curvature, directions) = found.model.vector(layout), np.linalg.eigh(found.hessian)
@@ -370,6 +371,11 @@ def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restar
             break
         found, traces = best, begun
     return found, traces
+
+
+def near_noise(found: Fit) -> bool:
+    """Whether half the blocks are explained to about their noise (ROUGH), so that details may be told."""
+    return float(np.median(found.misfit)) <= ROUGH
 
 
 def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
@@ -474,11 +480,13 @@ def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None)
 
 
 def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
-    """The traces without the spikes that stand out of the model's error: a rudder's own error is smooth, however wrong the model is."""
+    """The traces without the spikes that stand out of the model's error: within SPIKE_TIME a rudder's own error is smooth, however wrong
+    the model is."""
     out = []
     for k, trace in enumerate(traces):
         e = np.where(trace.valid, (trace.y - model.predict(trace, k, OBSERVER_RATE)) / trace.sigma, np.nan)
-        out.append(trace.without(excursions(e, 1.0, *SPIKE)) if np.isfinite(e[trace.valid]).all() else trace)
+        longest = min(SPIKE_SAMPLES, int(SPIKE_TIME / trace.sample_time + 1e-6))
+        out.append(trace.without(excursions(e, 1.0, *SPIKE, longest)) if longest and np.isfinite(e[trace.valid]).all() else trace)
     return out
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME, Effect
-from ers_mj.identification import OBSERVER_RATE, STATES, Columns, Fit, Model, converged, fit, hopped, jacobian_of, residuals, score, tau_of
+from ers_mj.identification import OBSERVER_RATE, STATES, Columns, Fit, Model, converged, fit, hopped, jacobian_of, near_noise, residuals, score, tau_of
 from ers_mj.traces import BLOCK, Blocks, Trace
 
 LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error of about 0.3 sigma RMS
@@ -33,7 +33,7 @@ AGAIN = 0.1  # share of the best first refit's gain from which an effect is refi
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
-MOST_ROUNDS = 3
+MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
@@ -338,7 +338,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless."""
     current, rounds, blocks = base, [], base.misfit.size
     tau = tau_of(base.misfit)
-    while len(rounds) < MOST_ROUNDS and float(score(current.misfit, tau).sum()) > LEAST_GAIN * blocks:
+    while len(rounds) < (MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS) and float(score(current.misfit, tau).sum()) > LEAST_GAIN * blocks:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LEAST_GAIN * blocks, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
@@ -348,7 +348,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
         current, _ = hopped(fit(current.model, traces, tau=tau, steps=20), traces, tau, jobs)
-        current = _exchanged(current, rounds[:-1], traces, tau, jobs)
+        if near_noise(current):
+            current = _exchanged(current, rounds[:-1], traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau)
 
 

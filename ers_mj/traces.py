@@ -108,12 +108,28 @@ def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
         known = np.isfinite(values)
         if known.mean() < 0.8 or np.ptp(values[known]) == 0:
             continue
+        if kind == "speed" and not _integrates(recording, values):
+            continue
         if kind == "motor":
             both = known & valid
             slope, zero = np.polyfit(recording.y[both], values[both], 1)
             values = (values - zero) / slope
         found.append(Channel(kind, np.ascontiguousarray(values), noise_sigma(values[known], converter_step(values[known]))))
     return tuple(found)
+
+
+def _integrates(recording: Recording, omega: np.ndarray) -> bool:
+    """Whether a speed is that of the output at the same time: its integral over 0.1 s is the way made, within three times the noise.
+
+    What a drive reports as speed is often an older, filtered difference of the angle, which tells nothing new and that late.
+    """
+    t, n = recording.t, max(1, round(0.1 / recording.sample_time))
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
+    miss = (way[n:] - way[:-n] - recording.y[n:] + recording.y[:-n])[::n]
+    miss, known = miss[np.isfinite(miss)], np.isfinite(omega)
+    noise = math.hypot(noise_sigma(recording.y[recording.valid], recording.quantum) * math.sqrt(2.0),
+                       noise_sigma(omega[known], converter_step(omega[known])) * math.sqrt(n) * recording.sample_time)
+    return bool(miss.size) and float(np.sqrt(np.mean(miss**2))) < 3.0 * noise
 
 
 def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
