@@ -16,7 +16,7 @@ from ers_mj.traces import Trace
 
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
 CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
-HALF = 0.5  # share of its error that recalibration must take away
+HALF = 0.5  # share of the squared error that must go
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,11 @@ def _halves(after: Score, without: Score, parts: Sequence[Fold]) -> bool:
 
 
 def _helps_recalibrated(models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold]) -> bool:
-    """Whether the models halve the error of recordings of another day once gain, offset and friction level of that day are known."""
+    """Whether the models halve the squared error of recordings of another day once gain, offset and friction level of that day are known."""
     if parts[0].training is not None:
         return False
     after, before = (pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(some, parts)]).rmse for some in (models, lesser))
-    return after < HALF * before
+    return after**2 < HALF * before**2
 
 
 def _scores(models: Sequence[Model], parts: Sequence[Fold]) -> list[Score]:
