@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-import independent_plant  # noqa: E402
+from ers_mj.proving import quick  # noqa: E402
 
 from ers_mj.datasheet import read_datasheet  # noqa: E402
 from ers_mj.effects import EFFECTS, Scales  # noqa: E402
@@ -43,7 +43,7 @@ def main():
     print(f"{'baseline with inductance':34}{'ms/s':>8}{'error [deg]':>14}   (bars: 0.2 ms/s, 1e-3 deg)")
     for name in ("multisine", "chirp", "ramp", "steps"):
         u = INPUTS[name](T)
-        truth = independent_plant.simulate(dict(SHEET.parameters), [], T, u, step=5e-6, stand=0.0).true
+        truth = quick.simulate(dict(SHEET.parameters), [], T, u, step=5e-6, stand=0.0).true
         print(f"{name:34}{milliseconds(base, u):8.3f}{worst(base.simulate(T, u).theta, truth):14.1e}")
     u = INPUTS["multisine"](T)
     print(f"{'effect, multisine':34}{'ms/s':>8}{'error [deg]':>14}")

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
 import time
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 from scipy.stats import binomtest
 
 CLASSES = [{"bias_torque", "asymmetric_friction"}, {"inductance", "input_delay", "sensor_lag"},
@@ -28,12 +30,13 @@ def class_of(name: str) -> frozenset[str]:
 
 
 def answer(folder: Path, limit: float) -> dict:
-    """diagnosis.json of one case, with the wall time [s]."""
+    """diagnosis.json of one case, with the wall and processor time [s]."""
     recordings = sorted(map(str, folder.glob("rec*.csv")))
-    begin = time.perf_counter()
+    begin, spent = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = subprocess.run([sys.executable, "-m", "ers_mj", "diagnose", *recordings, "--datasheet", str(folder / "datasheet.toml"), "--json"],
                           capture_output=True, text=True, timeout=limit, check=True)
-    return {**json.loads(done.stdout), "wall_s": time.perf_counter() - begin}
+    return {**json.loads(done.stdout), "wall_s": time.perf_counter() - begin,
+            "cpu_s": resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - spent}
 
 
 def halves(truths: dict[str, dict]) -> dict[str, str]:
@@ -49,7 +52,7 @@ def halves(truths: dict[str, dict]) -> dict[str, str]:
 def line(case: str, document: dict, truth: dict) -> dict:
     """What is kept of one case."""
     named = [m["effect"] for m in document["missing"]]
-    return {"case": case, "labels": truth["labels"], "named": named, "verdict": document["verdict"], "wall_s": round(document["wall_s"], 1),
+    return {"case": case, "labels": truth["labels"], "named": named, "verdict": document["verdict"], "wall_s": round(document["wall_s"], 1), "cpu_s": round(document["cpu_s"], 1),
             "visibility": truth.get("visibility_after_refit_sigma"), "where": [w["label"] for w in document["where"] if w["axis"] == "subsystem"][:1],
             "before": document["fit"]["heldout_rmse_before_rad"], "after": document["fit"]["heldout_rmse_after_rad"],
             "floor": document["fit"]["noise_floor_rad"], "significant": document["remainder"]["significant"]}
@@ -68,7 +71,7 @@ def summary(rows: list[dict]) -> str:
     out.append(_share("null cases with a named effect", sum(bool(r["named"]) for r in nulls), len(nulls)))
     others = [r for r in singles if r["labels"][0] not in LIBRARY]
     out.append(_share("singles outside the library flagged (unexplained or remainder)", sum(r["significant"] for r in others), len(others)))
-    out.append(f"mean wall time {sum(r['wall_s'] for r in rows) / max(len(rows), 1):.1f} s a case")
+    out.append(f"time a case, median: {np.median([r['wall_s'] for r in rows]):.1f} s, of one processor {np.median([r['cpu_s'] for r in rows]):.1f} s")
     wrong = Counter((r["labels"][0], r["named"][0] if r["named"] else r["verdict"]) for r in singles if r["labels"][0] in LIBRARY
                     and (not r["named"] or class_of(r["named"][0]) != class_of(r["labels"][0])))
     return "\n".join(out + [f"  {n} x {truth} -> {named}" for (truth, named), n in wrong.most_common()])
@@ -103,7 +106,7 @@ def main() -> None:
             rows.append(line(case, answer(arguments.folder / case, arguments.limit), truth))
         except (subprocess.SubprocessError, json.JSONDecodeError) as error:
             print(f"{case}: no answer ({str(error)[-200:]})", file=sys.stderr)
-            rows.append({"case": case, "labels": truth["labels"], "named": [], "verdict": "no answer", "wall_s": arguments.limit,
+            rows.append({"case": case, "labels": truth["labels"], "named": [], "verdict": "no answer", "wall_s": arguments.limit, "cpu_s": arguments.limit,
                          "visibility": truth.get("visibility_after_refit_sigma"), "where": [], "before": None, "after": None, "floor": None,
                          "significant": False})
         text = json.dumps(rows[-1])

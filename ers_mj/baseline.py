@@ -13,7 +13,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.errors import InputError
 from ers_mj.guess import guesses
-from ers_mj.identification import Fit, Model, descend, fit, hopped, tau_of, with_starts
+from ers_mj.identification import Fit, Model, descend, fit, hopped, tau_of, with_starts, without_spikes
 from ers_mj.traces import Trace
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
@@ -33,7 +33,8 @@ def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bo
                   acceleration=max(values.get("c_2", 0.0), 0.05 * abs(values["b"]) * peak), input=peak,
                   sample_time=float(np.median([t.sample_time for t in traces])),
                   noise=float(np.median([t.sigma for t in traces])), quantum=max(t.quantum for t in traces),
-                  is_angle=is_angle, tau_e_datasheet=tau_e)
+                  is_angle=is_angle, tau_e_datasheet=tau_e, duration=max(float(t.t[-1] - t.t[0]) for t in traces),
+                  recordings=len(traces))
 
 
 @dataclass(frozen=True)
@@ -70,13 +71,14 @@ def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Seq
     """Fit, with the initial states fitted before and after."""
     traces = with_starts(model, traces)
     first = fit(model, traces)
-    traces = with_starts(first.model, traces)
+    traces = with_starts(first.model, without_spikes(first.model, traces))
     found = fit(first.model, traces, tau=tau_of(first.misfit))
     return hopped(found, traces, tau_of(found.misfit), jobs, restart=True)
 
 
 def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> Model:
     values = {"a_1": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0, **known}
+    values.setdefault("ampere", _ampere(values["b"], traces))
     scales = scales_of(traces, values, is_angle, values["tau_e"] or None)
     values["c_2"] = max(values["c_2"], 1e-3 * scales.acceleration)
     return Model(values, _free(values, traces), scales=scales, priors=_priors(values))
@@ -90,9 +92,21 @@ def _free(values: Mapping[str, float], traces: Sequence[Trace]) -> tuple[str, ..
     opened = any(t.enable is not None and not t.enable.all() for t in traces)
     if values["tau_e"] > 0:
         names.append("tau_e")
-    if values["tau_e"] > 0 or opened:
+    seen = any(c.kind == "current" for t in traces for c in t.channels)
+    if values["tau_e"] > 0 or opened or seen:
         names.append("emf_share")
+    if seen:
+        names.append("ampere")
     return tuple(names)
+
+
+def _ampere(b: float, traces: Sequence[Trace]) -> float:
+    """A first n K_t / J: b times the resistance that voltage over current makes."""
+    pairs = [(t.u, c.values) for t in traces for c in t.channels if c.kind == "current"]
+    if not pairs:
+        return b
+    u, i = (np.nan_to_num(np.concatenate(column)) for column in zip(*pairs))
+    return b * max(float(u @ i), 0.05 * float(np.linalg.norm(u) * np.linalg.norm(i))) / float(i @ i)
 
 
 def _priors(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -106,7 +120,8 @@ def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle:
     must beat one-sided friction to be kept, and what was found under the scaffold stays as an anchor for later fits.
     """
     opened = any(t.enable is not None and not t.enable.all() for t in traces)
-    starts = [{"tau_e": 0.0, "emf_share": 0.5 if opened else 0.0, **g, **known} for g in guesses(traces)]
+    shown = opened or any(c.kind == "current" for t in traces for c in t.channels)
+    starts = [{"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known} for g in guesses(traces)]
     scales = scales_of(traces, starts[0], is_angle, None)
     stops = ("end_stop", BY_NAME["end_stop"].starts(scales)[-1])
     sided = ("asymmetric_friction", BY_NAME["asymmetric_friction"].starts(scales)[0])

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ers_mj.baseline import Start
 from ers_mj.evaluation import Fold, Score, folds, paired_p, pooled, recalibrated, refits, scored
-from ers_mj.identification import Model, fit
+from ers_mj.identification import Fit, Model, fit, polished, score
 from ers_mj.selection import Selection
 from ers_mj.traces import Trace
 
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
-HALF = 0.5  # share of its error that recalibration must take away
+CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
+HALF = 0.5  # share of the squared error that must go
 
 
 @dataclass(frozen=True)
@@ -40,27 +44,42 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         without, p, lesser_models = {}, {}, {}
         for name in model.names:
             if len(model.names) > 1:
-                less = fit(model.without_effect(name), start.traces, tau=selection.tau, steps=12).model
+                less = _without(name, model, start, selection.tau).model
                 lesser_models[name] = refits(less, parts, selection.tau, jobs)
             else:
                 lesser_models[name] = base_models
             without[name] = pooled(_scores(lesser_models[name], parts))
             p[name] = paired_p(pooled(after).misfit, without[name].misfit)
         failed = [n for n in model.names if (p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse)
-                  and not _helps_recalibrated(after_models, lesser_models[n], parts)]
+                  and not _halves(pooled(after), without[n], parts) and not _helps_recalibrated(after_models, lesser_models[n], parts)]
         if not failed:
             return selection, Confirmed(_scores(base_models, parts), after, without, p, after_models, base_models, parts, sentence)
         worst = max(failed, key=lambda n: p[n])
-        reduced = fit(model.without_effect(worst), start.traces, tau=selection.tau, steps=15)
+        reduced = _without(worst, model, start, selection.tau)
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
 
 
+def _without(name: str, model: Model, start: Start, tau: float) -> Fit:
+    return polished(fit(model.without_effect(name), start.traces, tau=tau, steps=15), start.traces)
+
+
+def _halves(after: Score, without: Score, parts: Sequence[Fold]) -> bool:
+    """Whether half of the squared free-run error above the noise goes, in a clear case, and the blocks speak for it on balance.
+
+    An effect that one recording shows best is known less well without that recording: it helps there, and is not exact to the noise.
+    """
+    noise = float(np.mean([fold.held_out.sigma**2 for fold in parts]))
+    above, left = without.rmse**2 - noise, after.rmse**2 - noise
+    return (without.rmse > CLEAR * math.sqrt(noise) and left < HALF * above
+            and float(np.sum(score(after.misfit, 1.0))) < float(np.sum(score(without.misfit, 1.0))))
+
+
 def _helps_recalibrated(models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold]) -> bool:
-    """Whether the models halve the error of recordings of another day once gain, offset and friction level of that day are known."""
+    """Whether the models halve the squared error of recordings of another day once gain, offset and friction level of that day are known."""
     if parts[0].training is not None:
         return False
     after, before = (pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(some, parts)]).rmse for some in (models, lesser))
-    return after < HALF * before
+    return after**2 < HALF * before**2
 
 
 def _scores(models: Sequence[Model], parts: Sequence[Fold]) -> list[Score]:

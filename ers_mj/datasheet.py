@@ -78,10 +78,10 @@ class Datasheet:
         return type(self), (*plain, self.name)
 
     def to_lumped(self) -> dict[str, float]:
-        """Those of Eq. (6)'s parameters, of tau_e and of emf_share that follow from what is given.
+        """Those of Eq. (6)'s parameters, of tau_e, emf_share and ampere that follow from what is given.
 
             a_1 = k_s/J,  a_2 = (B R + n^2 K_t K_e)/(J R),  b = n K_t/(J R),  c_1 = T_LH/J,  c_2 = F_c/J,
-            tau_e = L/R [s],  emf_share = n^2 K_t K_e/(J R)/a_2,
+            tau_e = L/R [s],  emf_share = n^2 K_t K_e/(J R)/a_2,  ampere = n K_t/J [rad/s^2 per A],
 
         n is 1 where it is not given; what is given lumped stands as it is.
         """
@@ -107,6 +107,7 @@ FOLLOWS = {
     "c_2": ("F_c J", lambda p: p["F_c"] / p["J"]),
     "theta_0": ("theta_0", lambda p: p["theta_0"]),
     "tau_e": ("L R", lambda p: p["L"] / p["R"]),
+    "ampere": ("K_t J", lambda p: p["n"] * p["K_t"] / p["J"]),
     "emf_share": ("B J K_t K_e R", lambda p: _emf_damping(p) / _damping(p) if _damping(p) else math.nan),
 }
 

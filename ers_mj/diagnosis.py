@@ -8,16 +8,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ers_mj.baseline import baseline
 from ers_mj.confirmation import confirmed
 from ers_mj.datasheet import Datasheet
 from ers_mj.document import Case, Diagnosis
-from ers_mj.identification import polished
+from ers_mj.identification import polished, without_spikes
 from ers_mj.multibody import Rig
 from ers_mj.recording import Recording
 from ers_mj.selection import select
-from ers_mj.traces import trace_of
+from ers_mj.traces import Trace, trace_of
 
+FEWEST_LOST = 3  # dropouts from which a sensor is said to have them
 COARSE = 1 / 300  # a converter whose step is more than this share of the travel is an effect, not an ordinary one
 
 Progress = Callable[[str, float], None]
@@ -44,19 +47,33 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     traces = [trace_of(r, inertia) for r in recordings]
     progress("fitting the baseline", 0.03)
     start = baseline(traces, datasheet, first.output_unit == "rad", jobs)
-    coarse = max(t.quantum for t in traces) > COARSE * 2 * start.fit.model.scales.position
+    sensors = _symptoms(start.traces, 2 * start.fit.model.scales.position)
     chosen = select(start.fit, start.traces, anchors=start.anchors, jobs=jobs, progress=progress)
     start = replace(start, fit=polished(start.fit, start.traces))
     chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
     progress("judging on held-out data", 0.75)
-    held = [trace_of(r, inertia) for r in holdout]
+    held = without_spikes(start.fit.model, [trace_of(r, inertia) for r in holdout])
     selection, judged = confirmed(start, chosen, held, jobs)
     progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
-    multibody = tuple(rig.rmse(models, judged.parts, jobs) for models in (judged.base_models, judged.models))
+    before = rig.rmse(judged.base_models, judged.parts, jobs)
+    multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
     progress("locating", 0.92)
-    case = Case(recordings, list(holdout), datasheet, start, selection, judged, coarse, seed, rig, multibody)
+    case = Case(recordings, list(holdout), datasheet, start, selection, judged, sensors, seed, rig, multibody)
     return case.told(held)
+
+
+def _symptoms(traces: Sequence[Trace], travel: float) -> dict[str, np.ndarray]:
+    """Sensor effects that show in the data itself, with their parameters."""
+    found = {}
+    lost = [(t, span) for t in traces for span in t.lost]
+    if len(lost) >= FEWEST_LOST:
+        seconds = sum(float(t.t[-1] - t.t[0]) for t in traces)
+        found["sensor_dropout"] = np.array([len(lost) / seconds, np.mean([(s.stop - s.start) * t.sample_time for t, s in lost])])
+    quantum = max(t.quantum for t in traces)
+    if quantum > COARSE * travel:
+        found["sensor_quantisation"] = np.array([quantum])
+    return found
 
 
 def _cores() -> int:

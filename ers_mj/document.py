@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ers_mj import __version__
+from ers_mj.advice import next_recording
 from ers_mj.baseline import Start
 from ers_mj.confirmation import Confirmed
 from ers_mj.datasheet import Datasheet
-from ers_mj.effects import BY_NAME
-from ers_mj.evaluation import free_run, neutral, pooled, recalibrated, scored
+from ers_mj.effects import BY_NAME, Parameter
+from ers_mj.evaluation import free_run, pooled, recalibrated, scored
 from ers_mj.evidence import Evidence, RecordView, Rung
-from ers_mj.excitation import next_recording
-from ers_mj.identification import BASE, STATES, Model, residuals, score, with_starts
+from ers_mj.identification import BASE, STATES, Fit, Model, residuals, score, with_starts
 from ers_mj.intervals import standard_errors
+from ers_mj.isolability import isolability, probabilities
 from ers_mj.localisation import Place, gather, places, residual_map, shaded
 from ers_mj.multibody import Rig
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.recording import Recording
-from ers_mj.selection import Candidate, Selection, tie
+from ers_mj.selection import Candidate, Selection
 from ers_mj.simulation import PER_INERTIA, unit_of
 from ers_mj.traces import Blocks, Trace
 
@@ -54,7 +55,7 @@ class Case:
     start: Start
     selection: Selection
     confirmed: Confirmed
-    coarse: bool
+    sensors: Mapping[str, np.ndarray]
     seed: int
     rig: Rig
     multibody: tuple[float | None, float | None]
@@ -84,16 +85,17 @@ class Case:
         """The document, the evidence and the model."""
         base, model, traces = self.start.fit.model, self.model, self.start.traces
         samples = gather(base, model, traces)
-        found = places(samples, traces, self.selection.rounds, self.start.fit.cost, self.output_unit, self.input_unit)
         fits, record_state = self._fits(), self._record_state(held)
         explained = self._explained(fits)
         verdict = self._verdict(explained)
         missing = self._missing() if verdict == "missing_physics" else []
+        found = places(samples, traces, self.selection.rounds, self.start.fit.cost, [m["effect"] for m in missing], self.output_unit,
+                       self.input_unit)
         document = {
             "version": 1, "verdict": verdict, "sentence": self._sentence(verdict, missing, fits, found, explained),
             "where": [] if verdict == "consistent" else [self._place(p) for p in found],
             "missing": missing, "remainder": self._remainder(verdict, explained), "record_state": record_state, "fit": fits,
-            "parameters": self._parameters(), "next_recording": next_recording(self._rivals(), self.start.traces, self.input_unit),
+            "parameters": self._parameters(), "next_recording": next_recording(*self._rivals(), self.start.traces, self.input_unit, self.output_unit),
             "data": self._data(), "seed": self.seed, "versions": _versions(),
         }
         if verdict == "unexplained":
@@ -134,7 +136,7 @@ class Case:
         return float(np.mean(score(self.selection.chosen.misfit, 1.0)))
 
     def _verdict(self, explained: float) -> str:
-        if self.coarse and not self.model.names:
+        if self.sensors and not self.model.names:
             return "missing_physics"
         if self.model.names:
             return "missing_physics" if explained >= HALF else "unexplained"
@@ -152,10 +154,9 @@ class Case:
         return bool(np.all(np.isfinite(misfit))) and float(np.mean(score(misfit, 1.0))) < CONSISTENT
 
     def _missing(self) -> list[dict]:
-        sensors = [self._quantised()] if self.coarse else []
+        sensors = [self._symptom(name, values) for name, values in self.sensors.items()]
         effects = [self._effect(name) for name in self.model.names]
-        after = pooled(self.confirmed.after).rmse
-        effects.sort(key=lambda e: after - (e["evidence"]["heldout_rmse_without_rad"] or 0.0))
+        effects.sort(key=lambda e: -self.confirmed.without[e["effect"]].rmse)
         return effects + sensors
 
     def _effect(self, name: str) -> dict:
@@ -164,64 +165,83 @@ class Case:
         without = c.without[name]
         gain = float(np.sum(score(without.misfit, 1.0)) - np.sum(score(pooled(c.after).misfit, 1.0)))
         size = sum(np.isfinite(v) for v in dict(self.model.effects)[name])
+        with_and_without = (None, None) if effect.local else (pooled(c.after).rmse, without.rmse)
         shown = {k: _shown(e["value"], e["unit"]) for k, e in parameters.items()}
         return {"effect": name, "sentence": effect.describe(shown), "subsystem": effect.subsystem, "parameters": parameters,
-                "evidence": {"heldout_rmse_without_rad": without.rmse, "heldout_rmse_with_rad": pooled(c.after).rmse,
+                "evidence": {"heldout_rmse_without_rad": with_and_without[1], "heldout_rmse_with_rad": with_and_without[0],
                              "delta_bic": 2 * gain - size * math.log(max(without.misfit.size, 2)), "p_value": c.p[name]},
-                "alternatives": self._alternatives(name)}
+                "probability": self._found(name)[1].get(name), "alternatives": self._alternatives(name)}
 
     def _effect_parameters(self, name: str):
-        values, errors = dict(self.model.effects)[name], self._errors()
+        values, errors = dict(self.model.effects_of())[name], self._errors()
         for parameter, value in zip(BY_NAME[name].parameters, values):
             factor = self.inertia if self.inertia and parameter.kind in PER_INERTIA else 1.0
             finite = bool(np.isfinite(value))
             low_high = errors.get((name, parameter.name))
-            yield {"name": parameter.name, "entry": {
+            yield {"name": parameter.name, "entry": self._per_recording(name, parameter, factor) | {
                 "value": float(value) * factor if finite else None,
                 "unit": unit_of(parameter.kind, self.output_unit, self.input_unit, bool(self.inertia)),
                 "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
                 "meaning": parameter.meaning}}
 
-    def _quantised(self) -> dict:
-        step = max(t.quantum for t in self.start.traces)
-        effect = BY_NAME["sensor_quantisation"]
-        entry = {"value": step, "unit": self.output_unit, "ci95": [0.99 * step, 1.01 * step], "meaning": effect.parameters[0].meaning}
-        return {"effect": effect.name, "sentence": effect.describe({"step": _shown(step, self.output_unit)}),
-                "subsystem": effect.subsystem, "parameters": {"step": entry},
+    def _per_recording(self, name: str, parameter: Parameter, factor: float) -> dict:
+        """The values in every training recording of a parameter that has one of its own in each; null where the effect is absent."""
+        if not parameter.per_record:
+            return {}
+        columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
+        values = self.model.local[name][:, columns.index(parameter.name)]
+        return {"per_recording": [float(v) * factor if np.isfinite(v) else None for v in values]}
+
+    def _symptom(self, name: str, values: np.ndarray) -> dict:
+        """A sensor effect that was found in the data itself."""
+        effect = BY_NAME[name]
+        entries = {p.name: {"value": float(v), "unit": unit_of(p.kind, self.output_unit, self.input_unit), "ci95": [None, None],
+                            "meaning": p.meaning} for p, v in zip(effect.parameters, values)}
+        return {"effect": name, "sentence": effect.describe({k: _shown(e["value"], e["unit"]) for k, e in entries.items()}),
+                "subsystem": effect.subsystem, "parameters": entries,
                 "evidence": {"heldout_rmse_without_rad": None, "heldout_rmse_with_rad": None, "delta_bic": None, "p_value": None},
                 "alternatives": []}
 
     def _alternatives(self, name: str) -> list[dict]:
-        """Candidates of the round in which the effect was found that fit no worse beyond chance."""
-        for ranked in self.selection.rounds:
-            mine = next((c for c in ranked if c.name == name), None)
-            if mine is None or mine is not ranked[0]:
-                continue
-            rivals = [(c, tie(mine, c)) for c in ranked if c.name != name and c.name in BY_NAME]
-            tied = [(c, weight) for c, weight in rivals if weight > TIED]
-            total = 1.0 + sum(w for _, w in tied)
-            return [{"effect": c.name, "probability": w / total,
-                     "why_not_excluded": f"explains these recordings within {abs(mine.gain - c.gain):.2f} of {mine.gain:.1f}"}
-                    for c, w in tied]
-        return []
+        """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer on them."""
+        ranked, weights = self._found(name)
+        others = [c for c in ranked[1:] if weights[c.name] > TIED]
+        apart = isolability(ranked[0].fit, [c.fit for c in others], self.start.traces) if others else []
+        return [{"effect": c.name, "probability": weights[c.name],
+                 "why_not_excluded": f"costs {abs(d.cost):.2f} {'more' if d.cost >= 0 else 'less'} than {name}, which explains {ranked[0].gain:.1f}; the two "
+                                     f"simulations differ by {d.sigmas:.2g} times the noise on these recordings",
+                 "difference_sigma": d.sigmas, "cost_difference": d.cost} for c, d in zip(others, apart)]
 
-    def _rivals(self) -> tuple[Candidate, Candidate] | None:
-        """The strongest pair of explanations that these recordings cannot tell apart."""
+    def _found(self, name: str) -> tuple[list[Candidate], dict[str, float]]:
+        """The effects that were compared when this one was found, itself first, and their probabilities."""
         for ranked in self.selection.rounds:
             named = [c for c in ranked if c.name in BY_NAME and c.gain > 0]
-            if len(named) > 1 and named[0].name in self.model.names and tie(named[0], named[1]) > TIED:
-                return named[0], named[1]
-        return None
+            if named and named[0].name == name:
+                return named, probabilities({c.name: c.fit for c in named})
+        return [], {}
+
+    def _rivals(self) -> tuple[tuple[str, Fit], list[tuple[str, Fit, float]]]:
+        """The answer and what the recordings do not exclude in its place, with probabilities: of the effect with the least certain name."""
+        chosen = self.selection.chosen
+        best = (" and ".join(self.model.names) or "baseline", chosen), []
+        for name in self.model.names or [ranked[0].name for ranked in self.selection.rounds[-1:] if ranked and self._left() > SIGNIFICANT]:
+            ranked, weights = self._found(name)
+            rivals = [(c.name, c.fit, weights[c.name]) for c in ranked[1:] if weights[c.name] > TIED]
+            if sum(r[2] for r in rivals) > sum(r[2] for r in best[1]):
+                best = (name, ranked[0].fit), rivals
+        return best
 
     def _errors(self) -> dict:
         """95 % intervals of every fitted number, by (owner, name)."""
         if not hasattr(self, "_cached"):
-            model = neutral(self.model)
+            model = replace(self.model, states=None)
             left_out = self.confirmed.models if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2 else []
             error, factor = standard_errors(model, self.start.traces, left_out, self.selection.tau)
             layout = model.layout()
             z, out = model.vector(layout), {}
             for f, q, e in zip(layout, z, error * factor):
+                if (f.owner, f.name) in out:  # of a further recording
+                    continue
                 ends = f.ends(q, e)
                 if f.name == "b" and model.values["b"] < 0:
                     ends = (-ends[1], -ends[0])
@@ -233,11 +253,11 @@ class Case:
         known = self.datasheet.to_lumped() if self.datasheet is not None else {}
         y, u = self.output_unit, self.input_unit
         units = {"a_1": "1/s^2", "a_2": "1/s", "b": f"{y}/s^2/{u}", "c_1": f"{y}/s^2", "c_2": f"{y}/s^2", "theta_0": y, "tau_e": "s",
-                 "emf_share": "-"}
+                 "emf_share": "-", "ampere": f"{y}/s^2/A"}
         rows, errors = {}, self._errors()
         for name in BASE:
             fitted = ("base", name) in errors
-            if not fitted and name in ("tau_e", "emf_share"):
+            if not fitted and name in ("tau_e", "emf_share", "ampere"):
                 continue
             absent = name in ("a_1", "c_1") and self.model.values[name] == 0
             value = float(self.model.values[name]) if fitted or absent else None
@@ -253,14 +273,14 @@ class Case:
         """The combinations of Table 1's letters that position and voltage can tell (notes in the README)."""
         if self.datasheet is None or not self.datasheet.parameters:
             return {}
-        named = {"k_s/J": "a_1", "n K_t/(J R)": "b", "T_LH/J": "c_1", "F_c/J": "c_2", "L/R": "tau_e"}
+        named = {"k_s/J": "a_1", "n K_t/(J R)": "b", "T_LH/J": "c_1", "F_c/J": "c_2", "L/R": "tau_e", "n K_t/J": "ampere"}
         return {combination: rows[name] for combination, name in named.items() if name in rows}
 
     def _record_state(self, held: list[Trace]) -> list[dict]:
         """What differs between recordings beyond chance: training ones as fitted, held-out ones as recalibrated."""
         out, unknown = [], (None, None)
         states, errors = dict(self.model.states or {}), self._state_errors()
-        later = [recalibrated(self.model, h)[1] for h in held]
+        later = [recalibrated(model, h)[1] for model, h in zip(self.confirmed.models, held)]
         count = len(self.start.traces)
         for name in STATES:
             rest = 0.0 if name == "offset" else 1.0
@@ -362,8 +382,8 @@ class Case:
         for name in (self.model.names if verdict == "missing_physics" else ()):
             entries = {p["name"]: p["entry"]["value"] for p in self._effect_parameters(name)}
             effects.append((name, {k: v for k, v in entries.items() if v is not None}))
-        if verdict == "missing_physics" and self.coarse:
-            effects.append(("sensor_quantisation", {"step": max(t.quantum for t in self.start.traces)}))
+        if verdict == "missing_physics":
+            effects += [(name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)}) for name, values in self.sensors.items()]
         parameters = dict(self.datasheet.parameters) if self.datasheet is not None else {}
         return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
 

@@ -16,14 +16,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.base import Scales
+from ers_mj.effects.base import Parameter, Scales
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.symptoms import excursions
 from ers_mj.traces import Blocks, Trace, parabola_start, start_samples
 
 OBSERVER_RATE = 5.0  # [1/s]
 OBSERVER_STEP = 0.005  # [s] between corrections of the observer
 DIFFERENCE = 1e-4  # step of the finite differences in transformed parameters
-BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share")
+BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share", "ampere")
+SIGNED = ("b", "ampere")  # fitted by size, their sign kept
 STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
 POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
@@ -35,8 +37,12 @@ SOFT = 3  # directions along which a fit hops, of least curvature
 HOP_GAIN = 0.3  # of C that a hop must win to be followed by further ones
 ROUGH, QUIET = 3.0, 0.02  # median misfit up to which, and C per block from which, a fit hops
 HOPELESS = 0.02  # excess of C per block over a nested model at which a search is given up
-NEAR = 0.1  # half travels by which theta_0 may lie beyond the travel
+NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
+FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
+SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
+SPIKE_SAMPLES, SPIKE_TIME = 5, 0.005  # length of a spike at most, and [s]
+CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 STATES = ("gain", "offset", "friction_level")
 
 
@@ -52,6 +58,12 @@ class Free:
     lower: float
     upper: float
     prior: tuple[float, float] | None = None
+    local: bool = False
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """What tells this number from every other one, whatever else is fitted."""
+        return self.owner, self.name, self.index // 16 if self.local else self.index if self.owner in STATES else 0
 
     def ends(self, z: float, half: float) -> tuple[float, float]:
         """The interval z -+ half of the transformed number, in the number's own unit."""
@@ -60,12 +72,17 @@ class Free:
         return (z - half) * self.scale, (z + half) * self.scale
 
 
+Columns = Mapping[tuple[str, str, int], np.ndarray]  # of a Jacobian, by the key of what is fitted
+
+
 @dataclass(frozen=True)
 class Model:
     """A structure with values: the baseline, the effects on top, and what differs from recording to recording.
 
     ``values`` holds all of BASE; ``free`` names those that are fitted. ``effects`` are (name, parameters (k,));
-    infinite parameters are absent, not fitted. ``states`` maps a record state to its value in each recording.
+    infinite parameters are absent, not fitted. ``states`` maps a record state to its value in each recording, ``local`` an effect to
+    its parameters that are ``per_record`` (recordings, k), in rows of NaN where the effect is absent from a recording.
+    ``frozen`` names effects that are not fitted, and with ", local" those whose ``local`` is not.
     """
 
     values: Mapping[str, float]
@@ -75,6 +92,7 @@ class Model:
     scales: Scales | None = None
     priors: Mapping[str, tuple[float, float]] | None = None
     frozen: tuple[str, ...] = ()
+    local: Mapping[str, np.ndarray] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,11 +104,10 @@ class Model:
         out = []
         held = {name for effect, _ in self.effects for name in BY_NAME[effect].absorbs}
         for name in (n for n in self.free if n not in held):
-            positive = name not in ("theta_0", "b") or name == "b"
+            positive = name != "theta_0"
             lower, upper = (1e-9, np.inf)
             if name == "theta_0":
-                near = NEAR * self.scales.position
-                positive, lower, upper = False, self.scales.low - near, self.scales.high + near
+                positive, (lower, upper) = False, self._near_travel()
             if name == "emf_share":
                 lower, upper = 0.02, 0.999
             if name == "tau_e":
@@ -101,13 +118,13 @@ class Model:
             if effect_name in self.frozen:
                 continue
             for k, parameter in enumerate(BY_NAME[effect_name].parameters):
-                if np.isfinite(values[k]):
-                    scale = max(abs(values[k]), 1e-12) if not parameter.positive else 1.0
-                    most = 1.0 / self.scales.sample_time if parameter.kind == "frequency" else np.inf
-                    least = SMALLEST * self.scales.noise if parameter.kind == "position" else 1e-12
-                    out.append(Free(effect_name, parameter.name, row * 16 + k, parameter.positive, scale,
-                                    max(parameter.lower, least) if parameter.positive else parameter.lower,
-                                    min(parameter.upper, most)))
+                if np.isfinite(values[k]) and parameter.fitted and not (parameter.per_record and effect_name in (self.local or {})):
+                    out.append(self._of_effect(effect_name, parameter, row * 16 + k, values[k]))
+        for effect_name, rows in (self.local or {}).items():
+            if f"{effect_name}, local" in self.frozen:
+                continue
+            for k, parameter in enumerate(p for p in BY_NAME[effect_name].parameters if p.per_record):
+                out += [self._of_effect(effect_name, parameter, r * 16 + k, v, True) for r, v in enumerate(rows[:, k]) if np.isfinite(v)]
         for state, per_record in (self.states or {}).items():
             for k in range(1, len(per_record)):
                 multiplies = state != "offset"
@@ -116,9 +133,21 @@ class Model:
                                 5.0 if multiplies else np.inf, prior))
         return out
 
+    def _of_effect(self, name: str, parameter: Parameter, index: int, value: float, local: bool = False) -> Free:
+        scale = 1.0 if parameter.positive else CLOCKED.get(parameter.kind, max(abs(value), 1e-12))
+        most = 1.0 / self.scales.sample_time if parameter.kind == "frequency" else np.inf
+        least = {"position": SMALLEST * self.scales.noise, "frequency": FEWEST_CYCLES / self.scales.duration}.get(parameter.kind, 1e-12)
+        lower = max(parameter.lower, least) if parameter.positive else parameter.lower
+        ends = self._near_travel() if parameter.on_travel else (lower, min(parameter.upper, most))
+        return Free(name, parameter.name, index, parameter.positive, scale, *ends, local=local)
+
+    def _near_travel(self) -> tuple[float, float]:
+        near = NEAR * self.scales.position
+        return self.scales.low - near, self.scales.high + near
+
     def _tau_bounds(self) -> tuple[float, float]:
         known = self.scales.tau_e_datasheet
-        return (0.01 * known, 2.0 * known) if known else (1e-6, 1.0)
+        return (0.1 * known, 2.0 * known) if known else (1e-6, 1.0)
 
     def vector(self, layout: Sequence[Free]) -> np.ndarray:
         """The fitted numbers, transformed (logarithm of positive ones, others over their scale)."""
@@ -133,30 +162,42 @@ class Model:
             return self.values[f.name]
         if f.owner in STATES:
             return self.states[f.owner][f.index]
+        if f.local:
+            return self.local[f.owner][f.index // 16, f.index % 16]
         return self.effects[f.index // 16][1][f.index % 16]
 
     def at(self, layout: Sequence[Free], z: np.ndarray) -> Model:
         """The model with the fitted numbers of z, held within their bounds."""
         values, effects = dict(self.values), [(n, v.copy()) for n, v in self.effects]
-        states = {k: v.copy() for k, v in (self.states or {}).items()}
+        states, local = ({k: v.copy() for k, v in (some or {}).items()} for some in (self.states, self.local))
         for f, q in zip(layout, z):
             v = math.exp(min(q, 60.0)) if f.positive else q * f.scale
             v = min(max(v, f.lower), f.upper)
             if f.owner == "base":
-                values[f.name] = math.copysign(v, self.values["b"]) if f.name == "b" else v
+                values[f.name] = math.copysign(v, self.values[f.name]) if f.name in SIGNED else v
             elif f.owner in STATES:
                 states[f.owner][f.index] = v
+            elif f.local:
+                local[f.owner][f.index // 16, f.index % 16] = v
             else:
                 effects[f.index // 16][1][f.index % 16] = v
-        return replace(self, values=values, effects=tuple(effects), states=states or None)
+        return replace(self, values=values, effects=tuple(effects), states=states or None, local=local or None)
 
     def with_effect(self, name: str, start: np.ndarray) -> Model:
-        """The model with one more effect at ``start``."""
-        return replace(self, effects=(*self.effects, (name, np.array(start, float))))
+        """The model with one more effect at ``start``, its per-record parameters alike in every recording that it acts in."""
+        effect, start = BY_NAME[name], np.array(start, float)
+        local = dict(self.local or {})
+        if effect.local:
+            rows = np.tile(start[effect.local_columns], (self.scales.recordings, 1))
+            if "record" in (names := [p.name for p in effect.parameters]):
+                rows[np.arange(len(rows)) != start[names.index("record")]] = np.nan
+            local[name] = rows
+        return replace(self, effects=(*self.effects, (name, start)), local=local or None)
 
     def without_effect(self, name: str) -> Model:
         """The model with one effect less."""
-        return replace(self, effects=tuple(e for e in self.effects if e[0] != name))
+        local = {k: v for k, v in (self.local or {}).items() if k != name}
+        return replace(self, effects=tuple(e for e in self.effects if e[0] != name), local=local or None)
 
     def with_state(self, state: str, records: int) -> Model:
         """The model with a record state free in every recording but the first."""
@@ -170,7 +211,27 @@ class Model:
             gain = self.states["gain"][record] if "gain" in self.states else 1.0
             level = self.states["friction_level"][record] if "friction_level" in self.states else 1.0
             c = c._replace(b=c.b * gain, c_2_plus=c.c_2_plus * level, c_2_minus=c.c_2_minus * level)
-        return ReducedModel(c, self.effects)
+        return ReducedModel(c, self.effects_of(record))
+
+    def effects_of(self, record: int | None = None) -> tuple[tuple[str, np.ndarray], ...]:
+        """The effects that act in one recording (None: in any), with their values there (in the first where they act)."""
+        if not self.local:
+            return self.effects
+        out = []
+        for name, values in self.effects:
+            if name in self.local:
+                values, columns = values.copy(), BY_NAME[name].local_columns
+                rows = self.local[name]
+                values[columns] = rows[np.argmin(np.isnan(rows).any(axis=1)) if record is None else record]
+                if np.isnan(values[columns]).any():
+                    continue
+            out.append((name, values))
+        return tuple(out)
+
+    def of_records(self, records: Sequence[int]) -> Model:
+        """The model for some of its recordings only, without what differs between them (``states``)."""
+        local = {name: rows[list(records)] for name, rows in (self.local or {}).items()}
+        return replace(self, states=None, local=local or None, scales=replace(self.scales, recordings=len(records)))
 
     def offset(self, record: int) -> float:
         """Output offset of one recording."""
@@ -178,15 +239,37 @@ class Model:
 
     def predict(self, trace: Trace, record: int = 0, rate: float = 0.0, start=None) -> np.ndarray:
         """Simulated output (N,) of a recording: free run, or observer form where ``rate`` [1/s] > 0."""
+        plant, run = self._run(trace, record, rate, start)
+        return plant.theta(trace.t, trace.u, **run) + self.offset(record)
+
+    def observed(self, trace: Trace, record: int, rate: float) -> list[np.ndarray]:
+        """What ``predict`` gives, and behind it what each further channel of the recording would show, (N,) each."""
+        plant, run = self._run(trace, record, rate, None)
+        theta, motion = plant.outputs(trace.t, trace.u, **run)
+        out = [theta + self.offset(record)]
+        for channel in trace.channels:
+            out.append({"speed": lambda: motion[:, 1], "motor": lambda: motion[:, 3],
+                        "current": lambda: plant.current(trace.t, motion) / self.values["ampere"]}[channel.kind]())
+        return out
+
+    def first_orders(self, traces: Sequence[Trace], rate: float, name: str, starts: Sequence[np.ndarray]) -> np.ndarray:
+        """First-order change of the predicted outputs (len(starts), all residuals; none of the channels) by the law of one more effect, at each of its starts."""
+        columns = []
+        for k, trace in enumerate(traces):
+            plant, run = self._run(trace, k, rate, None)
+            path, clock = plant.path(trace.t, trace.u, **run), {key: run[key] for key in ("gain", "every")}
+            rest = np.zeros(trace.rows - trace.t.size)
+            columns.append([np.concatenate([plant.first_order(trace.t, path, name, start, **clock), rest]) for start in starts])
+        return np.concatenate(columns, axis=1)
+
+    def _run(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
+        """The plant of a recording, and how it is run along it."""
         every = max(1, round(OBSERVER_STEP / trace.sample_time))
-        gain = 1.0 - math.exp(-rate * every * trace.sample_time)
-        shift = self.offset(record)
+        gain, shift, plant = 1.0 - math.exp(-rate * every * trace.sample_time), self.offset(record), self.plant(record)
         theta, omega = trace.start if start is None else start
-        plant = self.plant(record)
         drive = 0.0 if omega == 0 else plant.coefficients.b * trace.u[0] - plant.coefficients.a_emf * omega
-        y = trace.y - shift if gain > 0 else None
-        return plant.theta(trace.t, trace.u, (theta - shift, omega, drive), enable=trace.enable, load=trace.load,
-                           y=y, gain=gain, every=every) + shift
+        return plant, {"start": (theta - shift, omega, drive), "enable": trace.enable, "load": trace.load,
+                       "y": trace.y - shift if gain > 0 else None, "gain": gain, "every": every}
 
 
 @dataclass(frozen=True)
@@ -206,11 +289,13 @@ class Fit:
 
 
 def residuals(model: Model, traces: Sequence[Trace], rate: float) -> np.ndarray:
-    """y - y_hat over all traces, in sigmas of each, 0 where a sample is not valid; NaN where the simulation ran away."""
+    """y - y_hat over all traces and their channels, in sigmas of each, 0 where a sample is missing; NaN where the simulation ran away."""
     parts = []
     for k, trace in enumerate(traces):
-        e = (trace.y - model.predict(trace, k, rate)) / trace.sigma
-        parts.append(np.where(trace.valid, e, 0.0))
+        theta, *others = model.observed(trace, k, rate)
+        parts.append(np.where(trace.valid, (trace.y - theta) / trace.sigma, 0.0))
+        for channel, seen in zip(trace.channels, others):
+            parts.append(np.where(np.isfinite(channel.values), (channel.values - seen) / channel.sigma, 0.0))
     return np.concatenate(parts)
 
 
@@ -225,36 +310,40 @@ def tau_of(misfit: np.ndarray) -> float:
 
 
 def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25,
-        ceiling: np.ndarray | None = None) -> Fit:
+        ceiling: np.ndarray | None = None, known: Columns | None = None, renewals: float = math.inf) -> Fit:
     """Minimise C over the model's free numbers, from the model's own values.
 
     ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
-    given up, since its start was a bad one.
+    given up, since its start was a bad one. ``known`` are columns of a Jacobian taken near by, with which the search begins; after
+    ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further.
 
     Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
     mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
     more of a search that begins near the data: one bad block would send it back to the sum of squares.)
     """
-    now = math.inf
+    now, jacobian = math.inf, None
+    if known is not None:
+        layout = model.layout()
+        jacobian = jacobian_of(model, layout, model.vector(layout), residuals(model, traces, rate), traces, rate, known)
     while True:
         misfit = Blocks.of(traces).misfit(residuals(model, traces, rate))
         sound = np.all(np.isfinite(misfit))  # a runaway has one descent to find a motion
         level = float(np.exp(np.mean(np.log(misfit + tau)))) if sound else 0.0
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
-        found = descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3)
+        found, jacobian, renewals = _descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, jacobian, renewals)
         if last or (ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size):
             return found
         model = found.model
 
 
-def converged(found: Fit, rivals: Sequence[Fit], traces: Sequence[Trace], tau: float) -> Fit:
-    """The fit carried on to its valley's floor, from its own values and from the baseline values of its rivals.
+def converged(found: Fit, rival: Fit, traces: Sequence[Trace], tau: float) -> Fit:
+    """The fit carried on to its valley's floor, from its own values and from the baseline values of a rival.
 
     Where stick and slip fork, the cost has dents of about one block's cost, in which a single descent may rest.
     """
-    starts = [replace(found.model, values=rival.model.values) for rival in rivals]
-    ends = [descend(model, traces, OBSERVER_RATE, tau, 40, FLOOR) for model in (found.model, *starts)]
+    starts = found.model, replace(found.model, values=rival.model.values)
+    ends = [descend(model, traces, OBSERVER_RATE, tau, 40, FLOOR) for model in starts]
     return min(ends, key=lambda f: f.cost)
 
 
@@ -270,7 +359,7 @@ def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restar
         return descend(start, begun, OBSERVER_RATE, tau, 12, 0.03), begun
 
     for _ in range(MOST_HOPS):
-        if float(np.median(found.misfit)) > ROUGH or float(np.mean(score(found.misfit, tau))) < QUIET:
+        if not near_noise(found) or float(np.mean(score(found.misfit, tau))) < QUIET:
             break
         layout = found.model.layout()
         z, (curvature, directions) = found.model.vector(layout), np.linalg.eigh(found.hessian)
@@ -282,6 +371,11 @@ def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restar
             break
         found, traces = best, begun
     return found, traces
+
+
+def near_noise(found: Fit) -> bool:
+    """Whether half the blocks are explained to about their noise (ROUGH), so that details may be told."""
+    return float(np.median(found.misfit)) <= ROUGH
 
 
 def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
@@ -305,13 +399,19 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
 
 
 def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float) -> Fit:
-    """Levenberg-Marquardt on C at one ``tau``, until a step along a fresh Jacobian gains less than ``tolerance``.
+    """Levenberg-Marquardt on C at one ``tau``, until a step along a fresh Jacobian gains less than ``tolerance``."""
+    return _descend(model, traces, rate, tau, steps, tolerance, None, math.inf)[0]
+
+
+def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, jacobian: np.ndarray | None,
+             renewals: float) -> tuple[Fit, np.ndarray | None, float]:
+    """See ``descend``: the fit, the Jacobian that it ended with, and how many it may still take.
 
     Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised.
     """
     layout, blocks = model.layout(), Blocks.of(traces)
     z = model.vector(layout)
-    damping, calls = 1e-3, 1
+    damping, calls, fresh = 1e-3, 1, False
 
     def evaluate(z):
         e = residuals(model.at(layout, z), traces, rate)
@@ -323,11 +423,13 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
     e, m, cost = evaluate(z)
     if m is None:
         e, m = np.full(blocks.index.size, 1e6), np.full(blocks.counts.size, 1e12)
-    jacobian, fresh = None, False
+    hessian = np.eye(z.size)
     for _ in range(steps):
         if jacobian is None:
+            if renewals <= 0:
+                break
             jacobian, fresh = jacobian_of(model, layout, z, e, traces, rate), True
-            calls += z.size
+            calls, renewals = calls + z.size, renewals - 1
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
         weighted = jacobian * weight[:, None]
         hessian, slope = weighted.T @ jacobian, weighted.T @ e
@@ -357,21 +459,35 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
         z, (e, m, cost) = goal, trial
         damping = max(damping / 8, 1e-9)
         if gain < tolerance:
-            if was_fresh:
+            if was_fresh or renewals <= 0:
                 break
             jacobian = None
-    return Fit(model.at(layout, z), cost, m, hessian, calls)
+    return Fit(model.at(layout, z), cost, m, hessian, calls), jacobian, renewals
 
 
-def jacobian_of(model, layout, z, e, traces, rate):
-    """Finite differences of the residuals e (N,) by the fitted numbers: (N, k)."""
+def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None):
+    """Finite differences of the residuals e (N,) by the fitted numbers, but for the ``known`` ones: (N, k)."""
     jacobian = np.empty((e.size, z.size))
     for k in range(z.size):
+        if known and layout[k].key in known:
+            jacobian[:, k] = known[layout[k].key]
+            continue
         shifted = z.copy()
         shifted[k] += DIFFERENCE
         jacobian[:, k] = (residuals(model.at(layout, shifted), traces, rate) - e) / DIFFERENCE
     jacobian[~np.isfinite(jacobian)] = 0.0
     return jacobian
+
+
+def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
+    """The traces without the spikes that stand out of the model's error: within SPIKE_TIME a rudder's own error is smooth, however wrong
+    the model is."""
+    out = []
+    for k, trace in enumerate(traces):
+        e = np.where(trace.valid, (trace.y - model.predict(trace, k, OBSERVER_RATE)) / trace.sigma, np.nan)
+        longest = min(SPIKE_SAMPLES, int(SPIKE_TIME / trace.sample_time + 1e-6))
+        out.append(trace.without(excursions(e, 1.0, *SPIKE, longest)) if longest and np.isfinite(e[trace.valid]).all() else trace)
+    return out
 
 
 def with_starts(model: Model, traces: Sequence[Trace]) -> list[Trace]:

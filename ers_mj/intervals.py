@@ -20,10 +20,11 @@ RUN = 4  # neighbouring blocks that are resampled together
 def standard_errors(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> tuple[np.ndarray, float]:
     """Standard errors (k,) of the model's transformed numbers, and the factor that makes them 95 % half-widths.
 
-    ``left_out`` holds the model refitted without each recording in turn; with fewer than three the block sandwich serves.
+    ``left_out`` holds the model refitted without each recording in turn; with fewer than three, or where
+    some numbers belong to one recording only, the block sandwich serves.
     """
     layout = model.layout()
-    if len(left_out) >= FEWEST_RECORDS:
+    if len(left_out) >= FEWEST_RECORDS and not any(f.local for f in layout):
         z = np.array([m.vector(layout) for m in left_out])
         n = len(left_out)
         return np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0)), float(student.ppf(0.975, n - 1))

@@ -21,6 +21,7 @@ from ers_mj.traces import Trace
 
 LOCAL_RATE = 30.0  # [1/s]
 BINS = 24
+LEAST_SHARE = 0.05  # of the misfit from which a subsystem is told
 LEAST_EXCESS = 0.2  # share of error minus share of time from which a region is worth a sentence
 
 
@@ -79,14 +80,14 @@ def _best_interval(values: np.ndarray, squares: np.ndarray, edges: np.ndarray):
     return edges[i], edges[j], float(error[i:j].sum()), float(time[i:j].sum())
 
 
-def places(samples: Samples, traces: Sequence[Trace], rounds: Sequence[Sequence[Candidate]], base_cost: float,
+def places(samples: Samples, traces: Sequence[Trace], rounds: Sequence[Sequence[Candidate]], base_cost: float, named: Sequence[str],
            output_unit: str, input_unit: str) -> list[Place]:
-    """Regions worth telling, subsystem first, then by how much more error than time they hold."""
+    """Regions worth telling, subsystem first (of the ``named`` effects before others), then by how much more error than time they hold."""
     found = [*_by_value(samples, output_unit, input_unit), *_by_direction(samples), *_by_time(samples, traces),
              *_by_frequency(samples, traces)]
     found = [p for p in found if p.share_of_error - p.share_of_time >= LEAST_EXCESS]
     found.sort(key=lambda p: p.share_of_time - p.share_of_error)
-    return [*_by_subsystem(rounds, base_cost), *found]
+    return [*_by_subsystem(rounds, base_cost, named), *found]
 
 
 def _shown(value: float, unit: str) -> str:
@@ -163,19 +164,23 @@ def _by_frequency(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
                   f"{error:.0%} of the error's size varies at {low:.3g} to {high:.3g} Hz, where {motion:.0%} of the motion's power is")]
 
 
-def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float) -> list[Place]:
-    """Subsystems by what their best effect explains of the baseline's cost."""
+def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named: Sequence[str]) -> list[Place]:
+    """Subsystems by what their best effect explains of the baseline's cost; those of the named effects lead, in their order."""
     best: dict[str, tuple[float, str]] = {}
-    for candidate in (rounds[0] if rounds else ()):
-        if candidate.name not in BY_NAME:
-            continue
-        subsystem = BY_NAME[candidate.name].subsystem
-        share = max(candidate.gain, 0.0) / max(base_cost, 1e-9)
-        best[subsystem] = max(best.get(subsystem, (0.0, "")), (min(share, 1.0), candidate.name))
-    ranked = sorted(best.items(), key=lambda item: -item[1][0])
-    return [Place("subsystem", None, None, subsystem, share, 1.0,
-                  f"{share:.0%} of the misfit can be explained in the {subsystem} ({name.replace('_', ' ')})")
-            for subsystem, (share, name) in ranked if share > 0.05]
+    for candidate in (c for ranked in rounds for c in ranked):
+        if candidate.name in BY_NAME:
+            share = min(max(candidate.gain, 0.0) / max(base_cost, 1e-9), 1.0)
+            subsystem = BY_NAME[candidate.name].subsystem
+            best[subsystem] = max(best.get(subsystem, (0.0, "")), (share, candidate.name))
+    lead = list(dict.fromkeys(BY_NAME[name].subsystem for name in named))
+    ranked = sorted((s for s in best if s not in lead and best[s][0] > LEAST_SHARE), key=lambda s: -best[s][0])
+    out = []
+    for subsystem in (*lead, *ranked):
+        share, name = best.get(subsystem, (None, None))
+        words = (f"{share:.0%} of the misfit can be explained in the {subsystem} ({name.replace('_', ' ')})" if share is not None
+                 else f"the data itself shows it: the {subsystem}")
+        out.append(Place("subsystem", None, None, subsystem, share, None if share is None else 1.0, words))
+    return out
 
 
 def shaded(trace: Trace, record: int, samples: Samples) -> tuple[tuple[float, float], ...]:

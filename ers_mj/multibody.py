@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.evaluation import Fold, neutral
+from ers_mj.evaluation import Fold
 from ers_mj.identification import Model, fitted_start
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped
@@ -27,7 +27,7 @@ class Rig:
     def plant(self, model: Model) -> MechanicalPlant:
         """The identified model as a MuJoCo plant: the rudder system where the datasheet tells its inertia, one lumped joint else."""
         shape = bodily(self.parameters, self.is_angle, model.values["b"])
-        return MechanicalPlant(lumped(model.values), neutral(model).effects, parameters=shape, is_angle=self.is_angle)
+        return MechanicalPlant(lumped(model.values), model.effects_of(), parameters=shape, is_angle=self.is_angle)
 
     def free_run(self, model: Model, trace: Trace) -> np.ndarray:
         """Output (N,) of the MuJoCo plant under a recording's input, from the initial state that the reduced model fits."""
@@ -35,7 +35,7 @@ class Rig:
         plant = self.plant(model)
         c = plant.coefficients
         drive = 0.0 if omega == 0 else c.b * trace.u[0] - c.a_emf * omega
-        return plant.simulate(trace.t, trace.u, (theta, omega, drive), enable=trace.enable, load=trace.load).theta
+        return plant.simulate(trace.t, trace.u, (theta, omega, drive), enable=trace.enable, load=trace.load).measured
 
     def rmse(self, models: Sequence[Model], parts: Sequence[Fold], jobs: int) -> float | None:
         """Pooled free-run error [output unit] of the MuJoCo plants on what each model has not seen; None where one runs away."""

@@ -14,22 +14,37 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.effects import EFFECTS
-from ers_mj.identification import OBSERVER_RATE, STATES, Fit, Model, converged, fit, hopped, jacobian_of, residuals, score, tau_of
-from ers_mj.traces import Blocks, Trace
+from ers_mj.effects import BY_NAME, Effect
+from ers_mj.identification import OBSERVER_RATE, STATES, Columns, Fit, Model, converged, fit, hopped, jacobian_of, near_noise, residuals, score, tau_of
+from ers_mj.traces import BLOCK, Blocks, Trace
 
 LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error of about 0.3 sigma RMS
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
-REFITTED = 7  # candidates of the screening that are refitted
-ELSEWHERE = 3  # and those that another place than the refitted baseline finds most promising
+MOST_SENT, LATER = 10, 5  # candidates of the screening that are refitted at most, in the first round and beside an effect
+PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
+RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
+LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
+PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
-MOST_ROUNDS = 2
+CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
+MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
+RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
+QUICK = 8  # steps of a first refit, on a borrowed Jacobian
+HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
+
+
+@dataclass(frozen=True)
+class Begin:
+    """Where a refit begins: the model, and the Jacobian's columns at the place that it extends."""
+
+    model: Model
+    known: Columns
 
 
 @dataclass(frozen=True)
@@ -63,36 +78,60 @@ def tie(best: Candidate, other: Candidate) -> float:
     return math.erfc(max(float(np.sum(d)), 0.0) / spread / math.sqrt(2.0))
 
 
-def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Model]]]]:
+def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Begin]]]]:
     """The promising effects, each with the models to refit: for every place, those of its best starts.
 
-    From each place (the refitted baseline, and where else a fit may start from) the secant e(with effect) - e(without) is taken at
-    the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
+    From each place (the refitted baseline first, and where else a fit may start from) the secant e(with effect) - e(without) is taken
+    at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
     largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
-    a small effect beside the noise, the second a large one that the baseline could not swallow. The baseline sends REFITTED
-    effects on, every other place ELSEWHERE.
+    a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
+    the first place: MOST_SENT at most, those with PROMISING of the best one's promise.
     """
-    tried: dict[str, list[list[Model]]] = {}
-    sent: list[str] = []
-    for place, most in zip(places, (REFITTED, *[ELSEWHERE] * len(places))):
+    tried: dict[str, list[list[Begin]]] = {}
+    for place in places:
         e = residuals(place, traces, OBSERVER_RATE)
         if not np.all(np.isfinite(e)):
             continue
-        targets = _targets(place, e, traces, tau)
-        promises = {}
-        for effect in EFFECTS:
-            if effect.name not in exclude:
-                found = [p for start in effect.starts(place.scales) if (p := _promise(place, effect, start, e, targets, traces))]
+        (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
+        promises, begins = {}, {}
+        for effect in (BY_NAME[name] for name in tried or BY_NAME if name not in exclude):
+            starts = _hopeful(place, effect, effect.starts(scales), targets, traces)
+            found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
+            if found:
                 found.sort(key=lambda p: -p[0])
-                if found:
-                    promises[effect.name] = found[0][0]
-                    tried.setdefault(effect.name, []).append([model for _, model in found[:effect.tries]])
-        sent += sorted(promises, key=promises.get, reverse=True)[:most]
-    return [(name, tried[name]) for name in dict.fromkeys(sent)]
+                promises[effect.name] = found[0][0]
+                begins[effect.name] = [Begin(model, known) for _, model in found[:effect.tries]]
+        if not tried:
+            best = sorted(promises, key=promises.get, reverse=True)[:LATER if place.names else MOST_SENT]
+            tried = {name: [] for name in best
+                     if promises[name] >= (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * promises[best[0]]}
+        for name in tried:
+            tried[name] += [begins[name]] if name in begins else []
+    return list(tried.items())
 
 
-def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """(weights (N,), orthonormal basis (N, k) of the place's own parameters, weighted residual (N,) beside it) at either weighting."""
+def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
+    """Of many starts of a law, those that promise most to first order along the place's own motion."""
+    if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or place.plant().coupled:
+        return starts
+    sigma = np.concatenate([np.full(t.rows, t.sigma) for t in traces])
+    valid = np.concatenate([np.pad(t.valid, (0, t.rows - t.t.size)) for t in traces])
+    groups = _groups(effect, traces)
+    waves = 2 if effect.wave else 1
+    every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
+    changes = np.where(valid, -place.first_orders(traces, OBSERVER_RATE, effect.name, every) / sigma, 0.0)
+    if "record" in (names := [p.name for p in effect.parameters]):
+        record = np.repeat(np.arange(len(traces)), [t.rows for t in traces])
+        changes *= np.array([s[names.index("record")] for s in every])[:, None] == record
+    shares = [max(_mixed(_split(changes[i:i + waves], groups), target)[0] if effect.signed else _explained(changes[i], target, False)[0]
+                  for target in targets) for i in range(0, len(every), waves)]
+    best = sorted(np.argsort(shares)[::-1][:effect.tries])
+    return [starts[i] for i in best]
+
+
+def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
+    """The Jacobian's columns at the place, and at either weighting (weights (N,), orthonormal basis (N, k) of the place's own
+    parameters, weighted residual (N,) beside it)."""
     blocks, layout = Blocks.of(traces), place.layout()
     m = blocks.misfit(e)
     jacobian = jacobian_of(place, layout, place.vector(layout), e, traces, OBSERVER_RATE)
@@ -101,7 +140,7 @@ def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float) -
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
         basis, _ = np.linalg.qr(jacobian * root[:, None])
         out.append((root, basis, _beside(basis, root * e)))
-    return out
+    return {f.key: column for f, column in zip(layout, jacobian.T)}, out
 
 
 def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
@@ -109,6 +148,8 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
 
     A secant across a large step bends; where the effect is proportional to its leading parameters it is taken again at that size.
     """
+    if effect.wave and np.isfinite(start[effect.wave[1]]):
+        return _promise_of_wave(place, effect, start, e, targets, traces)
     best = None
     for _ in range(2 if effect.sized else 1):
         secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
@@ -119,6 +160,60 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
         if best is None or share > best[0]:
             best = share, place.with_effect(effect.name, start)
     return best
+
+
+def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
+    """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local."""
+    amplitude, phase = effect.wave
+    secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
+    if not np.all(np.isfinite(secants)):
+        return None
+    columns = _split(secants, _groups(effect, traces))
+    share, mixture = max((_mixed(columns, target) for target in targets), key=lambda found: found[0])
+    mixture = mixture.reshape(-1, 2)
+    sizes, turns = np.hypot(*mixture.T), np.arctan2(mixture[:, 1], mixture[:, 0])
+    found = start.copy()
+    found[amplitude] *= min(max(math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
+    found[phase] += turns[0]
+    model = place.with_effect(effect.name, found)
+    if effect.local:
+        model.local[effect.name][:, effect.local_columns.index(phase)] = start[phase] + turns
+    return share, model
+
+
+def _mixed(columns: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[float, np.ndarray]:
+    """Share of a target that the columns (N, 2 g) explain together, and the multiples (2 g,) of them that do."""
+    root, basis, residual = target
+    free = _beside(basis, root[:, None] * columns)
+    multiples = np.linalg.lstsq(free, -residual, rcond=1e-9)[0]
+    left = residual + free @ multiples
+    return 1.0 - float(left @ left) / float(residual @ residual), multiples
+
+
+def _quarter(effect: Effect, start: np.ndarray) -> np.ndarray:
+    """The start of a wave a quarter period on."""
+    turned = start.copy()
+    turned[effect.wave[1]] += 0.5 * math.pi
+    return turned
+
+
+def _groups(effect: Effect, traces: Sequence[Trace]) -> np.ndarray:
+    """For each sample (N,) the number of what may have a phase of its own: its recording, or 0 for all."""
+    return np.repeat(np.arange(len(traces)) if effect.local and effect.wave else np.zeros(len(traces), int), [t.rows for t in traces])
+
+
+def _split(changes, groups: np.ndarray) -> np.ndarray:
+    """Columns (N, groups x changes): each change (N,) within each group."""
+    return np.column_stack([np.where(groups == g, s, 0.0) for g in range(groups[-1] + 1) for s in changes])
+
+
+def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int, float, float], ...]:
+    """Spans (recording, begin [s], length [s]) around the blocks of largest misfit: where something may have knocked."""
+    blocks = Blocks.of(traces)
+    record = np.repeat(np.arange(len(traces)), [t.counts.size * (1 + len(t.channels)) for t in traces])
+    within = np.concatenate([np.tile(np.arange(t.counts.size), 1 + len(t.channels)) for t in traces])
+    worst = np.argsort(-score(blocks.misfit(e), tau), kind="stable")[:HOTTEST]
+    return tuple((int(record[b]), float(traces[record[b]].t[0] + within[b] * BLOCK), length) for b in worst for length in KNOCKS)
 
 
 def _explained(secant: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray], signed: bool) -> tuple[float, float]:
@@ -147,21 +242,25 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
                anchors: Sequence[Mapping[str, float]] = (), least: float = 0.0) -> list[Candidate]:
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
 
-    They are left at their first refit where none has come near the ``least`` gain that matters.
+    They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow and a
+    mimic's short. Where none comes near the ``least`` gain that matters they are left at that.
     """
     reference = float(score(base.misfit, tau).sum())
 
     def total(found):
         return float(score(found.misfit, tau).sum())
 
-    def quick(model):
-        return fit(model, traces, tau=tau, steps=6, ceiling=base.misfit)
+    def quick(begin):
+        return fit(begin.model, traces, tau=tau, steps=QUICK, ceiling=base.misfit, known=begin.known, renewals=0)
 
     def refitted(starts):
-        """The best fit by name from pairs (name, model), those with the most parameters begun first since they take longest."""
-        order = sorted(starts, key=lambda start: -len(start[1].layout()))
-        ends = list(zip((name for name, _ in order), pool.map(quick, (model for _, model in order))))
+        """The best fit by name from pairs (name, Begin), those with the most parameters begun first since they take longest."""
+        order = sorted(starts, key=lambda start: -len(start[1].model.layout()))
+        ends = list(zip((name for name, _ in order), pool.map(quick, (begin for _, begin in order))))
         return {name: min((found for other, found in ends if other == name), key=total) for name, _ in starts}
+
+    def onward(item):
+        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=RENEWALS)
 
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
@@ -170,26 +269,58 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         name, found = item
         return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau))
 
-    states = [(s, [[base.model.with_state(s, len(traces))]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
+    states = [(s, [[Begin(base.model.with_state(s, len(traces)), {})]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
         screened = screen(places, traces, tau, exclude) + states
-        first = refitted([(name, models[0]) for name, per_place in screened for models in per_place])
+        first = refitted([(name, begins[0]) for name, per_place in screened for begins in per_place])
         most = max((reference - total(f) for f in first.values()), default=0.0)
-        again = refitted([(name, model) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
-                          for models in per_place for model in models[1:]])
-        best = [(name, min((ends[name] for ends in (first, again) if name in ends), key=total)) for name in first]
-        rough = sorted(best, key=lambda item: total(item[1]))
+        again = refitted([(name, begin) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
+                          for begins in per_place for begin in begins[1:]])
+        best = {name: min((ends[name] for ends in (first, again) if name in ends), key=total) for name in first}
+        running = list(best)
+        for _ in range(LATER_LAPS if base.model.names else LAPS):
+            leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
+            pace = max(PACE * least, PACE_SHARE * leading)
+            ends = dict(pool.map(onward, ((name, best[name]) for name in running)))
+            running = [name for name in running if total(best[name]) - total(ends[name]) > pace]
+            best |= {name: found for name, found in ends.items() if total(found) < total(best[name])}
+        rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
             return sorted(map(judged, rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         ranked = sorted(map(judged, list(pool.map(finish, rough[:close])) + rough[close:]), key=lambda c: -c.worth)
-        rivals = sum(c.worth > max(ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain), 0.0) for c in ranked)
+        rivals = len(_rivals(ranked))
         if rivals > 1:
-            close = [c.fit for c in ranked[:rivals]]
-            ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, [f for f in close if f is not c.fit], traces, tau))), ranked[:rivals])
-    return sorted(ranked, key=lambda c: -c.worth)
+            lead, second = ranked[0].fit, ranked[1].fit
+            ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau))), ranked[:rivals])
+    return _simplest_first(sorted(ranked, key=lambda c: -c.worth))
+
+
+def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates that the best one does not beat clearly, itself among them."""
+    least = max(ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain), 0.0)
+    return [c for c in ranked if c.worth > least]
+
+
+def _simplest_first(ranked: list[Candidate]) -> list[Candidate]:
+    """Of rivals the one with the fewest parameters leads: which of them the worth prefers is a matter of the last dents of the search.
+
+    What has a clock of its own (a gust, a knock) leads only where no law of the servo itself explains CLOCKED of what it does: a swing
+    bends to whatever a repeated excitation leaves over.
+    """
+    if not ranked:
+        return ranked
+    if _clocked(ranked[0]):
+        lawful = [c for c in ranked if not _clocked(c) and c.gain >= CLOCKED * ranked[0].gain and c.z >= LEAST_Z]
+        ranked = sorted(ranked, key=lambda c: c not in lawful)
+    first = min(_rivals(ranked) or ranked[:1], key=lambda c: (_clocked(c), c.fit.size))
+    return [first, *(c for c in ranked if c is not first)]
+
+
+def _clocked(candidate: Candidate) -> bool:
+    return candidate.name in BY_NAME and BY_NAME[candidate.name].local
 
 
 @dataclass(frozen=True)
@@ -207,7 +338,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless."""
     current, rounds, blocks = base, [], base.misfit.size
     tau = tau_of(base.misfit)
-    while len(rounds) < MOST_ROUNDS and float(score(current.misfit, tau).sum()) > LEAST_GAIN * blocks:
+    while len(rounds) < (MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS) and float(score(current.misfit, tau).sum()) > LEAST_GAIN * blocks:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LEAST_GAIN * blocks, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
@@ -217,7 +348,31 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
         current, _ = hopped(fit(current.model, traces, tau=tau, steps=20), traces, tau, jobs)
+        if near_noise(current):
+            current = _exchanged(current, rounds[:-1], traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau)
+
+
+def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
+    """With earlier effects exchanged for their rivals of that round where these do better beside what came later."""
+    def instead(candidate):
+        name = candidate.name
+        model = without.with_effect(name, dict(candidate.fit.model.effects)[name])
+        if BY_NAME[name].local:
+            model = replace(model, local={**model.local, name: candidate.fit.model.local[name]})
+        return fit(model, traces, tau=tau, steps=12)
+
+    for ranked in rounds:
+        if ranked[0].name not in current.model.names:
+            continue
+        rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names
+                  and c.gain >= RIVAL * ranked[0].gain][:MOST_RIVALS]
+        without = current.model.without_effect(ranked[0].name)
+        with ThreadPoolExecutor(jobs) as pool:
+            best = min(pool.map(instead, rivals), key=lambda f: f.cost, default=current)
+        if best.cost < current.cost - LEAST_GAIN * current.misfit.size:
+            current = best
+    return current
 
 
 def _pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> Fit:

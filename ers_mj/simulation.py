@@ -23,7 +23,7 @@ from ers_mj.plants.reduced import Motion, ReducedModel, lumped
 PER_INERTIA = {"torque": "", "damping": " s/{y}", "stiffness": "/{y}", "drag": " s^2/{y}^2", "cubic": "/{y}^3"}
 LUMPED_UNIT = {"torque": "{y}/s^2", "damping": "1/s", "stiffness": "1/s^2", "drag": "1/{y}", "cubic": "1/({y}^2 s^2)"}
 PLAIN_UNIT = {"position": "{y}", "speed": "{y}/s", "acceleration": "{y}/s^2", "input": "{u}", "time": "s",
-              "frequency": "Hz", "ratio": "-"}
+              "frequency": "Hz", "phase": "rad", "ratio": "-", "count": "-", "per_position": "1/{y}", "per_position_squared": "1/{y}^2"}
 FORCE = {"rad": "N m", "m": "N"}
 AFTER_NOISE = ("sensor_quantisation", "sensor_dropout")  # what the converter and the wire do to a noisy signal
 
@@ -140,7 +140,7 @@ def simulate_recording(
     t, u = np.ascontiguousarray(t, float), np.ascontiguousarray(u, float)
     theta = finite(t, plant.simulate(t, u).theta)
     chosen = kernel_effects([*datasheet.effects, *effects], inertia_of(datasheet))
-    return {"t_s": t, "u_V": u, "theta_rad": _sensed(theta, chosen, noise, seed)}
+    return {"t_s": t, "u_V": u, "theta_rad": _sensed(t, theta, chosen, noise, seed)}
 
 
 def finite(t: np.ndarray, theta: np.ndarray) -> np.ndarray:
@@ -167,15 +167,15 @@ def _values(datasheet: Datasheet, inductance: bool) -> dict[str, float]:
     return values if inductance else values | {"tau_e": 0.0}
 
 
-def _sensed(theta: np.ndarray, effects: Iterable[tuple[str, np.ndarray]], noise: float, seed: int) -> np.ndarray:
-    """What the file holds of the true angle (N,): the sensor, then its noise, then the converter."""
+def _sensed(t: np.ndarray, theta: np.ndarray, effects: Iterable[tuple[str, np.ndarray]], noise: float, seed: int) -> np.ndarray:
+    """What the file holds of the true angle (N,) at times t (N,): the sensor, then its noise, then the converter."""
     y = theta
     for name, values in effects:
-        y = y if name in AFTER_NOISE else BY_NAME[name].measure(values, y)
+        y = y if name in AFTER_NOISE else BY_NAME[name].measure(values, t, y)
     if noise:
         y = y + noise * np.random.default_rng(seed).standard_normal(y.size)
     for name, values in effects:
-        y = BY_NAME[name].measure(values, y) if name in AFTER_NOISE else y
+        y = BY_NAME[name].measure(values, t, y) if name in AFTER_NOISE else y
     return y
 
 

@@ -1,12 +1,14 @@
 """What a signal shows of the instrument that took it: held spans, noise, and the step of its converter."""
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 NEIGHBOURS = 20  # samples on either side of a held span that say how the signal usually moves
 SHORTEST_HELD = 5  # samples
 FEWEST_LEVELS = 3  # distinct values below which no lattice can be told
 FEWEST_REVISITED = 0.05  # share of the distinct values that a converter shows twice or more
 COARSE = 200  # levels of travel below which even a decimal grid acts as a converter
+JUMP, CALM_CHANGES, LONGEST_EXCURSION = 8.0, 6, 50  # noise levels of a jump; changes on either side that are usual; samples
 LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
 
 
@@ -106,3 +108,34 @@ def _refined(gaps: np.ndarray, step: float) -> float:
     gaps = gaps[_on_lattice(gaps, step)]
     multiples = np.rint(gaps / step)
     return float(gaps @ multiples / (multiples @ multiples))
+
+
+# -- samples that are not the signal's -----------------------------------------------------------------------
+
+
+def excursions(y: np.ndarray, sigma: float, times: float = JUMP, usual: float = 0.98,
+               longest: int = LONGEST_EXCURSION) -> list[slice]:
+    """Spans of at most ``longest`` samples in which y (N,) jumps away from its course and back again.
+
+    A jump is a change from sample to sample that differs from the usual one around it by more than ``times`` noise levels ``sigma``, and
+    as many times what a share ``usual`` of the changes in this recording stays below: quick motion.
+    """
+    known = np.flatnonzero(np.isfinite(y))
+    change = np.diff(y[known])
+    if change.size < 2 * NEIGHBOURS:
+        return []
+    jump = change - median_filter(change, 2 * CALM_CHANGES + 1, mode="nearest")
+    least = times * max(sigma, float(np.quantile(np.abs(jump), usual)))
+    large = np.flatnonzero(np.abs(jump) > least)
+    out, end = [], -1
+    for i, k in enumerate(large):
+        if k < end:
+            continue
+        for back in large[i + 1:]:
+            if back - k > longest:
+                break
+            if abs(jump[k] + jump[back]) < 0.5 * abs(jump[k]):
+                out.append(slice(int(known[k + 1]), int(known[back]) + 1))
+                end = back + 1
+                break
+    return out

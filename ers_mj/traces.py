@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ers_mj.recording import Recording
+from ers_mj.symptoms import at_extreme, converter_step, excursions, frozen_spans
 
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
@@ -16,8 +18,20 @@ START_SAMPLES = 10
 
 
 @dataclass(frozen=True)
+class Channel:
+    """What another sensor saw, (N,) on the output's side of the gear: "current" [A], "speed" or "motor" angle; NaN where missing."""
+
+    kind: str
+    values: np.ndarray
+    sigma: float
+
+
+@dataclass(frozen=True)
 class Trace:
-    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, and the state it starts in."""
+    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the state it starts in, and the spans that its sensor lost.
+
+    ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output.
+    """
 
     name: str
     t: np.ndarray
@@ -31,8 +45,10 @@ class Trace:
     start: tuple[float, float]
     block: np.ndarray
     counts: np.ndarray
+    lost: tuple[slice, ...] = ()
+    channels: tuple[Channel, ...] = ()
 
-    @property
+    @cached_property
     def sample_time(self) -> float:
         """Median step [s]."""
         return float(np.median(np.diff(self.t)))
@@ -41,26 +57,92 @@ class Trace:
         """Samples begin..end as a trace of their own."""
         cut = slice(begin, end)
         pick = lambda a: None if a is None else a[cut]  # noqa: E731
-        return make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
+        made = make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
                           pick(self.load), self.sigma, self.quantum)
+        return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels))
+
+    def without(self, spans: Sequence[slice]) -> Trace:
+        """The trace with further spans lost."""
+        if not spans:
+            return self
+        valid = self.valid.copy()
+        for span in spans:
+            valid[span] = False
+        made = make_trace(self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum)
+        return replace(made, start=self.start, channels=self.channels, lost=(*self.lost, *spans))
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Which of its residuals (rows,) a sensor saw."""
+        return np.concatenate([self.valid, *(np.isfinite(c.values) for c in self.channels)])
+
+    @property
+    def rows(self) -> int:
+        """Residuals that the recording gives: samples times (1 + channels)."""
+        return self.t.size * (1 + len(self.channels))
 
 
 def trace_of(recording: Recording, inertia: float | None) -> Trace:
-    """A recording as a trace; its known load torque becomes an acceleration where the inertia [kg m^2] is known, else nothing."""
+    """A recording as a trace; its known load torque becomes an acceleration where the inertia [kg m^2] is known, else nothing.
+
+    Spans in which the sensor shows a spike, or hangs, are no measurement of the output.
+    """
     load = -recording.load / inertia if recording.load is not None and inertia else None
-    valid = recording.valid
-    return make_trace(recording.name, recording.t, recording.u, recording.y, valid, recording.enable, load,
-                      noise_sigma(recording.y[valid], recording.quantum), recording.quantum)
+    y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
+    stuck = [s for s in frozen_spans(y, recording.quantum) if not at_extreme(y, s)]
+    lost = (*excursions(np.where(recording.valid, y, np.nan), sigma), *stuck)
+    trace = make_trace(recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum)
+    trace = trace.without(lost)
+    return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid))
+
+
+def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
+    """The current, the speed and the motor's angle where a recording holds them and they vary.
+
+    The motor's angle is brought to the output's side of the gear by a straight line through both, so that ratio and zero are not judged.
+    """
+    found = []
+    for kind, values in (("current", recording.current), ("speed", recording.omega), ("motor", recording.theta_m)):
+        if values is None or recording.output_unit != "rad" and kind != "current":
+            continue
+        known = np.isfinite(values)
+        if known.mean() < 0.8 or np.ptp(values[known]) == 0:
+            continue
+        if kind == "speed" and not _integrates(recording, values):
+            continue
+        if kind == "motor":
+            both = known & valid
+            slope, zero = np.polyfit(recording.y[both], values[both], 1)
+            values = (values - zero) / slope
+        found.append(Channel(kind, np.ascontiguousarray(values), noise_sigma(values[known], converter_step(values[known]))))
+    return tuple(found)
+
+
+def _integrates(recording: Recording, omega: np.ndarray) -> bool:
+    """Whether a speed is that of the output at the same time: its integral over 0.1 s is the way made, within three times the noise.
+
+    What a drive reports as speed is often an older, filtered difference of the angle, which tells nothing new and that late.
+    """
+    t, n = recording.t, max(1, round(0.1 / recording.sample_time))
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
+    miss = (way[n:] - way[:-n] - recording.y[n:] + recording.y[:-n])[::n]
+    miss, known = miss[np.isfinite(miss)], np.isfinite(omega)
+    noise = math.hypot(noise_sigma(recording.y[recording.valid], recording.quantum) * math.sqrt(2.0),
+                       noise_sigma(omega[known], converter_step(omega[known])) * math.sqrt(n) * recording.sample_time)
+    return bool(miss.size) and float(np.sqrt(np.mean(miss**2))) < 3.0 * noise
 
 
 def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
     """A trace with its blocks of BLOCK seconds and its initial state."""
     block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
     counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
-    observed = np.where(valid, y, np.nan)
-    n = start_samples(t)
-    start = parabola_start(t[:n], observed[:n])
-    return Trace(name, t, u, observed, valid, enable, load, sigma, quantum, start, block, counts)
+    trace = Trace(name, t, u, np.where(valid, y, np.nan), valid, enable, load, sigma, quantum, (0.0, 0.0), block, counts)
+    return replace(trace, start=_started(trace))
+
+
+def _started(trace: Trace) -> tuple[float, float]:
+    n = start_samples(trace.t)
+    return parabola_start(trace.t[:n], trace.y[:n])
 
 
 def start_samples(t: np.ndarray) -> int:
@@ -106,10 +188,12 @@ class Blocks:
     def of(traces: Sequence[Trace]) -> Blocks:
         index, counts, base = [], [], 0
         for trace in traces:
-            index.append(trace.block + base)
-            counts.append(trace.counts)
-            base += trace.counts.size
-        return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0))
+            every = [trace.counts, *(np.bincount(trace.block[np.isfinite(c.values)], minlength=trace.counts.size) for c in trace.channels)]
+            for count in every:
+                index.append(trace.block + base)
+                counts.append(count)
+                base += count.size
+        return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0).astype(float))
 
     def misfit(self, e: np.ndarray) -> np.ndarray:
         """Mean squared residual (in sigmas) of each block."""

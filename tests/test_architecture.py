@@ -6,12 +6,14 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
-ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "simulation", "traces",
-         "replay", "model_file", "rendering", "window", "identification", "guess", "baseline", "selection", "intervals",
-         "evaluation", "evidence", "excitation", "localisation", "confirmation", "multibody", "document", "diagnosis",
-         "validation", "display", "validity", "frames", "figures", "page", "maps", "report", "validation_report", "commands", "cli"]
-SILENT = {"identification", "guess", "baseline", "selection", "intervals", "evaluation", "localisation", "confirmation", "multibody",
-          "document", "diagnosis", "validation", "validity", "effects", "plants", "replay", "model_file", "rendering", "window", "frames"}
+ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "proving", "simulation", "traces",
+         "excitation", "replay", "model_file", "rendering", "window", "identification", "guess", "baseline", "selection", "isolability",
+         "intervals", "evaluation", "evidence", "design", "advice", "localisation", "confirmation", "multibody", "document", "diagnosis",
+         "validation", "display", "validity", "frames", "figures", "page", "maps", "report", "validation_report",
+         "proof_figures", "proof_report", "commands", "cli"]
+SILENT = {"proving", "advice", "design", "excitation", "isolability", "identification", "guess", "baseline", "selection", "intervals",
+          "evaluation", "localisation", "confirmation", "multibody", "document", "diagnosis", "validation", "validity", "effects", "plants",
+          "replay", "model_file", "rendering", "window", "frames"}
 
 
 def room(path: Path) -> str:

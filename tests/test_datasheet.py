@@ -38,7 +38,7 @@ def test_table_1_is_the_papers():
 
 def test_a_subset_says_only_what_follows_from_it():
     assert set(Datasheet({"J": 2.0, "k_s": 3.0}).to_lumped()) == {"a_1"}
-    assert Datasheet({"J": 2.0, "R": 1.0, "K_t": 3.0}).to_lumped() == {"b": 1.5}
+    assert Datasheet({"J": 2.0, "R": 1.0, "K_t": 3.0}).to_lumped() == {"b": 1.5, "ampere": 1.5}
     assert Datasheet({"L": 1.0, "R": 4.0, "theta_0": -0.1}).to_lumped() == {"theta_0": -0.1, "tau_e": 0.25}
     assert "emf_share" not in Datasheet({"J": 1.0, "R": 1.0, "K_t": 1.0, "K_e": 0.0, "B": 0.0}).to_lumped()
 

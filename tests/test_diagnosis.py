@@ -104,3 +104,40 @@ def test_without_a_datasheet_everything_is_identified():
     document = diagnose(recordings(names=("multisine", "steps")), None).document
     assert document["verdict"] != "consistent"
     assert document["parameters"]["b"]["value"] == pytest.approx(TRUTH["b"], rel=0.1)
+
+
+def acting(*per_record, names=("multisine", "steps", "chirp")):
+    """Three recordings in each of which other effects act."""
+    return [recordings(effects, names=names)[k] for k, effects in enumerate(per_record)]
+
+
+def test_a_gust_has_a_phase_of_its_own_in_every_recording():
+    gusts = [[("periodic_gust", np.array([12.0, 2.3, phase]))] for phase in (0.4, 2.0, -1.3)]
+    document = diagnose(acting(*gusts), read_datasheet("table1")).document
+    first = document["missing"][0]
+    assert first["effect"] == "periodic_gust" and first["evidence"]["heldout_rmse_with_rad"] is None
+    assert first["parameters"]["f"]["value"] == pytest.approx(2.3, rel=0.01)
+    amplitude, phases = first["parameters"]["A"]["value"], np.array(first["parameters"]["phase"]["per_recording"])
+    assert np.cos(phases - [0.4, 2.0, -1.3]) * np.sign(amplitude) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_knock_in_one_recording_is_found_there():
+    knock = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0]))]
+    document = diagnose(acting([], knock, []), read_datasheet("table1")).document
+    first = document["missing"][0]
+    assert first["effect"] == "load_disturbance" and first["parameters"]["record"]["value"] == 1
+    assert first["parameters"]["t_0"]["value"] == pytest.approx(1.2, abs=0.02)
+    assert first["parameters"]["t_0"]["per_recording"][0] is None
+
+
+@pytest.mark.parametrize("lose", ["spikes", "holds"])
+def test_dropouts_are_found_in_the_data_and_left_out(lose):
+    def sensor(y):
+        y, random = y.copy(), np.random.default_rng(int(1e6 * y[-1]) % 1000)
+        for k in random.choice(np.arange(100, y.size - 100), 12, replace=False):
+            y[k:k + (1 if lose == "spikes" else 40)] = y[k] + 0.03 if lose == "spikes" else y[k - 1]
+        return y
+
+    document = diagnose(recordings(sensor=sensor), read_datasheet("table1")).document
+    assert [m["effect"] for m in document["missing"]] == ["sensor_dropout"]
+    assert document["fit"]["heldout_rmse_before_rad"] < (3 if lose == "spikes" else 10) * NOISE  # a hold at rest may pass unseen

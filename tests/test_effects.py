@@ -44,3 +44,14 @@ def test_equivalence_classes_hold_known_names_once():
     names = [n for group in EQUIVALENT for n in group]
     assert len(names) == len(set(names))
     assert set(BY_NAME) & set(names)
+
+
+CURRENT = [e for e in EFFECTS if e.subsystem in ("drive", "transmission") and e.follows_current and e.name != "cogging"]
+
+
+@pytest.mark.parametrize("effect", CURRENT, **ids)
+def test_an_open_circuit_feels_nothing_of_the_current(effect):
+    off, c = np.zeros(T.size, bool), table_1().coefficients
+    with_it, without = (ReducedModel(c, chosen).simulate(T, np.zeros(T.size), (0.5, 8.0), enable=off).theta
+                        for chosen in ([(effect.name, effect.starts(SCALES)[0])], []))
+    assert np.degrees(np.max(np.abs(with_it - without))) < 1e-6

@@ -15,6 +15,8 @@ VISIBLE = 0.2  # [deg] RMS
 SIZES = {  # where the first start of an effect is too small to be seen beside the two plants' own difference
     "inductance": [0.004], "input_delay": [0.0043], "backlash": [0.012, 0.6, 0.2, 120.0, 0.2], "stribeck": [40.0, 0.6, 1.4],
     "end_stop": [0.15, 0.35, 100.0, 0.3], "sensor_quantisation": [0.0213], "voltage_saturation": [5.0],
+    "load_disturbance": [150.0, 0.6, 0.5, 0.0], "sensor_dropout": [4.0, 0.08], "sensor_lag": [0.02],
+    "sensor_nonlinearity": [0.2, 0.1, np.inf, np.inf, np.inf],
 }
 
 
@@ -34,7 +36,7 @@ def test_law_and_twin_agree(effect, road):
     size = rms_deg(law.measured - without.measured)
     assert size > VISIBLE
     if effect.subsystem == "sensor":  # what the sensor does to one and the same angle
-        assert np.array_equal(twin.measured, effect.measure(chosen[0][1], twin.theta))
+        assert np.array_equal(twin.measured, effect.measure(chosen[0][1], T, twin.theta))
     else:
         assert rms_deg(twin.measured - law.measured) < TOLERANCE * size
 
@@ -55,3 +57,23 @@ def test_a_broken_twin_is_noticed():
     law, without = ReducedModel(EQ_5, [(drag.name, p)]).simulate(T, u), ReducedModel(EQ_5).simulate(T, u)
     twin = MechanicalPlant(EQ_5, [(drag.name, 1.1 * p)], parameters=SHEET.parameters).simulate(T, u)
     assert rms_deg(twin.theta - law.theta) > TOLERANCE * rms_deg(law.theta - without.theta)
+
+
+def test_both_plants_read_the_recordings_own_clock():
+    gust = next(e for e in EFFECTS if e.name == "periodic_gust")
+    chosen, late, u = [(gust.name, values(gust))], T + 0.37, INPUTS["multisine"](T)
+    law, early = ReducedModel(EQ_5, chosen).simulate(late, u), ReducedModel(EQ_5, chosen).simulate(T, u)
+    twin = MechanicalPlant(EQ_5, chosen).simulate(late, u)
+    assert rms_deg(law.theta - early.theta) > VISIBLE
+    assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - early.theta)
+
+
+def test_a_shaft_beside_a_play_softens_its_contact():
+    """Both at once are one play with the shaft's spring, in either plant and whichever is named first."""
+    both = [("backlash", np.array([0.012, 0.6, 0.2, 120.0, 0.2])), ("shaft_compliance", np.array([20.0, 0.2, 0.6, 0.2]))]
+    u = INPUTS["multisine"](T)
+    law, stiff = ReducedModel(EQ_5, both).simulate(T, u), ReducedModel(EQ_5, both[:1]).simulate(T, u)
+    twin = MechanicalPlant(EQ_5, both, parameters=SHEET.parameters).simulate(T, u)
+    assert rms_deg(law.theta - stiff.theta) > VISIBLE
+    assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - stiff.theta)
+    assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(T, u).theta - law.theta) < 1e-9

@@ -70,12 +70,21 @@ def _write(folder: Path, document: dict, found: object, progress: Progress) -> l
 
     progress("drawing the report", 1.0)
     page = report_page(document, found.evidence, frames_of(found.plant, found.evidence))
+    following = (document.get("next_recording") or {}).get("excitation")
     return write_results(folder, {
         "diagnosis.json": lambda path: write_text(path, as_json(document) + "\n"),
         "report.html": lambda path: write_text(path, page),
         "model.toml": lambda path: write_model(path, found.model),
         "plant.xml": lambda path: write_text(path, found.plant.xml()),
-    })
+    } | ({"next_recording.csv": lambda path: write_text(path, _input_table(following))} if following else {}))
+
+
+def _input_table(excitation: dict) -> str:
+    """The input to record next, as `ers simulate --input` takes it."""
+    from ers_mj.excitation import signal
+
+    column = {"%": "u_duty_pct"}.get(excitation["input_unit"], f"u_{excitation['input_unit']}")
+    return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation)))]) + "\n"
 
 
 # -- what cannot be diagnosed together --------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ers_mj.effects.base import Parameter, Transmission
+from ers_mj.effects.base import Parameter, Transmission, coupled
 
 
 class Backlash(Transmission):
@@ -31,6 +31,4 @@ class Backlash(Transmission):
                 for part in (0.003, 0.01, 0.03, 0.1)]
 
     def coefficients(self, p, c):
-        contact = 2 * np.pi * p[3]
-        return c._replace(two_body=1.0, gap=p[0], rho=p[1], beta=p[1], phi=p[2], k_twist=contact**2,
-                          d_twist=2 * p[4] * contact)
+        return coupled(c, f=p[3], zeta=p[4], rho=p[1], phi=p[2], gap=p[0])

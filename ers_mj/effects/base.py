@@ -26,7 +26,8 @@ class Coefficients(NamedTuple):
 
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
-    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``.
+    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``. With rho = 0 it
+    is the foot of a bristle instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder.
     """
 
     a_1: float = 0.0
@@ -53,6 +54,16 @@ class Coefficients(NamedTuple):
     d_twist: float = 0.0
     gap: float = 0.0
 
+    @property
+    def has_motor_side(self) -> bool:
+        """Whether motor and rudder are two bodies."""
+        return self.two_body > 0 and self.rho > 0
+
+    @property
+    def has_bristle(self) -> bool:
+        """Whether friction bends a bristle first."""
+        return self.two_body > 0 and self.rho <= 0
+
 
 @dataclass(frozen=True)
 class Scales:
@@ -60,7 +71,8 @@ class Scales:
 
     ``position`` half the travel, ``low``/``high`` its ends, ``speed`` a high percentile of |w|, ``acceleration`` the
     friction level (or the drive's, where there is none), ``input`` the peak |u|, ``sample_time`` [s], ``noise`` and
-    ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad.
+    ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
+    recording [s], ``recordings`` their number, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
     """
 
     position: float
@@ -74,6 +86,9 @@ class Scales:
     quantum: float
     is_angle: bool
     tau_e_datasheet: float | None = None
+    duration: float = 10.0
+    recordings: int = 1
+    hot: tuple[tuple[int, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -81,7 +96,9 @@ class Parameter:
     """One number of an effect.
 
     ``kind`` names its dimension: torque, damping, stiffness, drag, cubic (all carried per inertia), position, speed,
-    input, time, ratio. ``positive`` parameters are fitted in their logarithm.
+    input, time, frequency, phase, ratio, count, per_position, per_position_squared. ``positive`` parameters are fitted in their
+    logarithm; those not ``fitted`` keep the value they start with; those ``per_record`` are another number in every recording; those
+    ``on_travel`` are places that the travel reaches, or nearly.
     """
 
     name: str
@@ -91,6 +108,9 @@ class Parameter:
     lower: float = -np.inf
     upper: float = np.inf
     absent: float = 0.0
+    fitted: bool = True
+    per_record: bool = False
+    on_travel: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,13 +118,15 @@ class Twin:
     """Where an effect writes its MJCF realisation.
 
     ``spec`` is the model so far; ``inertia`` the J [kg m^2, or 1 where lumped] that turns an acceleration into a torque;
-    ``is_angle`` whether the output turns (hinges) or slides. Named alike in every model: body ``rudder``, tendon
-    ``rudder_angle`` (the absolute output), actuators ``motor`` (ctrl in input units) and ``load``.
+    ``is_angle`` whether the output turns (hinges) or slides; ``ampere`` the drive acceleration of one unit of the motor's
+    force. Named alike in every model: body ``rudder``, tendon ``rudder_angle`` (the absolute output), actuators ``motor``
+    (ctrl in input units) and ``load``.
     """
 
     spec: mujoco.MjSpec
     inertia: float
     is_angle: bool
+    ampere: float
 
 
 @dataclass(frozen=True)
@@ -123,11 +145,23 @@ class Effect:
     mjcf: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
+    wave: ClassVar[tuple[int, int] | None] = None  # amplitude and phase: the screening finds both from a start's two quarter periods
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
+    dear: ClassVar[bool] = False  # a simulation takes many times as long as others: refitted only where it promises most
     sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
-    follows_current: ClassVar[bool] = False  # its law changes as fast as the current: half the segment length
+    follows_current: ClassVar[bool] = False  # its law changes as fast as the current, or within a small angle: half the segment length
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
+
+    @property
+    def local(self) -> bool:
+        """Whether some of it is another number in every recording, so that no other recording can tell it."""
+        return any(p.per_record for p in self.parameters)
+
+    @property
+    def local_columns(self) -> list[int]:
+        """Which of its parameters are ``per_record``."""
+        return [k for k, p in enumerate(self.parameters) if p.per_record]
 
     @property
     def signed(self) -> bool:
@@ -154,9 +188,13 @@ class Effect:
         """What the motor's terminals see (N,) of the command u (N,)."""
         return u
 
-    def measure(self, p: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """What the sensor reads (N,) of the true output y (N,)."""
+    def measure(self, p: np.ndarray, t: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """What the sensor reads (N,) at times t (N,) of the true output y (N,)."""
         return y
+
+    def winding(self, p: np.ndarray, c: Coefficients, t: np.ndarray, motion: np.ndarray, j: np.ndarray) -> np.ndarray:
+        """n K_t i / J (N,) of the winding's current where the law takes it from the drive acceleration j (N,) of a motion (N, 4)."""
+        return j
 
     def edit_spec(self, p: np.ndarray, c: Coefficients, twin: Twin) -> bool:
         """Write the effect's elements into the MJCF; False where the stepping has to apply its law instead.
@@ -198,6 +236,18 @@ class Sensor(Effect):
     """Between the rudder and the number in the file."""
 
     subsystem = "sensor"
+
+
+def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap: float = 0.0) -> Coefficients:
+    """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta, slack within +-gap.
+
+    Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones named.
+    A bristle gives way to them: friction is then rigid.
+    """
+    k, d = (2 * np.pi * f) ** 2, 4 * np.pi * zeta * f
+    if c.has_motor_side and c.k_twist > 0:
+        k, d = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist)
+    return c._replace(two_body=1.0, gap=c.gap + gap, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d)
 
 
 def law(function: Callable) -> staticmethod:

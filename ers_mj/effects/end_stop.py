@@ -12,8 +12,8 @@ class EndStop(Load):
     sentence = "the travel ends at a stop"
     mjcf = "the range of the absolute angle, its limit a spring-damper (negative solref) that does not pull"
     parameters = (
-        Parameter("lower", "position", "lower stop", positive=False, absent=-np.inf),
-        Parameter("upper", "position", "upper stop", positive=False, absent=np.inf),
+        Parameter("lower", "position", "lower stop", positive=False, absent=-np.inf, on_travel=True),
+        Parameter("upper", "position", "upper stop", positive=False, absent=np.inf, on_travel=True),
         Parameter("f_stop", "frequency", "natural frequency of the contact", lower=10.0, upper=400.0, absent=100.0),
         Parameter("zeta", "ratio", "damping ratio of the contact", lower=0.02, upper=2.0, absent=0.3),
     )

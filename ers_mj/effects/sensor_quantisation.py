@@ -16,5 +16,5 @@ class SensorQuantisation(Sensor):
     def starts(self, scales):
         return []
 
-    def measure(self, p, y):
+    def measure(self, p, t, y):
         return np.round(y / p[0]) * p[0]

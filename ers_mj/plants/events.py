@@ -3,7 +3,14 @@
 State x = (theta, w, j, theta_m, w_m): rudder angle and speed, drive acceleration j (the motor torque over J; current in
 disguise), and the motor's side where a second body exists. Mode m = (s, side, stop, s_m, twist): the values that the set-valued
 terms take until the next event: direction of slip (0 = stuck), side of theta_0 (0 = held in the corner), stop touched,
-motor slip, contact of the play. A flow ends where the mode's inequality fails; the instant is found on the flow itself.
+motor slip, contact of the play (of two bodies without play: 1 throughout, a spring that pushes and pulls). A flow
+ends where the mode's inequality fails; the instant is found on the flow itself.
+
+A second body without inertia (rho = 0) is the foot of LuGre's bristle z = theta - theta_m: z' = w - |w| k z / F, and the friction is
+k z + d z'. It has no speed of its own (w_m stays 0 in x), and the drive acts on the rudder, whose slip s is then 1 wherever the
+preload's corner does not hold it. Its slip s_m is 0 while the bristle bends, which is stepped as a law is, and the direction of motion
+once the bristle is bent to the full: from there to the next reversal friction is Coulomb's and the flow linear. Where a law moves
+the level F, the bristle lags behind it and s_m stays 0.
 
 Within a mode the plant itself is linear: a precomputed map over a whole segment of a sample, a Taylor series to machine
 precision over a part of one. What the laws of effects add is a force; over a segment it enters the same maps as a parabola in time
@@ -15,7 +22,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from ers_mj.effects import EFFECTS
 from ers_mj.effects.base import Coefficients
@@ -30,6 +37,10 @@ CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h e
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
 ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
 EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows
+BRISTLE_CORNER = 0.03  # the same for a rudder that no friction slows: share of c_1 h below which it bounces out of sight
+STILL = 5e-5  # share of a bristle's friction within which its rudder rests
+LEAST_LEVEL = 0.2  # of the mean friction, which laws cannot lower a bristle's beyond
+FULL = 1.0 - 1e-4  # share of its friction's level at which a bristle counts as bent to the full
 CALM = 0.2  # share of a speed, or of a twist's distance to the ends of the play, that a leap over a whole sample must leave
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
@@ -39,44 +50,73 @@ GAUSS_X, GAUSS_W = (0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1), 0.5 * np
 
 
 def _chain_torque(laws):
-    """One compiled function that adds up the torques of the effects that are on."""
+    """One compiled function that evaluates the torque of the effect in one row."""
     if not laws:
-        @njit(nogil=True)
-        def total(on, p, theta, w, j, t):
+        @njit(nogil=True, inline="always")
+        def pick(k, p, theta, w, j, t):
             return 0.0
-        return total
+        return pick
     (row, law), rest = laws[0], _chain_torque(laws[1:])
 
-    @njit(nogil=True)
-    def total(on, p, theta, w, j, t):
-        a = rest(on, p, theta, w, j, t)
-        if on[row]:
-            a += law(p[row], theta, w, j, t)
+    @njit(nogil=True, inline="always")
+    def pick(k, p, theta, w, j, t):
+        if k == row:
+            a = law(p, theta, w, j, t)
+        else:
+            a = rest(k, p, theta, w, j, t)
         return a
-    return total
+    return pick
 
 
 def _chain_friction(laws):
-    """One compiled function that passes the friction level through the effects that are on."""
+    """One compiled function that passes the friction level through the effect in one row."""
     if not laws:
-        @njit(nogil=True)
-        def total(on, p, level, theta, w, j, direction):
+        @njit(nogil=True, inline="always")
+        def pick(k, p, level, theta, w, j, direction):
             return level
-        return total
+        return pick
     (row, law), rest = laws[0], _chain_friction(laws[1:])
 
-    @njit(nogil=True)
-    def total(on, p, level, theta, w, j, direction):
-        level = rest(on, p, level, theta, w, j, direction)
-        if on[row]:
-            level = law(p[row], level, theta, w, j, direction)
-        return level
-    return total
+    @njit(nogil=True, inline="always")
+    def pick(k, p, level, theta, w, j, direction):
+        if k == row:
+            a = law(p, level, theta, w, j, direction)
+        else:
+            a = rest(k, p, level, theta, w, j, direction)
+        return a
+    return pick
 
 
-_torque = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
-_friction = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
-HAS_LAW = np.array([bool(e.torque or e.friction) for e in EFFECTS])
+_torque_of = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
+_friction_of = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
+
+
+@njit(nogil=True)
+def _torque(on, p, theta, w, j, t):
+    """Sum of the torques of the effects that are on."""
+    a = 0.0
+    for i in range(on[0, 0]):
+        k = on[0, i + 1]
+        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3]), theta, w, j, t)
+    return a
+
+
+@njit(nogil=True)
+def _friction(on, p, level, theta, w, j, direction):
+    """The friction level after every effect that is on."""
+    for i in range(on[1, 0]):
+        k = on[1, i + 1]
+        level = _friction_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3]), level, theta, w, j, direction)
+    return level
+
+
+def rows_of(names):
+    """Effects as the laws are called: (2, 1 + effects) their number and rows, of torques and of frictions."""
+    on = np.zeros((2, 1 + len(EFFECTS)), np.int64)
+    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS])):
+        rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and laws[row]]
+        on[kind, 0], on[kind, 1:1 + len(rows)] = len(rows), rows
+    return on
 
 
 @njit(nogil=True, inline="always")
@@ -96,13 +136,54 @@ def _twist_force(c, twist, theta, w, theta_m, w_m):
     return c[K_TWIST] * (theta_m - theta - twist * c[GAP]) + c[D_TWIST] * (w_m - w)
 
 
+@njit(nogil=True, inline="always")
+def _has_bristle(c):
+    """Whether the second body is the foot of a bristle, which has no inertia."""
+    return c[TWO] > 0 and c[RHO] <= 0
+
+
+@njit(nogil=True, inline="always")
+def _drive_speed(c, x):
+    """Speed of the body that the drive acts on, which makes the back-EMF."""
+    return x[4] if c[TWO] > 0 and c[RHO] > 0 else x[1]
+
+
+@njit(nogil=True)
+def _level(c, on, p, lawful, x, direction):
+    """Level of friction on a bristle in one direction, per total inertia."""
+    level = c[C_PLUS] if direction > 0 else c[C_MINUS]
+    if lawful:
+        level = _friction(on, p, level, x[0], x[1], x[2], direction)
+    return max(level, LEAST_LEVEL * 0.5 * (c[C_PLUS] + c[C_MINUS]))
+
+
+@njit(nogil=True)
+def _bristle(c, on, p, lawful, x, s_m):
+    """(force of the bristle on the rudder, per total inertia; the speed of its foot)."""
+    if s_m != 0:
+        return -s_m * _level(c, on, p, lawful, x, float(s_m)), x[1]
+    pull, speed = c[K_TWIST] * (x[0] - x[3]), 0.0
+    if x[1] != 0.0:
+        speed = abs(x[1]) * pull / _level(c, on, p, lawful, x, 1.0 if x[1] > 0 else -1.0)
+    return -pull - c[D_TWIST] * (x[1] - speed), speed
+
+
+@njit(nogil=True, inline="always")
+def _viscous(c, s_m, w):
+    """Mechanical damping of a rudder on a bristle."""
+    return c[A_PLUS] if s_m > 0 or (s_m == 0 and w > 0) else c[A_MINUS]
+
+
 @njit(nogil=True)
 def _held(c, on, p, lawful, t, x, m):
     """(net acceleration without friction on the rudder at rest, its friction up, down), per total inertia."""
     theta, w, j, theta_m, w_m = x
     a = c[BIAS] + c[A_1] * (c[THETA_0] - theta) - c[C_1] * m[1] + _stop_force(c, m[2], theta, 0.0)
     share = 1.0
-    if c[TWO] > 0:
+    if _has_bristle(c):
+        a += j + _bristle(c, on, p, lawful, (theta, 0.0, j, theta_m, w_m), m[3])[0]
+        share = 0.0
+    elif c[TWO] > 0:
         a += _twist_force(c, m[4], theta, 0.0, theta_m, w_m)
         share = 1.0 - c[PHI]
     else:
@@ -135,7 +216,8 @@ def _held_motor(c, x, m):
 def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
     """d/dt of (theta, w, j, theta_m, w_m) within a mode."""
     theta, w, j, theta_m, w_m = x
-    two = c[TWO] > 0
+    bristle = _has_bristle(c)
+    two = c[TWO] > 0 and not bristle
     speed = w_m if two else w
     if tau > 0:
         dj = (drive - a_emf * speed - j) / tau
@@ -146,6 +228,8 @@ def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
     push = 0.0
     if two:
         push = _twist_force(c, m[4], theta, w, theta_m, w_m)
+    elif bristle:
+        push, w_m = _bristle(c, on, p, lawful, (theta, w, j, theta_m, w_m), m[3])
     if m[0] != 0:
         level = c[C_PLUS] if m[0] > 0 else c[C_MINUS]
         a_mech = c[A_PLUS] if m[0] > 0 else c[A_MINUS]
@@ -156,6 +240,8 @@ def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
         if two:
             force += push - (1.0 - c[BETA]) * a_mech * w - (1.0 - c[PHI]) * level * m[0]
             dw = force / (1.0 - c[RHO])
+        elif bristle:
+            dw = force + j + push - _viscous(c, m[3], w) * w
         else:
             dw = force + j - a_mech * w - level * m[0]
     dw_m = 0.0
@@ -182,7 +268,7 @@ def _runge_kutta(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
          k1[3] + 2 * (k2[3] + k3[3]) + k4[3], k1[4] + 2 * (k2[4] + k3[4]) + k4[4])
     x = _plus(x, dt / 6.0, d)
     if tau <= 0:
-        return x[0], x[1], drive - a_emf * (x[4] if c[TWO] > 0 else x[1]), x[3], x[4]
+        return x[0], x[1], drive - a_emf * _drive_speed(c, x), x[3], x[4]
     return x
 
 
@@ -193,22 +279,27 @@ def _linear(c, x, m, drive, tau, a_emf, dt, scale):
     ``scale`` 1 includes the constant forces, 0 leaves them and the drive out (the homogeneous flow).
     """
     theta, w, j, theta_m, w_m = x
-    two = c[TWO] > 0
-    load_free, motor_free = m[0] != 0, two and m[3] != 0
+    bristle = _has_bristle(c)
+    two = c[TWO] > 0 and not bristle
+    load_free, motor_free = m[0] != 0, c[TWO] > 0 and m[3] != 0
     a1 = a2 = force = kt = dt_ = force_m = a2_m = 0.0
     rho, rest = c[RHO], 1.0 - c[RHO]
-    if two and m[4] != 0:
+    if c[TWO] > 0 and m[4] != 0:
         kt, dt_ = c[K_TWIST], c[D_TWIST]
     if load_free:
         a1, a2 = c[A_1], c[A_PLUS] if m[0] > 0 else c[A_MINUS]
         level = c[C_PLUS] if m[0] > 0 else c[C_MINUS]
         if two:
             a2, level = a2 * (1.0 - c[BETA]), level * (1.0 - c[PHI])
+        elif bristle:
+            a2, level = _viscous(c, m[3], 0.0), 0.0
         force = c[BIAS] + c[A_1] * c[THETA_0] - c[C_1] * m[1] - level * m[0] - kt * m[4] * c[GAP]
         if m[2] != 0:
             a1, a2 = a1 + c[K_STOP], a2 + c[D_STOP]
             force += c[K_STOP] * (c[UPPER] if m[2] > 0 else c[LOWER])
-    if motor_free:
+        if bristle:
+            force -= (c[C_PLUS] if m[3] > 0 else c[C_MINUS]) * m[3]
+    if motor_free and not bristle:
         a2_m = c[BETA] * 0.5 * (c[A_PLUS] + c[A_MINUS])
         force_m = kt * m[4] * c[GAP] - _motor_friction(c) * m[3]
     rate = abs(a2) + math.sqrt(abs(a1)) + (1.0 / tau + math.sqrt(abs(a_emf) / tau) if tau > 0 else a_emf)
@@ -236,7 +327,9 @@ def _linear(c, x, m, drive, tau, a_emf, dt, scale):
                     e_w = q * (e_w + kt * (v_tm - v_t) + dt_ * (v_wm - v_w)) / rest
                 else:
                     e_w = q * (e_w + pull)
-            if motor_free:
+            if bristle:
+                e_tm = e_t
+            elif motor_free:
                 e_tm = q * v_wm
                 e_wm = q * (first * force_m + pull - a2_m * v_wm - kt * (v_tm - v_t) - dt_ * (v_wm - v_w)) / rho
             v_t, v_w, v_j, v_tm, v_wm = e_t, e_w, e_j, e_tm, e_wm
@@ -260,12 +353,25 @@ def _touch(depth, rate, stiffness, damping):
     return min(depth, _push(depth, rate, stiffness, damping))
 
 
+@njit(nogil=True)
+def _bristle_violation(e, c, on, p, lawful, x, m):
+    """Event function of the bristle: 4, a reversal, ends its slip; 6, bent to the full, begins it."""
+    if e == 5 or (e == 4) != (m[3] != 0):
+        return -1.0
+    if e == 4:
+        return -m[3] * x[1]
+    pull = c[K_TWIST] * (x[0] - x[3])
+    if pull * x[1] <= 0.0 or (lawful and on[1, 0] > 0):
+        return -1.0
+    return abs(pull) - FULL * _level(c, on, p, lawful, x, 1.0 if x[1] > 0 else -1.0)
+
+
 @njit(nogil=True, inline="always")
 def _violation(e, c, on, p, lawful, t, x, m):
     """Event function e: positive where the mode's inequality fails."""
     theta, w, j, theta_m, w_m = x
     if e == 0:
-        return -m[0] * w if m[0] != 0 else -1.0
+        return -m[0] * w if m[0] != 0 and not _has_bristle(c) else -1.0
     if e == 1:
         return -m[1] * (theta - c[THETA_0]) if m[0] != 0 else -1.0
     if e == 2:
@@ -279,9 +385,13 @@ def _violation(e, c, on, p, lawful, t, x, m):
         return max(a - up, -a - down)
     if c[TWO] <= 0:
         return -1.0
+    if c[RHO] <= 0:
+        return _bristle_violation(e, c, on, p, lawful, x, m)
     if e == 4:
         return -m[3] * w_m if m[3] != 0 and _motor_friction(c) > 0 else -1.0
     if e == 5:
+        if c[GAP] <= 0:
+            return -1.0
         side = m[4] if m[4] != 0 else (1 if theta_m > theta else -1)
         depth, rate = side * (theta_m - theta) - c[GAP], side * (w_m - w)
         if m[4] == 0:
@@ -315,6 +425,8 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
         s = _direction(a, up, down) if e == 0 else (1 if a - up > -a - down else -1)
         if side == 0 and c[C_1] > 0 and s != 0:
             side = s
+        if _has_bristle(c):
+            s = 1
     elif e == 1:
         theta = c[THETA_0]
         x = (theta, w, j, theta_m, w_m)
@@ -331,6 +443,10 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
                 stop = -1
         else:
             stop = 0
+    elif (e == 4 or e == 6) and _has_bristle(c):
+        if e == 4:
+            x = (theta, w, j, theta - s_m * _level(c, on, p, lawful, x, float(s_m)) / c[K_TWIST], w_m)
+        s_m = 0 if e == 4 else (1 if w > 0 else -1)
     elif e == 4 or e == 6:
         x = (theta, w, j, theta_m, 0.0)
         a, level = _held_motor(c, x, m)
@@ -343,14 +459,17 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
 
 
 @njit(nogil=True)
-def _rate(c, m, tau, a_emf):
+def _rate(c, m, w, tau, a_emf):
     """An upper bound [1/s] of the fastest rate in a mode."""
     rate = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
     if tau > 0:
         rate = max(rate, 1.0 / tau) + math.sqrt(a_emf / tau)
     if m[2] != 0:
         rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
-    if c[TWO] > 0:
+    if _has_bristle(c):
+        if m[3] == 0:
+            rate += math.sqrt(c[K_TWIST]) + c[D_TWIST] + 2.0 * c[K_TWIST] * abs(w) / (c[C_PLUS] + c[C_MINUS])
+    elif c[TWO] > 0:
         rate = rate / min(c[RHO], 1.0 - c[RHO])
         if m[4] != 0:
             share = c[RHO] * (1.0 - c[RHO])
@@ -361,9 +480,10 @@ def _rate(c, m, tau, a_emf):
 @njit(nogil=True)
 def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     """The state dt later within the mode."""
-    if not lawful or (m[0] == 0 and c[TWO] <= 0):
+    bends = _has_bristle(c) and m[3] == 0
+    if not bends and (not lawful or (m[0] == 0 and c[TWO] <= 0)):
         return _linear(c, x, m, drive, tau, a_emf, dt, 1.0)
-    n = int(_rate(c, m, tau, a_emf) * dt / RATE_STEP) + 1
+    n = int(_rate(c, m, x[1], tau, a_emf) * dt / RATE_STEP) + 1
     for k in range(n):
         x = _runge_kutta(c, on, p, lawful, t + k * dt / n, x, m, drive, tau, a_emf, dt / n)
     return x
@@ -380,7 +500,7 @@ def _locate(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, g1):
     z = x
     while g_lo >= 0.0:
         lo = 0.5 * hi if lo == 0.0 else 0.5 * lo
-        if e not in (0, 4) or lo < dt / 200:
+        if (e not in (0, 4) and not (_has_bristle(c) and e in (1, 6))) or lo < dt / 200:
             return 0.0, x
         z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, lo)
         g_lo = _violation(e, c, on, p, lawful, t + lo, z, m)
@@ -414,7 +534,7 @@ def _bounded(x):
 def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
     """Integrate over dt under a constant drive, through every event on the way. Returns (x, m, number of events)."""
     if tau <= 0:
-        x = (x[0], x[1], drive - a_emf * (x[4] if c[TWO] > 0 else x[1]), x[3], x[4])
+        x = (x[0], x[1], drive - a_emf * _drive_speed(c, x), x[3], x[4])
         if m[0] == 0 and _violation(3, c, on, p, lawful, t, x, m) > 0:
             x, m = _switch(3, c, on, p, lawful, t, x, m, corner)
     left, events = dt, 0
@@ -463,9 +583,13 @@ def _start_mode(c, on, p, lawful, t, x):
         side = 1 if w > 0 else -1
     stop = 1 if theta > c[UPPER] else (-1 if theta < c[LOWER] else 0)
     s = 1 if w > 0 else (-1 if w < 0 else 0)
+    if _has_bristle(c):
+        return 0 if c[C_1] > 0 and side == 0 else 1, side, stop, 0, 1
     s_m = 1 if x[4] > 0 or (c[TWO] > 0 and _motor_friction(c) <= 0) else (-1 if x[4] < 0 else 0)
     twist = 0
-    if c[TWO] > 0 and abs(x[3] - theta) > c[GAP]:
+    if c[TWO] > 0 and c[GAP] <= 0:
+        twist = 1
+    elif c[TWO] > 0 and abs(x[3] - theta) > c[GAP]:
         twist = 1 if x[3] > theta else -1
     return s, side, stop, s_m, twist
 
@@ -527,6 +651,8 @@ def _maps(c, tau, a_emf, h):
         for s in range(-1, 2):
             for s_m in range(-1, 2):
                 for twist in range(-1, 2):
+                    if _has_bristle(c) and (s < 0 or s_m == 0 or twist != 1):
+                        continue
                     if c[TWO] > 0 or (s_m == 0 and twist == 0 and s != 0):
                         _fill_map(e[half, s + 1, s_m + 1, twist + 1], c, (s, 0, 0, s_m, twist), tau, a_emf,
                                   h / (1 + half))
@@ -561,21 +687,49 @@ def _extra(c, on, p, t, x, s):
 
 
 @njit(nogil=True)
-def _segment(e, c, on, p, lawful, t, x, m, drive, load, h):
-    """The state a whole segment later if no event falls into it."""
+def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
+    """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they add now (NaN: unknown)."""
     two = c[TWO] > 0
+    if _has_bristle(c) and m[3] == 0:
+        bias = c[BIAS]
+        c[BIAS] = bias + load
+        z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, h)
+        c[BIAS] = bias
+        return z, np.nan
     whole, half = e[0, m[0] + 1, m[3] + 1, m[4] + 1], e[1, m[0] + 1, m[3] + 1, m[4] + 1]
     if not lawful or m[0] == 0:
-        return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0)
-    g0 = load + _extra(c, on, p, t, x, m[0])
+        return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0), np.nan
+    g0 = load + (extra if extra == extra else _extra(c, on, p, t, x, m[0]))
     ga = load + _extra(c, on, p, t + 0.5 * h, _mapped(half, two, x, drive, m[1], g0, 0.0, 0.0), m[0])
-    gb = load + _extra(c, on, p, t + h, _mapped(whole, two, x, drive, m[1], g0, 2.0 * (ga - g0), 0.0), m[0])
-    return _mapped(whole, two, x, drive, m[1], g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0))
+    end = _extra(c, on, p, t + h, _mapped(whole, two, x, drive, m[1], g0, 2.0 * (ga - g0), 0.0), m[0])
+    gb = load + end
+    return _mapped(whole, two, x, drive, m[1], g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0)), end
+
+
+@njit(nogil=True)
+def _grazes(c, x, z, m, h):
+    """True where a rudder on a bristle may have crossed theta_0 and come back between x and z."""
+    inwards, outwards = -m[1] * x[1], m[1] * z[1]
+    if c[C_1] <= 0 or m[0] == 0 or inwards <= 0 or outwards <= 0:
+        return False
+    return m[1] * (x[0] - c[THETA_0]) < inwards * h * inwards / (inwards + outwards)
+
+
+@njit(nogil=True)
+def _still(c, on, p, lawful, t, x, m, drive, tau, a_emf):
+    """Whether a rudder on a bent bristle rests: in the corner, or within STILL of the bristle's whole bend from where it would."""
+    if m[0] == 0:
+        return x[1] == 0.0 and _violation(3, c, on, p, lawful, t, x, m) <= 0
+    small = STILL * (c[C_PLUS] + c[C_MINUS])
+    return (abs(x[1]) * math.sqrt(c[K_TWIST]) < small
+            and abs(_derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1]) < small)
 
 
 @njit(nogil=True)
 def _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
     """True where a slipping body may have stopped and gone on within the step from x to z: it brakes first, speeds up last."""
+    if _has_bristle(c):
+        return _grazes(c, x, z, m, h)
     if m[0] == 0:
         return False
     d0 = _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1] * m[0]
@@ -594,7 +748,7 @@ def _cuts(c, h0, tau, a_emf, lawful, refine):
         mechanical = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
         step = min(step, LAW_STEP / mechanical)
     if c[TWO] > 0:
-        step = min(step, CONTACT_STEP / math.sqrt(c[K_TWIST] / (c[RHO] * (1.0 - c[RHO]))))
+        step = min(step, CONTACT_STEP / math.sqrt(c[K_TWIST] / (c[RHO] * (1.0 - c[RHO]) if c[RHO] > 0 else 1.0)))
     step /= refine
     skip = int(c[DELAY] / h0 + 1e-9)
     late = c[DELAY] - skip * h0
@@ -615,7 +769,7 @@ def _clean(c, on, p, lawful, t, x, z, m, tau, load, h):
     """Whether the state z, h after x, lies within the mode of two bodies."""
     bias = c[BIAS]
     c[BIAS] = bias + load
-    clean = True
+    clean = not (_has_bristle(c) and _grazes(c, x, z, m, h))
     for event in range(7):
         clean = clean and _violation(event, c, on, p, lawful, t + h, z, m) <= 0
     if tau <= 0:
@@ -627,7 +781,7 @@ def _clean(c, on, p, lawful, t, x, z, m, tau, load, h):
 @njit(nogil=True)
 def _calm(c, x, h):
     """Whether the twist of two bodies is further from the ends of the play than it moves within h."""
-    return abs(x[4] - x[1]) * h <= CALM * abs(abs(x[3] - x[0]) - c[GAP])
+    return c[GAP] <= 0 or abs(x[4] - x[1]) * h <= CALM * abs(abs(x[3] - x[0]) - c[GAP])
 
 
 @njit(nogil=True)
@@ -636,23 +790,48 @@ def _steady(x, z):
     return abs(z[1]) >= CALM * abs(x[1]) and abs(z[4]) >= CALM * abs(x[4])
 
 
+def _perturb(t, x, gain, every, c, on, p, out):
+    """Fill out (N,) with the first-order change of theta that the laws of ``on`` make along a motion of one body.
+
+    ``x`` (N, >= 3) are theta, w, j of the motion at the sample times. A body that rests stays at rest; its observer
+    (see simulate_kernel) forgets the change as it would any other.
+    """
+    h = t[1] - t[0]
+    maps = _maps(c, c[TAU], c[A_EMF], h)[0]
+    a = b = d = 0.0
+    for k in range(t.size):
+        out[k] = a
+        if k == t.size - 1:
+            break
+        if k % every == 0:
+            a *= 1.0 - gain
+        if x[k, 1] == 0.0 and x[k + 1, 1] == 0.0:
+            b = d = 0.0
+            continue
+        s = 1 if x[k, 1] + x[k + 1, 1] > 0.0 else -1
+        e = maps[s + 1, 1, 1]
+        force = _extra(c, on, p, t[k], (x[k, 0], x[k, 1], x[k, 2], x[k, 0], 0.0), s)
+        a, b, d = (e[0, 0] * a + e[0, 1] * b + e[0, 2] * d + e[0, 8] * force, e[1, 0] * a + e[1, 1] * b + e[1, 2] * d + e[1, 8] * force,
+                   e[2, 0] * a + e[2, 1] * b + e[2, 2] * d)
+
+
 def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
 
     ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
     hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
-    (effects,) is true where an effect with a law acts; ``refine`` divides the segments. A motion that runs away, or chatters
-    beyond EVENT_BUDGET, is NaN from there on.
+    holds the rows of the effects with a law (see rows_of), ``p`` (effects, N_PARAMETERS) their constants; ``refine`` divides the
+    segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
     """
     n = t.size
-    lawful, two = on.any(), c[TWO] > 0
+    lawful, two, bristle = on[0, 0] + on[1, 0] > 0, c[TWO] > 0, _has_bristle(c)
     h0 = t[1] - t[0]
     tau, a_emf, bias = c[TAU], c[A_EMF], c[BIAS]
     ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
     first = ends[0]
     last = ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
     late, early = _maps(c, tau, a_emf, last), _maps(c, tau, a_emf, first)
-    leaps = two and not lawful and ends.size > 1 and fresh[0] == 1
+    leaps = two and not bristle and not lawful and ends.size > 1 and fresh[0] == 1
     whole = _maps(c, tau, a_emf, h0) if leaps else early
     h_max = np.inf
     if c[UPPER] < np.inf or c[LOWER] > -np.inf:
@@ -660,14 +839,22 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     if two or lawful:
         h_max = min(h_max, last / refine)
     corner = CORNER * (c[C_1] + c[C_PLUS]) * h0
+    if bristle:
+        corner = max(corner, BRISTLE_CORNER * c[C_1] * last * refine)
     budget = EVENT_BUDGET * n + 1000
-    x = (x0[0], x0[1], x0[2], x0[0], x0[1] if two else 0.0)
+    resting = -1  # the sample that begins in a rest which was checked already
+    extra = np.nan  # what the laws add where a segment ended that holds no event
+    x = (x0[0], x0[1], x0[2], x0[0], x0[1] if two and not bristle else 0.0)
+    if bristle:  # a spring stretched by as much as a motion of this speed would have left it
+        slip = 0.5 * (c[C_PLUS] + c[C_MINUS]) / c[K_TWIST]
+        x = (x[0], x[1], x[2], x[0] - min(max(x[1] / math.sqrt(c[K_TWIST]), -slip), slip), 0.0)
     m = _start_mode(c, on, p, lawful, t[0], x)
     for k in range(n):
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[1], x[2], x[3]
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[1], x[2], x[0] if bristle else x[3]
         if k == n - 1:
             break
         if gain > 0.0 and k % every == 0 and y[k] == y[k]:
+            resting, extra = -1, np.nan
             x, m = _corrected(c, on, p, lawful, t[k], x, m, gain * (y[k] - x[0]))
         uniform = abs(t[k + 1] - t[k] - h0) < 1e-6 * h0
         stretch = 1.0 if uniform else (t[k + 1] - t[k]) / h0
@@ -675,10 +862,10 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
         if leaps and uniform and enable[k] and m[2] == 0 and _calm(c, x, h0):
             drive = c[B] * u[max(k - skip, 0)]
             if tau <= 0:
-                x = (x[0], x[1], drive - a_emf * x[4], x[3], x[4])
-            z = _segment(whole, c, on, p, lawful, t[k], x, m, drive, load[k], h0)
+                x = (x[0], x[1], drive - a_emf * _drive_speed(c, x), x[3], x[4])
+            z, _ = _segment(whole, c, on, p, lawful, t[k], x, m, drive, tau, a_emf, load[k], h0, np.nan)
             if tau <= 0:
-                z = (z[0], z[1], drive - a_emf * z[4], z[3], z[4])
+                z = (z[0], z[1], drive - a_emf * _drive_speed(c, z), z[3], z[4])
             if _calm(c, z, h0) and _steady(x, z) and _clean(c, on, p, lawful, t[k], x, z, m, tau, load[k], h0):
                 x = z
                 continue
@@ -694,16 +881,17 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                     x = (x[0], 0.0, x[2] if tau > 0 else drive, x[3], x[4])
                     z = (x[0], 0.0, j, x[3], x[4])
                     c[BIAS] = bias + load[k]
-                    held = (_violation(3, c, on, p, lawful, now + h, z, m) <= 0
-                            and _violation(3, c, on, p, lawful, now, x, m) <= 0)
+                    held = _violation(3, c, on, p, lawful, now + h, z, m) <= 0 and (
+                        (tau > 0 and resting == k) or _violation(3, c, on, p, lawful, now, x, m) <= 0)
                     c[BIAS] = bias
                     if held:
                         x = z
+                        resting = k + 1 if i == ends.size - 1 and load[k + 1] == load[k] else k
                         continue
                 elif not two:
                     if tau <= 0:
                         x = (x[0], x[1], drive - a_emf * x[1], x[3], x[4])
-                    z = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h)
+                    z, extra = _segment(e, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, extra if tau > 0 else np.nan)
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * z[1], z[3], z[4])
                     if (z[1] * m[0] > 0 and (z[0] - c[THETA_0]) * m[1] >= 0 and z[0] <= c[UPPER] and z[0] >= c[LOWER]
@@ -713,13 +901,23 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                         continue
                 else:
                     if tau <= 0:
-                        x = (x[0], x[1], drive - a_emf * x[4], x[3], x[4])
-                    z = _segment(e, c, on, p, lawful, now, x, m, drive, load[k], h)
+                        x = (x[0], x[1], drive - a_emf * _drive_speed(c, x), x[3], x[4])
+                    if bristle and m[3] == 0:
+                        j = drive + (x[2] - drive) * math.exp(-h / tau) if tau > 0 else x[2]
+                        z = (x[0], x[1], j, x[3], x[4])
+                        c[BIAS] = bias + load[k]
+                        still = _still(c, on, p, lawful, now, x, m, drive, tau, a_emf) and _still(c, on, p, lawful, now + h, z, m, drive, tau, a_emf)
+                        c[BIAS] = bias
+                        if still:
+                            x = z
+                            continue
+                    z, _ = _segment(e, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, np.nan)
                     if tau <= 0:
-                        z = (z[0], z[1], drive - a_emf * z[4], z[3], z[4])
+                        z = (z[0], z[1], drive - a_emf * _drive_speed(c, z), z[3], z[4])
                     if _clean(c, on, p, lawful, now, x, z, m, tau, load[k], h):
                         x = z
                         continue
+            extra = np.nan
             c[BIAS] = bias + load[k]
             if enable[k]:
                 x, m, events = _advance(c, on, p, lawful, now, x, m, drive, tau, a_emf, h, h_max, corner)
@@ -733,5 +931,12 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
             return
 
 
-with compiled_cache():
-    simulate_kernel = njit(nogil=True, cache=True)(_simulate)
+READ, READ_BOOL = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.bool_, 1, "C", readonly=True)
+ROWS, LAWS = types.int64[:, ::1], types.float64[:, ::1]
+VECTOR = types.float64[::1]
+
+with compiled_cache():  # one signature each: locked and other arrays alike
+    simulate_kernel = njit(types.void(READ, READ, READ_BOOL, READ, READ, types.float64, types.int64, VECTOR, ROWS, LAWS, types.int64,
+                                      VECTOR, LAWS), nogil=True, cache=True)(_simulate)
+    perturb_kernel = njit(types.void(READ, types.float64[:, ::1], types.float64, types.int64, VECTOR, ROWS, LAWS, VECTOR),
+                          nogil=True, cache=True)(_perturb)

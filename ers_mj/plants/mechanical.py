@@ -22,6 +22,7 @@ from ers_mj.plants.stepping import Law, Stepper, step_many
 from ers_mj.plants.writing import motor_gain, write_coefficients
 
 TIMESTEP = 5e-5  # [s] RMS error on Table 1 at most 0.01 deg; twice the step, twice the error
+BRISTLE_STEPS = 4  # steps for one where friction bends a bristle: MuJoCo steps its force explicitly
 MAX_DELAY_SAMPLES = 4096  # history of a delayed actuator in plant.xml
 
 
@@ -109,7 +110,7 @@ class MechanicalPlant:
         spec, delay = skeleton.spec, self._lowered.delay
         if delay > 0:
             motor = spec.actuator("motor")
-            motor.delay, motor.nsample = delay, min(int(np.ceil(delay / self.timestep)) + 1, MAX_DELAY_SAMPLES)
+            motor.delay, motor.nsample = delay, min(int(np.ceil(delay / self._step)) + 1, MAX_DELAY_SAMPLES)
         spec.compile()
         stepper = self._stepper()
         stepper.reset(self._start(None))
@@ -150,12 +151,16 @@ class MechanicalPlant:
             c = BY_NAME[name].coefficients(values, c)
         return c
 
+    @property
+    def _step(self) -> float:
+        return self.timestep / BRISTLE_STEPS if self._lowered.has_bristle else self.timestep
+
     def _build(self) -> tuple[Skeleton, tuple[Law, ...]]:
         c = self._lowered
         skeleton = (lumped_skeleton(c, self.is_angle) if self.parameters is None
                     else rudder_skeleton(c, self.parameters, self.linkage))
-        write_coefficients(skeleton, c, self.timestep)
-        twin = Twin(skeleton.spec, skeleton.inertia, skeleton.is_angle)
+        write_coefficients(skeleton, c, self._step)
+        twin = Twin(skeleton.spec, skeleton.inertia, skeleton.is_angle, skeleton.ratio * skeleton.K_t / skeleton.inertia)
         laws = []
         for name, values in self.effects:
             effect, constants = BY_NAME[name], BY_NAME[name].constants(values, c)
@@ -163,13 +168,15 @@ class MechanicalPlant:
                 laws.append(Law(name, constants, effect.torque, effect.friction))
         if c.a_mech_plus != c.a_mech_minus:
             laws.append(_viscous_asymmetry(c))
+        if c.has_bristle and c.c_2_plus != c.c_2_minus:
+            laws.append(Law("asymmetric friction of a bristle", np.zeros(0), None, lambda p, level, theta, w, j, direction: level))
         return skeleton, tuple(laws)
 
     # -- running --
 
     def _stepper(self) -> Stepper:
         c, J = self._lowered, self._skeleton.inertia
-        return Stepper(self.model, c, self._laws, self.timestep, inertia=J, ratio=self._skeleton.ratio,
+        return Stepper(self.model, c, self._laws, self._step, inertia=J, ratio=self._skeleton.ratio,
                        motor_joint=self._skeleton.motor_joint, activation=self._activation())
 
     def _activation(self) -> float:
@@ -178,26 +185,28 @@ class MechanicalPlant:
         return float(np.copysign(motor_gain(s, self._lowered) * s.ratio * s.K_t / s.inertia, self._lowered.b))
 
     def _start(self, start) -> dict[str, tuple[float, float]]:
-        """{joint: (position, velocity)} and, under "drive", (acceleration, 0) for (theta, omega[, drive])."""
+        """{joint: (position, velocity)} and, under "drive" and "bristle", (acceleration or deflection, 0) for (theta, omega[, drive])."""
         c = self._lowered
         theta, omega, drive = (*start, 0.0)[:3] if start is not None else (c.theta_0, 0.0, 0.0)
         joints = {name: (q, dq * omega) for name, (q, dq) in self._skeleton.pose(theta).items()}
         joints["lever_up"] = (max(theta, c.theta_0), omega if theta > c.theta_0 else max(omega, 0.0) * (theta == c.theta_0))
         joints["lever_down"] = (min(theta, c.theta_0), omega if theta < c.theta_0 else min(omega, 0.0) * (theta == c.theta_0))
-        return joints | {"drive": (drive, 0.0)}
+        slip = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_twist if c.has_bristle else 0.0
+        bent = float(np.clip(omega / np.sqrt(c.k_twist), -slip, slip)) if c.has_bristle else 0.0
+        return joints | {"drive": (drive, 0.0), "bristle": (bent, 0.0)}
 
     def _motion(self, t: np.ndarray, rows: np.ndarray) -> Motion:
         """Rows (N, 5) of theta, omega, theta_m, motor speed over n, drive -> Motion."""
         theta, omega, theta_m, _, drive = rows.T.copy()
         measured = theta
         for name, values in self.effects:
-            measured = BY_NAME[name].measure(values, measured)
+            measured = BY_NAME[name].measure(values, t, measured)
         return Motion(t, theta, omega, drive, theta_m, measured)
 
 
 def _viscous_asymmetry(c: Coefficients) -> Law:
     """Half the difference of viscous friction between the directions: a force even in the speed, which no damping gives."""
-    half = 0.5 * (c.a_mech_plus - c.a_mech_minus) * (1.0 - c.beta if c.two_body > 0 else 1.0)
+    half = 0.5 * (c.a_mech_plus - c.a_mech_minus) * (1.0 - c.beta if c.has_motor_side else 1.0)
     return Law("asymmetric viscous friction", np.array([half]), lambda p, theta, w, j, t: -p[0] * abs(w), None)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients
-from ers_mj.plants.events import N_PARAMETERS, simulate_kernel
+from ers_mj.plants.events import N_PARAMETERS, perturb_kernel, rows_of, simulate_kernel
 
 ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
 
@@ -52,15 +52,19 @@ class ReducedModel:
 
     def __post_init__(self):
         c = self.coefficients
-        on, p = np.zeros(len(EFFECTS), np.bool_), np.zeros((len(EFFECTS), N_PARAMETERS))
+        p = np.zeros((len(EFFECTS), N_PARAMETERS))
         for name, values in self.effects:
             effect = BY_NAME[name]
             c = effect.coefficients(values, c)
             if effect.torque or effect.friction:
-                on[ROW[name]] = True
                 constants = effect.constants(values, c)
                 p[ROW[name], :len(constants)] = constants
-        object.__setattr__(self, "_lowered", (np.array(c, float), on, p))
+        object.__setattr__(self, "_lowered", (np.array(c, float), rows_of([name for name, _ in self.effects]), p))
+
+    @property
+    def coupled(self) -> bool:
+        """Whether there is a second body."""
+        return Coefficients(*self._lowered[0]).two_body > 0
 
     def terminal(self, u: np.ndarray) -> np.ndarray:
         """The input (N,) that is left of the command u (N,) after the drive's static effects."""
@@ -79,17 +83,52 @@ class ReducedModel:
         return out
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
-        """Output (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see events.simulate_kernel).
+        """What the sensor reads (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see events.simulate_kernel).
 
-        ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool.
+        ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool. An observer beside a
+        sensor effect runs twice: what the sensor adds on the first way is taken off the measurement on the second.
         """
-        return self._run(t, u, start, enable, load, y, gain, every, 1)[:, 0]
+        return self.outputs(t, u, start, enable=enable, load=load, y=y, gain=gain, every=every)[0]
+
+    def outputs(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> tuple[np.ndarray, np.ndarray]:
+        """As ``theta``, with the motion (N, 4) beside it: theta, omega, drive acceleration and motor side's angle."""
+        motion = self._run(t, u, start, enable, load, y, gain, every, 1)
+        theta = motion[:, 0]
+        read = self.read(t, theta)
+        if read is not theta and gain > 0:
+            motion = self._run(t, u, start, enable, load, y - (read - theta), gain, every, 1)
+            read = self.read(t, motion[:, 0])
+        return read, motion
+
+    def current(self, t: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """n K_t i / J (N,) of the winding's current along a motion (N, 4): what effects take from the drive acceleration is not in it."""
+        j = motion[:, 2]
+        for name, values in self.effects:
+            j = BY_NAME[name].winding(values, self.coefficients, t, motion, j)
+        return j
+
+    def path(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
+        """(N, 4): theta, omega, drive acceleration and motor side's angle of the run that ``theta`` makes."""
+        return self._run(t, u, start, enable, load, y, gain, every, 1)
+
+    def first_order(self, t, path, name, values, *, gain=0.0, every=1) -> np.ndarray:
+        """First-order change of the output (N,) along a ``path`` of one body if the law of one more effect acted: a fiftieth of the work."""
+        effect, c = BY_NAME[name], Coefficients(*self._lowered[0])
+        p = np.zeros((len(EFFECTS), N_PARAMETERS))
+        constants = effect.constants(values, c)
+        p[ROW[name], :len(constants)] = constants
+        out = np.empty(t.size)
+        perturb_kernel(t, path, gain, every, self._lowered[0].copy(), rows_of([name]), p, out)
+        return out
+
+    def read(self, t: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """What the sensor reads (N,) of the true output theta (N,); theta itself where no effect touches the sensor."""
+        for name, values in self.effects:
+            theta = BY_NAME[name].measure(values, t, theta)
+        return theta
 
     def simulate(self, t, u, start=None, *, enable=None, load=None, refine=1) -> Motion:
         """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples."""
         start = (self.coefficients.theta_0, 0.0) if start is None else start
         out = self._run(t, u, start, enable, load, None, 0.0, 1, refine)
-        measured = out[:, 0]
-        for name, values in self.effects:
-            measured = BY_NAME[name].measure(values, measured)
-        return Motion(t, out[:, 0], out[:, 1], out[:, 2], out[:, 3], measured)
+        return Motion(t, out[:, 0], out[:, 1], out[:, 2], out[:, 3], self.read(t, out[:, 0]))

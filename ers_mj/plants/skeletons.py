@@ -81,13 +81,13 @@ def rudder_skeleton(c: Coefficients, parameters: Mapping[str, float], linkage: s
     if missing:
         raise InputError(f"the three-dimensional plant needs {' and '.join(missing)} above zero in the datasheet")
     J, n = parameters["J"], parameters["n"]
-    spec = _load(f"rudder_{linkage}.xml", c.two_body > 0)
+    spec = _load(f"rudder_{linkage}.xml", c.has_motor_side)
     spec.equality("thread").data[:2] = [0.0, ARM / n]
     if linkage == "constant":
         spec.equality("ratio").data[:2] = [0.0, 1.0 / n]
-        if c.two_body > 0:
+        if c.has_motor_side:
             spec.delete(spec.equality("gap_closed"))
-    local = _share_inertia(spec, J, n, c.rho if c.two_body > 0 else MOTOR_SHARE)
+    local = _share_inertia(spec, J, n, c.rho if c.has_motor_side else MOTOR_SHARE)
     pose = _constant_pose(n) if linkage == "constant" else _rod_pose(n)
     return Skeleton(spec, J, n, parameters["K_t"], "rotor", True, pose, local)
 
@@ -142,13 +142,13 @@ def lumped_skeleton(c: Coefficients, is_angle: bool) -> Skeleton:
     spec.option.tolerance = 1e-12
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_DIAGEXACT
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    rho = c.rho if c.two_body > 0 else MOTOR_SHARE
+    rho = c.rho if c.has_motor_side else MOTOR_SHARE
     rocker = _lumped_body(spec.worldbody, "rocker", rho, is_angle, "rocker")
-    rudder = _lumped_body(rocker, "rudder", 1.0 - rho - LEVER_SHARE, is_angle, "gap" if c.two_body > 0 else "")
+    rudder = _lumped_body(rocker, "rudder", 1.0 - rho - LEVER_SHARE, is_angle, "gap" if c.has_motor_side else "")
     rudder.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.3, 0.1, 0.01], pos=[0.2, 0, 0], mass=0, contype=0, conaffinity=0)
     for name in ("lever_up", "lever_down"):
         _lumped_body(spec.worldbody, name, LEVER_SHARE, is_angle, name)
-    _lumped_tendons(spec, ["rocker", "gap"] if c.two_body > 0 else ["rocker"])
+    _lumped_tendons(spec, ["rocker", "gap"] if c.has_motor_side else ["rocker"])
     _lumped_actuators(spec)
     return Skeleton(spec, 1.0, 1.0, 1.0, "rocker", is_angle, lambda theta: {"rocker": (theta, 1.0)}, (rho, 1 - rho - LEVER_SHARE))
 

@@ -62,7 +62,9 @@ class Stepper:
         self.motor, self.load = (self.model.actuator(name).id for name in ("motor", "load"))
         self.tendon = self.model.tendon("rudder_angle").id
         self.rocker, self.rotor = (self._address(name) for name in ("rocker", self.motor_joint))
-        self.gap = self._address("gap") if self.c.two_body > 0 else None
+        self.gap = self._address("gap") if self.c.has_motor_side else None
+        self.current = int(self.model.actuator_actadr[self.motor])
+        self.bristle = self.model.actuator("bristle").id if self.c.has_bristle else None
         self.torques = [(law.torque, law.p) for law in self.laws if law.torque]
         self.frictions = [(law.friction, law.p) for law in self.laws if law.friction]
 
@@ -75,14 +77,17 @@ class Stepper:
         for k in range(self.model.njnt):
             self.data.qpos[k], self.data.qvel[k] = start.get(self.model.joint(k).name, (0.0, 0.0))
         self.drive = start["drive"][0]
-        if self.model.na:
-            self.data.act[0] = self.drive / self.activation
+        if self.current >= 0:
+            self.data.act[self.current] = self.drive / self.activation
+        if self.bristle is not None:
+            self.data.act[self.model.actuator_actadr[self.bristle]] = start["bristle"][0]
 
     @unlogged()
     def run(self, t: np.ndarray, u: np.ndarray, delay: float, enable=None, load=None) -> np.ndarray:
         """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration."""
         model, data, rows = self.model, self.data, np.full((t.size, 5), np.nan)
         late = _delayed(t, u, delay) if delay > 0 else None
+        data.time = t[0]
         for k in range(t.size):
             rows[k] = self._observe()
             if k == t.size - 1 or not abs(rows[k, 0]) < 1e12:
@@ -108,7 +113,8 @@ class Stepper:
         self.model.opt.disableactuator = 0 if closed else 1 << MOTOR_GROUP
         if not closed:
             self.drive = 0.0
-            self.data.act[:] = 0.0
+            if self.current >= 0:
+                self.data.act[self.current] = 0.0
 
     def _advance(self, v: float, load: float, steps: int) -> None:
         data = self.data
@@ -125,8 +131,8 @@ class Stepper:
         """Drive acceleration under the input v."""
         if not self.closed:
             return 0.0
-        if self.model.na:
-            return self.activation * self.data.act[0]
+        if self.current >= 0:
+            return self.activation * self.data.act[self.current]
         return self.c.b * v - self.c.a_emf * self.data.qvel[self.rotor] / self.ratio
 
     def _observe(self) -> tuple[float, float, float, float, float]:
@@ -142,12 +148,15 @@ class Stepper:
         j, t, c = self._drive(v), self.data.time, self.c
         force = load + sum(torque(p, theta, w, j, t) for torque, p in self.torques)
         if self.frictions:
-            share = 1.0 - c.phi if c.two_body > 0 else 1.0
+            share = 1.0 - c.phi if c.has_motor_side else 1.0
             up, down = c.c_2_plus, c.c_2_minus
             for friction, p in self.frictions:
                 up, down = friction(p, up, theta, w, j, 1.0), friction(p, down, theta, w, j, -1.0)
-            self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
-            force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
+            if self.bristle is None:
+                self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
+                force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
+            else:
+                self.model.actuator_biasprm[self.bristle, 3:5] = self.inertia * (up if w > 0 else down)
         self.data.ctrl[self.load] = self.inertia * force
 
 
@@ -189,8 +198,8 @@ def _rows(stepper: Stepper, states: np.ndarray, u: np.ndarray) -> np.ndarray:
     theta_m, omega_m = states[:, stepper.rocker], states[:, nq + stepper.rocker]
     twist, spread = (0.0, 0.0) if stepper.gap is None else (states[:, stepper.gap], states[:, nq + stepper.gap])
     speed = states[:, nq + stepper.rotor] / stepper.ratio
-    if stepper.model.na:
-        drive = stepper.activation * states[:, -1]
+    if stepper.current >= 0:
+        drive = stepper.activation * states[:, nq + stepper.model.nv + stepper.current]
     else:
         drive = np.concatenate([[stepper.drive], stepper.c.b * u[:-1] - stepper.c.a_emf * speed[1:]])
     return np.column_stack([theta_m + twist, omega_m + spread, theta_m, speed, drive])

@@ -24,6 +24,7 @@ PLAY = [0.99, 0.9999, 1e-5, 0.5, 2.0]
 OVERDAMPED = 2.0  # damping ratio of the play's rigid ends: a limit that does not pull still bounces at critical damping
 ELASTIC = [1e-4, 1e-4, 0.001, 0.5, 2.0]  # mjMINIMP: the limit's force does not depend on the other forces
 RESOLVED = 0.8  # decay rate [1/s] of a contact times h, above which a rigid limit is nearer to it than its own spring-damper
+NO_TORQUE = 1e-9  # [N m/A] the constant of a motor that only rubs
 FAR = 1e6  # [output unit] an end that is not there
 
 
@@ -42,7 +43,7 @@ def write_coefficients(skeleton: Skeleton, c: Coefficients, timestep: float) -> 
     _write_friction(skeleton, c)
     _write_spring(skeleton, c)
     _write_stops(skeleton, c)
-    if c.two_body > 0:
+    if c.has_motor_side:
         _write_play(skeleton, c)
 
 
@@ -54,7 +55,7 @@ def motor_gain(skeleton: Skeleton, c: Coefficients) -> float:
 
 def _write_solver(spec: mujoco.MjSpec, h: float) -> None:
     spec.option.timestep = h
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
     for part in [*spec.joints, *spec.tendons]:
         part.solref_limit = part.solref_friction = [2 * h, 1.0]
         part.solimp_limit = part.solimp_friction = RIGID
@@ -83,16 +84,26 @@ def _write_motor(skeleton: Skeleton, c: Coefficients) -> None:
 
 
 def _write_friction(skeleton: Skeleton, c: Coefficients) -> None:
-    """Dry and viscous friction, shared by rocker and rudder; the asymmetry of the dry one is a constant torque."""
+    """Dry and viscous friction, shared by rocker and rudder; the asymmetry of the dry one is a constant torque, on a bristle a law."""
     J, tendon, rocker = skeleton.inertia, skeleton.spec.tendon("rudder_angle"), skeleton.spec.joint("rocker")
-    beta, phi = (c.beta, c.phi) if c.two_body > 0 else (0.0, 0.0)
+    beta, phi = (c.beta, c.phi) if c.has_motor_side else (0.0, 0.0)
     damping, level = 0.5 * J * (c.a_mech_plus + c.a_mech_minus), 0.5 * J * (c.c_2_plus + c.c_2_minus)
     tendon.damping, rocker.damping = [(1 - beta) * damping, 0.0, 0.0], [beta * damping, 0.0, 0.0]
-    tendon.frictionloss, rocker.frictionloss = (1 - phi) * level, phi * level
     push = J * (c.bias - 0.5 * (1 - phi) * (c.c_2_plus - c.c_2_minus))
+    if c.has_bristle:
+        _write_bristle(skeleton, c, level)
+        level, push = 0.0, J * c.bias
+    tendon.frictionloss, rocker.frictionloss = (1 - phi) * level, phi * level
     if push:
         skeleton.spec.add_actuator(name="bias", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle", gainprm=np.zeros(10),
                                    biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[push, *[0.0] * 9])
+
+
+def _write_bristle(skeleton: Skeleton, c: Coefficients, level: float) -> None:
+    """LuGre friction, which MuJoCo has as a part of a motor: one without torque, its activation the bristle's deflection."""
+    bristle = skeleton.spec.add_actuator(name="bristle", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle")
+    bristle.set_to_dcmotor(motorconst=[NO_TORQUE, NO_TORQUE], resistance=1.0,
+                           lugre=[skeleton.inertia * c.k_twist, skeleton.inertia * c.d_twist, level, level, 1.0])
 
 
 def _write_spring(skeleton: Skeleton, c: Coefficients) -> None:
@@ -115,13 +126,17 @@ def _write_stops(skeleton: Skeleton, c: Coefficients) -> None:
         return
     tendon, (rocker, rudder) = skeleton.spec.tendon("rudder_angle"), skeleton.local
     tendon.limited, tendon.range = True, [max(c.lower, -FAR), min(c.upper, FAR)]
-    mobility = 1.0 / rudder if c.two_body > 0 else 1.0 / (rocker + rudder)
+    mobility = 1.0 / rudder if c.has_motor_side else 1.0 / (rocker + rudder)
     tendon.solref_limit, tendon.solimp_limit = _elastic(skeleton, mobility, c.k_stop, c.d_stop), ELASTIC
 
 
 def _write_play(skeleton: Skeleton, c: Coefficients) -> None:
-    """The play: elastic where c gives its contact a stiffness and the timestep resolves its damping, else rigid."""
+    """The play: elastic where c gives its contact a stiffness and the timestep resolves its damping, else rigid; a shaft if it has no width."""
     joint, (rocker, rudder) = skeleton.spec.joint("gap"), skeleton.local
+    if c.gap <= 0:
+        joint.limited = False
+        joint.stiffness, joint.damping = [skeleton.inertia * c.k_twist, 0.0, 0.0], [skeleton.inertia * c.d_twist, 0.0, 0.0]
+        return
     joint.limited, joint.range, joint.solimp_limit = True, [-c.gap, c.gap], PLAY
     joint.solref_limit = [2 * skeleton.spec.option.timestep, OVERDAMPED]
     if c.k_twist > 0 and c.d_twist / (c.rho * (1.0 - c.rho)) * skeleton.spec.option.timestep < RESOLVED:

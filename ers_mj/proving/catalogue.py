@@ -6,12 +6,14 @@ its own formulas. `context` describes the servo and its effect-free records: par
 records, durations, dt.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 
-DEG = np.pi / 180.0
+from ers_mj.proving.laws import DEG
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ def index(options, form):
 # ---- friction ---------------------------------------------------------------------------------------------------------
 
 STRIBECK = ("1/(1+(w/v)^2)", "exp(-(w/v)^2)", "exp(-|w|/v)")
+HYPERBOLIC = "1/cosh(w/v)"
 
 
 def draw_stribeck(rng, context):
@@ -64,7 +67,7 @@ def draw_stribeck(rng, context):
 
 def put_stribeck(p, s, shape, record):
     """Strength (Fs - Fc)/Fc."""
-    p["stri_f"], p["stri_v"], p["stri_form"] = s, shape["v_stribeck_rad_s"], index(STRIBECK, shape.get("form", STRIBECK[1]))
+    p["stri_f"], p["stri_v"], p["stri_form"] = s, shape["v_stribeck_rad_s"], index((*STRIBECK, HYPERBOLIC), shape.get("form", STRIBECK[1]))
 
 
 def draw_presliding(rng, context):
@@ -91,6 +94,7 @@ def put_asymmetric(p, s, shape, record):
     """Strength a in Fc (1 +- a); the viscous asymmetry stands as it is or in proportion to a."""
     viscous = shape["viscous_per_coulomb"] * s if "viscous_per_coulomb" in shape else shape["viscous_asymmetry"]
     p["asym_c"], p["asym_v"] = shape["sign"] * s, shape["sign"] * viscous
+    p["asym_dir"] = shape.get("growing_to_rad_s", 0.0)
 
 
 LOAD = ("motor torque", "motor torque, rounded at zero")
@@ -140,6 +144,8 @@ def put_position(p, s, shape, record):
 # ---- transmission -----------------------------------------------------------------------------------------------------
 
 CONTACT = ("spring and damper", "Hunt-Crossley")
+RIGID = "rigid limit"
+"""Of MuJoCo; the quick simulator takes a spring and damper."""
 
 
 def draw_backlash(rng, context):
@@ -158,7 +164,8 @@ def split(p, k, zeta, share):
 def put_backlash(p, s, shape, record):
     """Strength: total gap at the output [deg]."""
     split(p, shape["contact_k"], shape["contact_zeta"], shape["motor_friction_share"])
-    p["gap"], p["con_form"] = 0.5 * s * DEG, index(CONTACT, shape.get("form", CONTACT[0]))
+    p["gap"], form = 0.5 * s * DEG, shape.get("form", CONTACT[0])
+    p["con_form"] = 3.0 if form == RIGID else index(CONTACT, form)
 
 
 def draw_compliance(rng, context):
@@ -257,8 +264,8 @@ def draw_nothing(rng, context):
 
 
 def put_inductance(p, s, shape, record):
-    """Strength: L [H] in place of the ordinary one."""
-    p["L"] = s
+    """Strength: L [H] in place of the ordinary one; it may fall as the iron saturates."""
+    p["L"], p["L_sat"] = s, shape.get("saturation_per_A", 0.0)
 
 
 def put_delay(p, s, shape, record):
@@ -342,7 +349,7 @@ def put_stop(p, s, shape, record):
     if shape["side"] in ("lower", "both"):
         p["stop_lo"] = low * (1.0 - s)
     p["stop_k"], p["stop_c"] = shape["k"], 2.0 * shape["zeta"] * np.sqrt(shape["k"] * p["J"][0])
-    p["stop_form"] = index(CONTACT, shape.get("form", CONTACT[0]))
+    p["stop_form"] = index((*CONTACT, RIGID), shape.get("form", CONTACT[0]))
 
 
 PULSE = ("rect", "half sine", "sudden and fading")

@@ -1,30 +1,19 @@
-"""An independent simulator of the electric rudder servo: the source of truth that the package is held against.
+"""The laws of the independent servo: Eq. (1) of the paper with everything that may be concealed in it, compiled.
 
-It shares no line and no method with the package. Eq. (1) of the paper, all on the rudder side of the gear:
-
-    L i' = v(u) - R i - K_e n w
-    J w' = n K_t i - B w - F_c Sgn(w) - k_s (theta - theta_0) - T_LH Sgn(theta - theta_0) + effects
-
-is stepped with Heun's rule at 5-10 us; Sgn is set-valued. Within a step the instants at which w or theta - theta_0 pass zero
-are located and the step is cut there; at rest the inclusion is solved in closed form (the servo stays where the torque lies inside
-the stick band, whose width is F_c + T_LH on theta = theta_0 and F_c elsewhere), so nothing creeps. Backlash and shaft compliance
-split J, B and F_c into a motor side and a rudder side joined by a spring with an optional gap.
-
-Angles rad, torques N m, voltages V, currents A, times s. What each effect means stands in `independent_effects.py`.
+All on the rudder side of the gear, angles rad, torques N m, voltages V, currents A, times s. Two simulators read these laws,
+the quick one (quick.py) and MuJoCo's (mechanism.py, recorder.py); neither shares a line with the package that is put to the test.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
 
 import numpy as np
-from independent_effects import put_effects, samples_of
 from numba import njit
+
+DEG = np.pi / 180.0
 
 TABLE_1 = {"J": 0.0031, "B": 0.0098, "K_t": 0.0175, "K_e": 0.0295, "k_s": 0.0877, "T_LH": 0.46, "F_c": 0.34, "R": 1.55,
            "L": 0.0016, "theta_0": 0.261799, "n": 22.26}
 """Table 1 of the paper, SI."""
-
-STAND_S = 0.25
-"""[s] how long the servo stands with u = 0 before t = 0."""
 
 FIELDS = """J B K_t K_e k_s T_LH F_c R L theta_0 n share_J share_B share_F
     stri_f stri_v stri_form asym_c asym_v asym_dir load_mu load_form quad_c quad_p pos_a pos_k pos_ph pos_form
@@ -35,7 +24,7 @@ FIELDS = """J B K_t K_e k_s T_LH F_c R L theta_0 n share_J share_B share_F
     dist_T dist_t0 dist_d dist_form gust_T gust_w gust_ph gust_form
     lag_s lag_form nl_a nl_P nl_ph nl_form q_step q_form adc_step
     app_J app_k app_c bw_T bw_x bw_n age_a age_t0 age_D brush_V brush_i angdamp_a angdamp_P tacho_a tacho_ph
-    kt_sat mxw_k mxw_tau run_a run_D""".split()
+    kt_sat mxw_k mxw_tau run_a run_D L_sat rod""".split()
 PLANT = np.dtype([(name, "f8") for name in FIELDS])
 """Everything that the compiled code reads, one number a field; zero means absent."""
 
@@ -44,16 +33,6 @@ CONTROLLER = ("KP", "KI", "KD", "TF", "UMAX", "FF_ON", "FF_C", "FF_TLH", "FF_KS"
 
 TH, W, CUR, THM, WM, BRI, HYS, APP, APV, TEMP, FAST, BUS, LAG, MXW, AGE, RUN = range(16)
 STATES = 16
-
-
-class Run(NamedTuple):
-    """One simulated recording, (samples,) each; `theta` [rad] is measured, `clean` lacks noise and ordinary converter."""
-
-    theta: np.ndarray
-    clean: np.ndarray
-    true: np.ndarray
-    u: np.ndarray
-    i_A: np.ndarray
 
 
 # ---- drive ------------------------------------------------------------------------------------------------------------
@@ -134,8 +113,9 @@ def torque_constant(p, y):
 def current_rate(p, y, u, gain):
     """[A/s] L i' = v - R i - K_e n w - brush drop."""
     i = y[CUR]
-    speed = y[WM] if p.two > 0.0 else y[W]
-    angle = y[THM] if p.two > 0.0 else y[TH]
+    has_motor = p.two > 0.0 or p.rod > 0.0
+    speed = y[WM] if has_motor else y[W]
+    angle = y[THM] if has_motor else y[TH]
     warm = warmth(p, y)
     emf = p.K_e * (1.0 - p.th_beta * warm) * p.n * ratio(p, y[TH] - p.theta_0) * speed
     v = terminal_voltage(p, y, u, gain)
@@ -143,7 +123,7 @@ def current_rate(p, y, u, gain):
         v += p.tacho_a * emf * np.sin(p.n * angle + p.tacho_ph)
     if p.brush_V > 0.0:
         v -= np.copysign(p.brush_V * np.log1p(abs(i) / p.brush_i), i)
-    rate = (v - p.R * (1.0 + p.th_alpha * warm) * i - emf) / p.L
+    rate = (v - p.R * (1.0 + p.th_alpha * warm) * i - emf) / (p.L * (1.0 - 0.4 * np.tanh(p.L_sat * i) ** 2))
     if p.lim_A > 0.0 and p.lim_form == 0.0 and abs(i) >= p.lim_A and rate * i > 0.0:
         return 0.0
     return rate
@@ -154,8 +134,10 @@ def current_rate(p, y, u, gain):
 
 @njit(cache=True)
 def stribeck(p, w):
-    """Share of the static excess left at speed w: 0 rational, 1 Gaussian, 2 exponential."""
+    """Share of the static excess left at speed w: 0 rational, 1 Gaussian, 2 exponential, 3 hyperbolic."""
     x = abs(w) / p.stri_v
+    if p.stri_form == 3.0:
+        return 1.0 / np.cosh(x)
     if p.stri_form == 1.0:
         return np.exp(-x * x)
     if p.stri_form == 2.0:
@@ -176,7 +158,7 @@ def along_travel(p, x):
 @njit(cache=True)
 def friction_level(p, y, w, direction):
     """[N m] size of the dry friction of the whole train when it moves, or would move, in `direction`."""
-    scale = 1.0 + direction * p.asym_c
+    scale = 1.0 + direction * p.asym_c * (1.0 - 0.5 * np.exp(-abs(w) / p.asym_dir) if p.asym_dir > 0.0 else 1.0)
     if p.stri_f != 0.0:
         scale += p.stri_f * stribeck(p, w)
     if p.pos_a != 0.0:
@@ -226,7 +208,7 @@ def hinge(p, x):
 
 @njit(cache=True)
 def stop_torque(p, x, w):
-    """[N m] end stops at x = stop_hi and stop_lo, never pulling: 0 spring and damper, 1 Hunt-Crossley."""
+    """[N m] end stops at x = stop_hi and stop_lo, never pulling: 0 (and 2, rigid in MuJoCo) spring and damper, 1 Hunt-Crossley."""
     side, depth = 1.0, x - p.stop_hi
     if depth <= 0.0:
         side, depth = -1.0, p.stop_lo - x
@@ -296,14 +278,15 @@ def motor_torque(p, y):
     """[N m at the rudder] K_t i through the gear, and cogging."""
     tau = p.n * ratio(p, y[TH] - p.theta_0) * torque_constant(p, y) * y[CUR]
     if p.cog_a != 0.0:
-        a = p.cog_k * (y[THM] if p.two > 0.0 else y[TH]) + p.cog_ph
+        a = p.cog_k * (y[THM] if p.two > 0.0 or p.rod > 0.0 else y[TH]) + p.cog_ph
         tau += p.cog_a * (np.sin(a) + p.cog_h2 * np.sin(2.0 * a + 0.7))
     return tau
 
 
 @njit(cache=True)
 def contact_torque(p, y):
-    """[N m] joint between motor and rudder: 0 spring and damper in a gap, never pulling; 1 Hunt-Crossley; 2 hardening shaft."""
+    """[N m] joint between motor and rudder: 0 (and 3, rigid in MuJoCo) spring and damper in a gap, never pulling;
+    1 Hunt-Crossley; 2 hardening shaft."""
     d, speed = y[THM] - y[TH], y[WM] - y[W]
     if p.con_form == 2.0:
         return p.con_k * d * (1.0 + (d / 0.03) ** 2) + p.con_c * speed
@@ -380,113 +363,6 @@ def slow_rates(p, y, u, gain, dy):
     dy[RUN] = abs(w)
 
 
-@njit(cache=True)
-def rates(p, y, t, u, gain, rudder, motor, side, dy):
-    """y' with friction directions `rudder`, `motor` (+-1, 0 at rest) and preload side `side` (+-1) held."""
-    tau, tau_m = free_torques(p, y, t)
-    dy[TH] = dy[W] = 0.0
-    if rudder != 0.0:
-        j, slope = inertia(p, y[TH] - p.theta_0)
-        dy[TH] = y[W]
-        dy[W] = (tau - rudder * dry(p, y, y[W], rudder, False) - side * p.T_LH - 0.5 * slope * y[W] ** 2) / j
-    if p.two > 0.0:
-        dy[THM] = dy[WM] = 0.0
-        if motor != 0.0:
-            dy[THM] = y[WM]
-            dy[WM] = (tau_m - motor * dry(p, y, y[WM], motor, True)) / (p.share_J * p.J)
-    dy[CUR] = current_rate(p, y, u, gain)
-    if p.pre_s0 > 0.0:
-        level = friction_level(p, y, y[W], np.sign(y[W])) * (1.0 - p.two * p.share_F)
-        dy[BRI] = bristle_rate(p, y, level) if rudder != 0.0 else 0.0
-    slow_rates(p, y, u, gain, dy)
-
-
-@njit(cache=True)
-def directions(p, y, t):
-    """(rudder, motor, side): who moves which way; at rest 0 where the torque lies inside the stick band."""
-    x = y[TH] - p.theta_0
-    rudder, motor, side = np.sign(y[W]), np.sign(y[WM]), np.sign(x)
-    if rudder == 0.0 or (p.two > 0.0 and motor == 0.0):
-        tau, tau_m = free_torques(p, y, t)
-        if rudder == 0.0:
-            tau -= side * p.T_LH
-            rudder = np.sign(tau)
-            band = dry(p, y, 0.0, rudder, False) + (p.T_LH if side == 0.0 else 0.0)
-            rudder = 0.0 if abs(tau) <= band else rudder
-        if p.two > 0.0 and motor == 0.0:
-            motor = np.sign(tau_m)
-            motor = 0.0 if abs(tau_m) <= dry(p, y, 0.0, motor, True) else motor
-    return rudder, motor, (rudder if side == 0.0 else side)
-
-
-@njit(cache=True)
-def heun(p, y, t, u, gain, h, rudder, motor, side, work, out):
-    """One step of Heun's rule from y into out."""
-    k1, k2, mid = work[0], work[1], work[2]
-    rates(p, y, t, u, gain, rudder, motor, side, k1)
-    for j in range(STATES):
-        mid[j] = y[j] + h * k1[j]
-    rates(p, mid, t + h, u, gain, rudder, motor, side, k2)
-    for j in range(STATES):
-        out[j] = y[j] + 0.5 * h * (k1[j] + k2[j])
-    if p.lim_A > 0.0 and p.lim_form == 0.0:
-        out[CUR] = min(max(out[CUR], -p.lim_A), p.lim_A)
-
-
-@njit(cache=True)
-def first_event(p, y, end, rudder, motor, side):
-    """(share of the step, which) of the first of: 1 w, 2 theta - theta_0, 3 motor speed through zero; which 0: none."""
-    share, which = 1.0, 0
-    if end[W] * rudder < 0.0:
-        share, which = abs(y[W]) / (abs(y[W]) + abs(end[W])), 1
-    x, x_end = y[TH] - p.theta_0, end[TH] - p.theta_0
-    if rudder != 0.0 and x != 0.0 and x_end * side < 0.0:
-        s = abs(x) / (abs(x) + abs(x_end))
-        if s < share:
-            share, which = s, 2
-    if p.two > 0.0 and end[WM] * motor < 0.0:
-        s = abs(y[WM]) / (abs(y[WM]) + abs(end[WM]))
-        if s < share:
-            share, which = s, 3
-    return share, which
-
-
-@njit(cache=True)
-def advance(p, y, t, u, gain, h, work):
-    """One step of length h, cut at every reversal and at every pass of theta_0."""
-    out, left, hold, hold_m = work[3], h, False, False
-    for count in range(10):
-        rudder, motor, side = directions(p, y, t)
-        rudder = 0.0 if hold and y[W] == 0.0 else rudder
-        motor = 0.0 if hold_m and y[WM] == 0.0 else motor
-        heun(p, y, t, u, gain, left, rudder, motor, side, work, out)
-        share, which = first_event(p, y, out, rudder, motor, side)
-        if which == 0:
-            y[:] = out
-            return
-        hold = hold or (which == 1 and y[W] == 0.0)
-        hold_m = hold_m or (which == 3 and y[WM] == 0.0)
-        heun(p, y, t, u, gain, left * share, rudder, motor, side, work, out)
-        y[:] = out
-        if which == 1:
-            y[W] = 0.0
-        elif which == 2:
-            y[TH] = p.theta_0
-        else:
-            y[WM] = 0.0
-        t, left = t + left * share, left * (1.0 - share)
-        if count > 5 and which != 3:
-            settle(p, y, t)
-
-
-@njit(cache=True)
-def settle(p, y, t):
-    """Many passes within one step are the end of a bounce on theta_0: come to rest there if the band allows it."""
-    tau, _ = free_torques(p, y, t)
-    if abs(tau) <= dry(p, y, 0.0, np.sign(tau), False) + p.T_LH and abs(y[TH] - p.theta_0) < 1e-6:
-        y[TH], y[W] = p.theta_0, 0.0
-
-
 # ---- sensor and controller --------------------------------------------------------------------------------------------
 
 
@@ -541,46 +417,6 @@ def pid(c, memory, target, angle, dt):
     return min(max(u, -c[4]), c[4])
 
 
-@njit(cache=True)
-def march(plant, u_in, target, c, closed, dt, substeps, noise, stuck, spike, gain, stand, printed):
-    """(5, samples): measured, clean, true angle, u and current at the sample times."""
-    p = plant[0]
-    h, samples = dt / substeps, u_in.size
-    out, y, work, memory = np.zeros((5, samples)), np.zeros(STATES), np.zeros((4, STATES)), np.zeros(3)
-    y[TH] = y[THM] = y[LAG] = p.theta_0
-    y[BUS] = p.sag_V
-    delay, late = int(round(p.delay_s / h)), int(round(p.lag_s / h))
-    window = max(2 * late, 1) if p.lag_form == 3.0 else late + 1
-    ring = np.full(window, p.theta_0)
-    before = int(round(stand / h))
-    step = -before
-    for s in range(before):
-        advance(p, y, step * h, 0.0, 1.0, h, work)
-        step += 1
-        ring[step % window] = y[TH]
-    for k in range(samples):
-        clean = sensed(p, y, ring, step, late)
-        held = out[0, k - 1] if k > 0 else clean
-        held_clean = out[1, k - 1] if k > 0 else clean
-        out[1, k] = held_clean if stuck[k] else quantise(p, clean + spike[k])
-        raw = quantise(p, clean + spike[k] + noise[k])
-        raw = np.round(raw / p.adc_step) * p.adc_step if p.adc_step > 0.0 else raw
-        out[0, k], out[2, k], out[4, k] = (held if stuck[k] else raw), y[TH], y[CUR]
-        if k == 0:
-            memory[2] = target[0] - out[0, 0]
-        u = pid(c, memory, target[k], out[0, k], dt) if closed else u_in[k]
-        out[3, k] = np.round(u * printed) / printed + 0.0 if printed > 0.0 else u
-        for s in range(substeps):
-            told = (step - delay) // substeps
-            advance(p, y, step * h, out[3, told] if told >= 0 else 0.0, gain[k], h, work)
-            step += 1
-            ring[step % window] = y[TH]
-    return out
-
-
-# ---- the way in -------------------------------------------------------------------------------------------------------
-
-
 def plant_of(params):
     """The compiled code's record for Eq. (1) with `params` (Table 1's letters, SI) and no effect."""
     plant = np.zeros(1, PLANT)
@@ -595,30 +431,3 @@ def plant_of(params):
     plant["stop_hi"], plant["stop_lo"] = 1e9, -1e9
     plant["sag_V"] = 24.0
     return plant
-
-
-def simulate(params, effects, t, u, *, record=0, step=1e-5, noise=None, adc_step=0.0, controller=None, theta_ref=None,
-             stand=STAND_S, decimals=None):
-    """A `Run` at the times t [s] (uniform) under u [V] held between samples, or under `controller` (a mapping with the keys
-    CONTROLLER) following `theta_ref` [rad]. `effects`: mappings with label, strength, shape as the truth files have them;
-    `noise` [rad], (samples,), is added to the angle; `decimals` rounds the applied voltage; `step` [s] is the longest step.
-    """
-    t, samples = np.asarray(t, float), len(t)
-    dt = (t[-1] - t[0]) / (samples - 1)
-    plant = plant_of(params)
-    plant["adc_step"] = adc_step
-    put_effects(plant, effects, record)
-    stuck, spike, gain = samples_of(effects, record, samples, dt)
-    closed = controller is not None
-    c = np.array([controller[name] for name in CONTROLLER]) if closed else np.zeros(len(CONTROLLER))
-    target = np.asarray(theta_ref, float) if closed else np.zeros(samples)
-    u_in = np.zeros(samples) if closed else np.asarray(u, float)
-    noise = np.zeros(samples) if noise is None else np.asarray(noise, float)
-    out = march(plant, u_in, target, c, closed, dt, max(1, int(np.ceil(dt / step - 1e-9))), noise, stuck, spike, gain, stand,
-                0.0 if decimals is None else 10.0**decimals)
-    return Run(*out)
-
-
-def own_error(params, t, u, step=1e-5):
-    """[rad] largest change of the effect-free angle when the step is halved: how far this simulator can be trusted."""
-    return float(np.abs(simulate(params, [], t, u, step=step).true - simulate(params, [], t, u, step=0.5 * step).true).max())

@@ -1,0 +1,158 @@
+"""`ers prove`: conceals effects in recordings made in MuJoCo, or in real ones, diagnoses them blind, and opens the truth."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import tempfile
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, refuse_unwritable, whole
+from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
+from ers_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from ers_mj.proving.conduct import Proof, Task
+
+CASES, STOPPED = 20, 130
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    """Add this command to the command line."""
+    parser = commands.add_parser(
+        "prove", help="conceal effects, diagnose them blind, score",
+        description="Measure what the diagnosis can do. Servos are drawn, effects concealed in them in other forms than the library's, recorded in\n"
+                    "MuJoCo; the truth is sealed and its hash printed; each case is diagnosed by a process that gets its files only; the truth is\n"
+                    "opened and the answers scored. A quarter of the cases hides nothing, half one effect, 15 % several, 10 % one that the\n"
+                    "library does not have. Stopped with Ctrl-C, the same command goes on where it was.",
+        epilog="examples:\n  ers prove --cases 40 --seed 7 --out proof\n  ers prove --real ../shared/data --cases 15 --out proof-real")
+    parser.add_argument("--cases", type=whole(1), metavar="N", help=f"how many (default {CASES})")
+    parser.add_argument("--real", metavar="FOLDER", help="conceal in real recordings: the folder that holds emps/, throttle/ and sts3215/")
+    parser.add_argument("--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)")
+    add_out(parser)
+    add_common(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped."""
+    if arguments.out is None and arguments.json:
+        with tempfile.TemporaryDirectory(prefix="ers-prove-") as folder:
+            return _run(Path(folder), arguments, keeps=False)
+    folder = Path(DEFAULT_OUT if arguments.out is None else arguments.out)
+    if arguments.out == "":
+        raise InputError("--out is empty, a folder was expected")
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is a file, --out needs a folder")
+    refuse_unwritable(folder)
+    return _run(folder, arguments, keeps=True)
+
+
+def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
+    tasks, settings = _tasks(arguments)
+    _heed_terminate()
+    from ers_mj.proving.conduct import conduct
+    from ers_mj.proving.real import scored_real
+    from ers_mj.proving.scoring import row_of, scored
+
+    try:
+        with Progress() as progress:
+            proof = conduct(folder, tasks, settings, force=arguments.force or arguments.out is None, jobs=arguments.jobs,
+                            limit=arguments.limit, tell=_tell, progress=progress)
+    except KeyboardInterrupt:
+        kept = f"{folder} keeps what was done, the same command goes on from there" if keeps else "nothing was kept, --out DIR would keep it"
+        print(f"ers: stopped; {kept}", file=sys.stderr)
+        return STOPPED
+    rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
+    scores = scored(rows) if arguments.real is None else scored_real(rows)
+    results = plain({**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)})
+    told = _told(results)
+    files = _write(folder, results, rows, told) if keeps else []
+    print(as_json(results) if arguments.json else "\n".join([*told, *(["", bold("written"), *(f"  {path}" for path in files)] if files else [])]))
+    return 0
+
+
+def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
+    """The cases to be made, and what names this proof."""
+    from ers_mj.proving.conduct import Task
+
+    if arguments.real is not None:
+        from ers_mj.proving import real
+
+        plans = real.plans(arguments.cases or len(real.COVERAGE), arguments.seed)
+        real.refuse_missing(Path(arguments.real), plans)
+        tasks = [Task(plan.name, real.make, (plan, Path(arguments.real).absolute(), arguments.seed)) for plan in plans]
+        return tasks, {"kind": "real", "seed": arguments.seed, "cases": len(plans), "folder": str(Path(arguments.real).absolute())}
+    from ers_mj.proving import case
+
+    plans = case.plans(arguments.cases or CASES, arguments.seed)
+    tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in plans]
+    return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(plans)}
+
+
+def _heed_terminate() -> None:
+    """Let a plain kill stop as Ctrl-C does: no diagnosis under way is left behind."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def _tell(line: str) -> None:
+    """A line for a person while the work goes on, out of the way of --json."""
+    print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
+
+
+def _versions(proof: Proof) -> dict[str, str]:
+    from ers_mj import __version__
+
+    answers = (answer.get("document") or {} for answer in proof.answers.values())
+    return {"ers-mj": __version__, **next((a["versions"] for a in answers if a.get("versions")), {})}
+
+
+def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> list[Path]:
+    from ers_mj.proof_report import proof_page
+
+    about = {"seed": results["seed"], "truth sealed as sha256": results["truth_sha256"], **results["versions"]}
+    page = proof_page(results, rows, about)
+    return write_results(folder, {
+        "results.json": lambda path: write_text(path, as_json(results) + "\n"),
+        "report.html": lambda path: write_text(path, page),
+        "summary.txt": lambda path: write_text(path, "\n".join(told) + "\n"),
+    })
+
+
+# -- the proof in lines ---------------------------------------------------------------------------------------------
+
+
+def _told(results: dict) -> list[str]:
+    """What a terminal shows when all is done."""
+    from ers_mj.proof_report import headline, table_of
+
+    counts = ", ".join(f"{n} {kind}" for kind, n in results["counts"].items() if n)
+    lines = ["", bold(headline(results)), f"{results['cases']} cases ({counts}), seed {results['seed']}", ""]
+    lines += [f"  {told:58}{count:>11}   {share}" for told, count, share in table_of(results)]
+    if results["accuracy"]:
+        lines += ["", bold("named right by class, against what the refit leaves [sigma]")]
+    for b in results["accuracy"]:
+        top = f"{b['to_sigma']:g}" if b["to_sigma"] else "more"
+        lines.append(f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]")
+    lines += ["", bold("concealed -> named first")]
+    lines += [f"  {truth:58} {', '.join(f'{k} x {name}' if k > 1 else name for name, k in named.items())}" for truth, named in results["confusion"].items()]
+    lines += _told_real(results) if "concealed_in_real" in results else []
+    over, cpu, wall = results["error_over_floor"], results["cpu_s"], results["wall_s"]
+    lines += ["", f"held-out error over noise floor: median {over['median']:.3g}, 90 % below {over['p90']:.3g}"] if over.get("median") else [""]
+    if cpu:
+        lines.append(f"time a case: median {cpu['median']:.1f} s of one processor, at most {cpu['max']:.1f} s (by the clock {wall['median']:.1f} and {wall['max']:.1f} s)")
+    return lines + [f"no answer: {failure}" for failure in results["failures"]]
+
+
+def _told_real(results: dict) -> list[str]:
+    """What was concealed in real records and found again beside what the rigs have of their own."""
+    lines = ["", bold("the rigs as they are")]
+    lines += [f"  {rig:12} {', '.join(names) or 'nothing'}" for rig, names in results["own"].items()]
+    lines += ["", bold("concealed in them")]
+    for x in results["concealed_in_real"]:
+        lines.append(f"  {x['rig']:12} {x['concealed']:22} {x['strength']:<10.3g} {'found' if x['found'] else '-':7} {', '.join(x['named']) or 'nothing'}")
+    return lines

@@ -1,0 +1,44 @@
+"""A sensor whose reading is not in proportion to the angle."""
+
+import numpy as np
+
+from ers_mj.effects.base import Parameter, Sensor
+
+ORDERS = (0.5, 1, 2, 3, 4, 6, 8)  # periods within the travel from which a fit is begun
+
+
+class SensorNonlinearity(Sensor):
+    """y = theta + bend theta^2 + twist theta^3, a loaded potentiometer; or + A sin(2 pi theta / period + phase), an eccentric scale.
+
+    Terms that are absent are infinite. A gain and an offset of the sensor are no error that position can tell from the plant's.
+    """
+
+    name = "sensor_nonlinearity"
+    sentence = "the sensor errs along the travel (bend {bend}, twist {twist}, wave {A} every {period})"
+    mjcf = "none: the reading is bent after the simulation"
+    parameters = (
+        Parameter("bend", "per_position", "error per angle squared", positive=False, absent=np.inf),
+        Parameter("twist", "per_position_squared", "error per angle cubed", positive=False, absent=np.inf),
+        Parameter("A", "position", "amplitude of the wave", positive=False, absent=np.inf),
+        Parameter("period", "position", "period of the wave", absent=np.inf),
+        Parameter("phase", "phase", "phase of the wave at angle zero", positive=False, absent=np.inf),
+    )
+    tries = 2
+    wave = (2, 4)
+
+    def starts(self, scales):
+        travel = scales.high - scales.low
+        size = 0.01 * travel
+        polynomial = [np.array([size / scales.position**2, size / scales.position**3, np.inf, np.inf, np.inf])]
+        return polynomial + [np.array([np.inf, np.inf, size, travel / order, 0.0]) for order in ORDERS]
+
+    def measure(self, p, t, y):
+        bend, twist, amplitude, period, phase = p
+        if np.isfinite(period):
+            return y + amplitude * np.sin(2 * np.pi / period * y + phase)
+        return y + (bend * y**2 if np.isfinite(bend) else 0.0) + (twist * y**3 if np.isfinite(twist) else 0.0)
+
+    def describe(self, values):
+        if values["period"] == "none":
+            return f"the sensor errs along the travel, by {values['bend']} times the angle squared and {values['twist']} times its cube"
+        return f"the sensor errs along the travel, by an amplitude of {values['A']} every {values['period']}"

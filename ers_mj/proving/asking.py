@@ -1,0 +1,87 @@
+"""Asks the diagnosis about one case, blind: a fresh process in an empty folder that holds its recordings and datasheet, nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from ers_mj.proving.sealing import hashes
+
+LIMIT = 300.0  # [s] of one processor that a diagnosis may take
+PATIENCE = 4.0  # times the limit that it may last by the clock on a busy machine
+LOOK = 0.05  # [s] between two looks at the child
+START = """import resource, runpy, sys
+resource.setrlimit(resource.RLIMIT_CPU, ({limit}, {limit} + 5))
+runpy.run_module("ers_mj", run_name="__main__", alter_sys=True)"""
+
+
+class Asker:
+    """Asks about cases, several at once if need be; `stop` ends every child that is under way."""
+
+    def __init__(self, code: str, limit: float = LIMIT):
+        self.code, self.limit = code, limit
+        self.children: set[subprocess.Popen] = set()
+        self.stopped = False
+
+    def ask(self, case: Path) -> dict | None:
+        """The answer with what it cost; a failure or a run out of time is an answer without a document. None once stopped."""
+        bound = {"case": case.name, "files_sha256": hashes(case), "code": self.code}
+        with tempfile.TemporaryDirectory(prefix="ers-blind-") as folder:
+            for path in case.iterdir():
+                shutil.copy(path, folder)
+            cost, text, complaint = self._run(Path(folder))
+        if self.stopped:
+            return None
+        document, error = None, None
+        try:
+            document = json.loads(text) if cost["exit"] == 0 else None
+        except ValueError:
+            error = "its answer is no JSON"
+        if document is None and error is None:
+            late = cost["exit"] in (-signal.SIGXCPU, -signal.SIGKILL) and max(cost["cpu_s"], cost["wall_s"]) > 0.9 * self.limit
+            error = f"no answer within {self.limit:g} s" if late else (complaint.strip().splitlines() or [f"exit code {cost['exit']}"])[-1][:300]
+        return {**bound, **cost, "error": error, "document": document}
+
+    def _run(self, folder: Path) -> tuple[dict, str, str]:
+        recordings = sorted((p.name for p in folder.iterdir() if p.name.startswith("rec")), key=lambda name: (len(name), name))
+        sheet = ["--datasheet", "datasheet.toml"] if (folder / "datasheet.toml").exists() else []
+        command = [sys.executable, "-c", START.format(limit=int(self.limit)), "diagnose", *recordings, *sheet, "--json", "--jobs", "1"]
+        package = str(Path(__file__).resolve().parents[2])
+        paths = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+        single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+        began = time.monotonic()
+        with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
+            child = subprocess.Popen(command, cwd=folder, env={**os.environ, **single, "PYTHONPATH": paths}, stdin=subprocess.DEVNULL,
+                                     stdout=out, stderr=err, start_new_session=True)
+            self.children.add(child)
+            code, usage = self._wait(child, began)
+            self.children.discard(child)
+            out.seek(0), err.seek(0)
+            text, complaint = out.read(), err.read()
+        scale = 2**20 if sys.platform == "darwin" else 2**10
+        cost = {"exit": code, "wall_s": time.monotonic() - began, "cpu_s": usage.ru_utime + usage.ru_stime, "peak_MiB": usage.ru_maxrss / scale}
+        return cost, text, complaint
+
+    def _wait(self, child: subprocess.Popen, began: float) -> tuple[int, object]:
+        """(exit code, resources used) of the child, killed when its time is over."""
+        while True:
+            pid, status, usage = os.wait4(child.pid, os.WNOHANG)
+            if pid:
+                child.returncode = os.waitstatus_to_exitcode(status)
+                return child.returncode, usage
+            if self.stopped or time.monotonic() - began > PATIENCE * self.limit:
+                child.kill()
+            time.sleep(LOOK)
+
+    def stop(self) -> None:
+        """End every child that this asker started."""
+        self.stopped = True
+        for child in list(self.children):
+            child.kill()

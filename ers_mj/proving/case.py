@@ -1,0 +1,126 @@
+"""One case of the proof: a servo is drawn, something is concealed in it, MuJoCo records it; what is handed out, and the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ers_mj.proving.catalogue import LISTED, OUTSIDE
+from ers_mj.proving.laws import DEG, TABLE_1
+from ers_mj.proving.quick import Run
+from ers_mj.proving.recorder import record
+from ers_mj.proving.servo import draw_servo
+from ers_mj.proving.sizing import ALIKE, TWO_MASS, Ruler, pooled, refit
+from ers_mj.proving.strength import clutter, conceal
+
+KINDS = {"null": 0.25, "single": 0.5, "several": 0.15, "outside": 0.1}
+RATES, WEIGHTS = (200, 250, 500, 1000, 2000), (0.15, 0.1, 0.2, 0.4, 0.15)
+FINE_STEP, ROUGH_STEP = 1.5e-5, 2.5e-5  # [s] between which MuJoCo's step is drawn; the package's own is 5e-5
+ROD = 0.5  # share of the variable ratios that are the rod linkage of mjcf/
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a case is to be: its number from 0, its kind, the labels concealed in it."""
+
+    index: int
+    kind: str
+    labels: tuple[str, ...]
+
+
+def plans(count: int, seed: int) -> list[Plan]:
+    """Kinds in their shares, in random order; singles and outsiders go through their lists in random order."""
+    rng = np.random.default_rng([seed, 0])
+    kinds = [str(kind) for kind in rng.permutation([kind for kind, k in shares(count).items() for _ in range(k)])]
+    lists = {"single": _cycle(rng, LISTED, count), "outside": _cycle(rng, OUTSIDE, count)}
+    out = []
+    for index, kind in enumerate(kinds):
+        labels = (lists[kind].pop(0),) if kind in lists else _several(rng) if kind == "several" else ()
+        out.append(Plan(index, kind, labels))
+    return out
+
+
+def shares(count: int) -> dict[str, int]:
+    """How many cases of each kind, largest remainders first."""
+    exact = {kind: share * count for kind, share in KINDS.items()}
+    out = {kind: int(x) for kind, x in exact.items()}
+    for kind in sorted(KINDS, key=lambda kind: out[kind] - exact[kind])[: count - sum(out.values())]:
+        out[kind] += 1
+    return out
+
+
+def _cycle(rng: np.random.Generator, names: tuple[str, ...], count: int) -> list[str]:
+    return [str(name) for _ in range(count // len(names) + 1) for name in rng.permutation(names)]
+
+
+def _several(rng: np.random.Generator) -> tuple[str, ...]:
+    """Two or three effects that can be told apart and joined in one servo."""
+    many = 2 if rng.random() < 0.7 else 3
+    while True:
+        names = {str(name) for name in rng.choice(LISTED, many, replace=False)}
+        if not any(len(names & alike) > 1 for alike in ALIKE):
+            return tuple(sorted(names))
+
+
+def make(plan: Plan, seed: int) -> tuple[dict[str, str], dict]:
+    """({file name: text} that is handed out, the truth) of one case; it does not depend on the others."""
+    rng = np.random.default_rng([seed, 1, plan.index])
+    servo = draw_servo(rng, 0.0, RATES, WEIGHTS)
+    linkage = "rod" if "variable_ratio" in plan.labels and rng.random() < ROD else "constant"
+    ruler, context = Ruler(servo), servo["context"]
+    concealed = [conceal(rng, ruler, name, context) for name in plan.labels if (name, linkage) != ("variable_ratio", "rod")]
+    faint = clutter(rng, ruler, [*plan.labels, *(TWO_MASS if linkage == "rod" else ())], context)
+    step = float(np.exp(rng.uniform(np.log(FINE_STEP), np.log(ROUGH_STEP))))
+    runs = [_recorded(servo, k, [*concealed, *faint], linkage, step) for k in range(len(servo["records"]))]
+    left = refit(servo, runs, 8)
+    if linkage == "rod":
+        concealed.append({"label": "variable_ratio", "strength_name": "rod linkage of mjcf/", "strength": None, "shape": {"form": "rod"}})
+    files = {"datasheet.toml": _datasheet(servo["sensor"]["sample_rate_hz"])}
+    files |= {f"rec{k + 1}.csv": _csv(r, x, servo["sensor"], rng) for k, (r, x) in enumerate(zip(servo["records"], runs))}
+    return files, _truth(plan, seed, servo, linkage, step, concealed, faint, runs, left)
+
+
+def _recorded(servo: dict, number: int, effects: list[dict], linkage: str, step: float) -> Run:
+    r, sensor = servo["records"][number], servo["sensor"]
+    return record(servo["params"], effects, r["t"], r["u"], number=number, step=step, linkage=linkage, noise=r["noise"],
+                  adc_step=sensor["adc_step_rad"], controller=servo["controller"] if r["closed_loop"] else None, theta_ref=r["ref"], decimals=4)
+
+
+def _truth(plan: Plan, seed: int, servo: dict, linkage: str, step: float, concealed: list, faint: list, runs: list[Run], left: list) -> dict:
+    sensor, rest = servo["sensor"], servo["params"]["theta_0"]
+    records = [{"kind": r["kind"], "closed_loop": r["closed_loop"], "duration_s": float(r["t"][-1]),
+                "travel_deg": [float((x.true.min() - rest) / DEG), float((x.true.max() - rest) / DEG)]}
+               for r, x in zip(servo["records"], runs)]
+    return {"case": f"case-{plan.index + 1:03d}", "kind": plan.kind, "labels": list(plan.labels), "effects": concealed, "clutter": faint,
+            "linkage": linkage, "visibility_after_refit_sigma": pooled(servo, left), "visibility_per_record": left,
+            "true_parameters": servo["params"], "lumped": lumped(servo["params"]), "mujoco_step_s": step, **sensor,
+            "controller": servo["controller"], "records": records, "seed": [seed, plan.index]}
+
+
+def lumped(p: Mapping[str, float]) -> dict[str, float]:
+    """Eq. (6)'s coefficients."""
+    n, J = p["n"], p["J"]
+    return {"a_1": p["k_s"] / J, "a_2": p["B"] / J + n**2 * p["K_t"] * p["K_e"] / (p["R"] * J), "b": n * p["K_t"] / (p["R"] * J),
+            "c_1": p["T_LH"] / J, "c_2": p["F_c"] / J, "theta_0": p["theta_0"]}
+
+
+# -- files ---------------------------------------------------------------------------------------------------
+
+
+def _datasheet(rate: int) -> str:
+    """Table 1 and the sample rate."""
+    return "\n".join(["[parameters]", *(f"{name} = {value}" for name, value in TABLE_1.items()), "", "[recording]", f"sample_rate_hz = {rate}", ""])
+
+
+def _csv(record: dict, run: Run, sensor: dict, rng: np.random.Generator) -> str:
+    """Columns t_s, u_V, theta_rad, then i_A and theta_ref_rad where there are any."""
+    columns = {"t_s": (record["t"], "%.6f"), "u_V": (run.u, "%.4f"), "theta_rad": (run.theta, "%.7f")}
+    if sensor["has_current"]:
+        columns["i_A"] = (run.i_A + sensor["current_sigma_A"] * rng.standard_normal(run.i_A.size), "%.4f")
+    if record["closed_loop"]:
+        columns["theta_ref_rad"] = (record["ref"], "%.5f")
+    form = ",".join(form for _, form in columns.values())
+    rows = zip(*(values.tolist() for values, _ in columns.values()))
+    return "\n".join([",".join(columns), *(form % row for row in rows), ""])

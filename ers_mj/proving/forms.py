@@ -1,0 +1,54 @@
+"""Draws the functional form of a concealed effect so that it is not the one that the effects folder has.
+
+What has one form only (a dead time, a constant torque, a weight on an arm, a reading held) keeps it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from ers_mj.proving.catalogue import CONTACT, DEAD, HYPERBOLIC, LIMIT, LOAD, RIGID, STRIBECK, Effect, between, choose
+
+TEXTBOOK: Mapping[str, Callable[[dict], bool]] = {
+    "presliding": lambda s: s["delta"] == 1.0 and s["v_d_rad_s"] == 0.0,
+    "load_dependent_friction": lambda s: s["form"] == LOAD[0],
+    "quadratic_drag": lambda s: abs(s["exponent"] - 2.0) < 0.05,
+    "position_dependent_friction": lambda s: s["form"].startswith("one spot"),
+    "shaft_compliance": lambda s: s["form"] == "linear",
+    "cogging": lambda s: s["second_harmonic"] == 0.0,
+    "voltage_saturation": lambda s: s["form"] == "hard",
+    "current_limit": lambda s: s["form"] == LIMIT[0],
+    "drive_dead_zone": lambda s: s["form"] != DEAD[3],
+    "supply_sag": lambda s: s["form"] == "motor's current" and s["tau_s"] == 0.0,
+    "hinge_moment_cubic": lambda s: s["form"] == "k3 x^3",
+    "load_disturbance": lambda s: s["form"] == "rect",
+    "periodic_gust": lambda s: s["form"] == "sine",
+    "sensor_lag": lambda s: s["form"] == "first order",
+    "sensor_nonlinearity": lambda s: s["form"] != "loaded potentiometer",
+    "sensor_quantisation": lambda s: s["form"] == "nearest",
+}
+"""Effect -> whether a shape is the package's own form."""
+
+
+def draw_shape(rng: np.random.Generator, effect: Effect, context: dict) -> dict:
+    """A shape of this effect in another form than the package's."""
+    is_textbook = TEXTBOOK.get(effect.name, lambda shape: False)
+    shape = effect.draw(rng, context)
+    while is_textbook(shape):
+        shape = effect.draw(rng, context)
+    return shape | _twist(rng, effect.name)
+
+
+def _twist(rng: np.random.Generator, name: str) -> dict:
+    """What is drawn here beside the catalogue's own shape."""
+    if name == "stribeck":
+        return {"form": choose(rng, STRIBECK[0], HYPERBOLIC)}
+    if name == "asymmetric_friction":
+        return {"growing_to_rad_s": between(rng, 0.1, 1.0)}
+    if name in ("backlash", "end_stop"):
+        return {"form": choose(rng, CONTACT[1], CONTACT[1], RIGID)}
+    if name == "inductance":
+        return {"saturation_per_A": between(rng, 0.03, 0.2)}
+    return {}

@@ -1,0 +1,113 @@
+"""How large a concealed effect shows, in units of the noise: as it stands, and once the effect-free model has been refitted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ers_mj.proving.quick import COARSE, ROUGH, run, simulate
+
+TWO_MASS = {"backlash", "shaft_compliance"}
+STIFF = TWO_MASS | {"presliding", "end_stop", "friction_ageing"}
+"""What needs the finer of the two steps while sizing."""
+ALIKE = ({"bias_torque", "asymmetric_friction"}, {"inductance", "input_delay", "sensor_lag"},
+         {"voltage_saturation", "current_limit", "supply_sag"}, {"cogging", "transmission_ripple"}, TWO_MASS | {"variable_ratio"},
+         {"sensor_quantisation", "sensor_dropout"})
+"""Effects that a pair does not combine: counted as one, or two that the simulator cannot join."""
+
+
+def bare(servo, record, u, step):
+    """(samples,) noise-free angle [rad] of the effect-free servo under u; open loops know it already."""
+    if record["closed_loop"]:
+        return simulate(servo["params"], [], record["t"], u, step=step).clean
+    if step not in record["bare"]:
+        record["bare"][step] = simulate(servo["params"], [], record["t"], u, step=step).clean
+    return record["bare"][step]
+
+
+def sizes(servo, effects, step):
+    """([rms of the difference with/without on the same u over sigma] a record, the runs with)."""
+    out, runs = [], []
+    for number, record in enumerate(servo["records"]):
+        with_it = run(servo, record, number, effects, step)
+        change = with_it.clean - bare(servo, record, with_it.u, step)
+        out.append(float(np.sqrt(np.mean(change**2)) / servo["sensor"]["noise_sigma_eff_rad"]))
+        runs.append(with_it)
+    return out, runs
+
+
+def step_for(effects):
+    """[s] step that does for sizing these effects."""
+    return COARSE if any(effect["label"] in STIFF for effect in effects) else ROUGH
+
+
+def pooled(servo, per_record):
+    """One size of the records' sizes, each record weighing as its length."""
+    weights = [record["t"].size for record in servo["records"]]
+    return float(np.sqrt(np.average(np.square(per_record), weights=weights)))
+
+
+# ---- how much stays visible once the effect-free model is refitted -----------------------------------------------------
+
+FREE = ("J", "B", "K_e", "k_s", "T_LH", "F_c", "theta_0")
+"""What angle and voltage can tell of Eq. (1): R, K_t and the ordinary L are held."""
+
+
+def moved(params, x):
+    """Parameters FREE moved by x: relative, theta_0 in radians."""
+    values = {name: float(params[name] * np.exp(v)) for name, v in zip(FREE[:-1], x)}
+    return params | values | {"theta_0": params["theta_0"] + x[-1]}
+
+
+def refit(servo, runs, rounds=5):
+    """[rms over sigma] a record that the effect-free Eq. (1) leaves: Levenberg-Marquardt on log parameters, noise-free angles."""
+    sigma = servo["sensor"]["noise_sigma_eff_rad"]
+
+    def residuals(x):
+        return [(simulate(moved(servo["params"], x), [], r["t"], with_it.u, step=ROUGH).clean - with_it.clean) / sigma
+                for r, with_it in zip(servo["records"], runs)]
+
+    x, parts, damping = np.zeros(len(FREE)), residuals(np.zeros(len(FREE))), 1e-3
+    for _ in range(rounds):
+        flat = np.concatenate(parts)
+        columns = [(np.concatenate(residuals(x + 1e-4 * e)) - flat) / 1e-4 for e in np.eye(len(FREE))]
+        jac = np.stack(columns, 1)
+        normal, slope = jac.T @ jac, jac.T @ flat
+        for _ in range(4):
+            trial = np.clip(x - np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-9), slope), -1.5, 1.5)
+            trial_parts = residuals(trial)
+            gain = np.sum(flat**2) - np.sum(np.concatenate(trial_parts) ** 2)
+            damping *= 0.2 if gain > 0 else 8.0
+            if gain > 0:
+                x, parts = trial, trial_parts
+                break
+        if gain < 1e-3 * np.sum(flat**2):
+            break
+    return [float(np.sqrt(np.mean(part**2))) for part in parts]
+
+
+class Ruler:
+    """Measures effects on one servo by the quick simulator: at once by projection, or by the refit itself."""
+
+    def __init__(self, servo: dict):
+        self.servo, self.sigma = servo, servo["sensor"]["noise_sigma_eff_rad"]
+        self.runs = [run(servo, record, k, [], ROUGH) for k, record in enumerate(servo["records"])]
+        columns = []
+        for e in np.eye(len(FREE)):
+            pairs = [[simulate(moved(servo["params"], way * 1e-4 * e), [], r["t"], x.u, step=ROUGH).true for way in (1, -1)]
+                     for r, x in zip(servo["records"], self.runs)]
+            columns.append(np.concatenate([up - down for up, down in pairs]))
+        self.basis = np.linalg.qr(np.stack(columns, 1) + 0.0)[0]
+
+    def projected(self, effects: list[dict]) -> float:
+        """[sigma] rms of what the effects move, less what small changes of the parameters can imitate."""
+        step, moved_by = step_for(effects), []
+        for number, record in enumerate(self.servo["records"]):
+            with_it = run(self.servo, record, number, effects, step)
+            moved_by.append(with_it.clean - bare(self.servo, record, with_it.u, step))
+        change = np.concatenate(moved_by)
+        return float(np.sqrt(np.mean((change - self.basis @ (self.basis.T @ change)) ** 2)) / self.sigma)
+
+    def refitted(self, effects: list[dict]) -> float:
+        """[sigma] rms that the refitted effect-free model leaves."""
+        step = step_for(effects)
+        return pooled(self.servo, refit(self.servo, [run(self.servo, r, k, effects, step) for k, r in enumerate(self.servo["records"])], 4))

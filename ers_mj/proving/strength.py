@@ -1,0 +1,75 @@
+"""Finds the strength at which a concealed effect leaves a drawn number of sigmas; whatever is found is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ers_mj.proving.catalogue import CATALOGUE, Effect
+from ers_mj.proving.forms import draw_shape
+from ers_mj.proving.sizing import Ruler
+
+LEAST, MOST = 0.5, 50.0  # [sigma] visibility after refit, drawn log-uniform
+FAINT, FAINTEST, BARELY = 0.2, 0.02, 0.3  # [sigma] clutter: drawn between the first two, left out above the third
+NEAR = 0.15  # of the logarithm of the target
+TRIES = 7
+STRUCTURAL = ("backlash", "shaft_compliance", "variable_ratio", "sensor_dropout", "inductance", "end_stop")
+"""What is no clutter: it changes the mechanism, or shows below the noise."""
+
+
+def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) -> dict:
+    """An effect of drawn shape, its strength tuned to a drawn visibility after refit."""
+    effect = CATALOGUE[name]
+    target = float(np.exp(rng.uniform(np.log(LEAST), np.log(MOST))))
+    shape = draw_shape(rng, effect, context)
+    low, high = np.log(_lowest(effect, ruler)), np.log(effect.high)
+    as_list = lambda s: [{"label": name, "strength": float(np.exp(s)), "shape": shape}]  # noqa: E731
+    guess, _ = nearest(lambda s: ruler.projected(as_list(s)), target, 0.5 * (low + high), low, high, TRIES)
+    found, left = nearest(lambda s: ruler.refitted(as_list(s)), target, guess, low, high, 3)
+    return as_list(found)[0] | {"strength_name": effect.strength_name, "target_sigma": target, "quick_visibility_sigma": left}
+
+
+def _lowest(effect: Effect, ruler: Ruler) -> float:
+    """The least strength that counts; an inductance must stand out from the ordinary one."""
+    return max(effect.low, 2.5 * ruler.servo["params"]["L"]) if effect.name == "inductance" else effect.low
+
+
+def nearest(size: Callable[[float], float], target: float, guess: float, low: float, high: float, tries: int) -> tuple[float, float]:
+    """(logarithm of the strength, its size) nearest to the target: secants on logarithms within brackets."""
+    seen: list[tuple[float, float]] = []
+    for _ in range(tries):
+        miss = float(np.log(max(size(guess), 1e-9) / target))
+        seen.append((guess, miss))
+        if abs(miss) < NEAR or high - low < 1e-3:
+            break
+        low, high = (low, guess) if miss > 0 else (guess, high)
+        guess = _next(seen, low, high)
+    best = min(seen, key=lambda pair: abs(pair[1]))
+    return best[0], float(target * np.exp(best[1]))
+
+
+def _next(seen: list[tuple[float, float]], low: float, high: float) -> float:
+    """By the secant through the last two, or a slope of one; the middle where that leaves the bracket."""
+    x, miss = seen[-1]
+    slope = 1.0
+    if len(seen) > 1 and abs(x - seen[-2][0]) > 1e-9:
+        slope = float(np.clip((miss - seen[-2][1]) / (x - seen[-2][0]), 0.3, 4.0))
+    step = x - float(np.clip(miss / slope, -2.0, 2.0))
+    return step if low < step < high else 0.5 * (low + high)
+
+
+def clutter(rng: np.random.Generator, ruler: Ruler, taken: list[str], context: dict) -> list[dict]:
+    """Up to three further effects that stay well below the noise."""
+    names = [name for name in CATALOGUE if name not in (*STRUCTURAL, *taken)]
+    out = []
+    for name in rng.choice(names, int(rng.integers(4)), replace=False):
+        effect = CATALOGUE[str(name)]
+        target = float(np.exp(rng.uniform(np.log(FAINTEST), np.log(FAINT))))
+        shape = draw_shape(rng, effect, context)
+        as_list = lambda s: [{"label": effect.name, "strength": float(np.exp(s)), "shape": shape}]  # noqa: B023, E731
+        low = np.log(effect.low)
+        found, size = nearest(lambda s: ruler.projected(as_list(s)), target, low, low - 6.0, low + 2.0, 4)
+        if size < BARELY:
+            out.append(as_list(found)[0] | {"strength_name": effect.strength_name, "quick_visibility_sigma": size})
+    return out
