@@ -156,7 +156,7 @@ class Case:
     def _missing(self) -> list[dict]:
         sensors = [self._symptom(name, values) for name, values in self.sensors.items()]
         effects = [self._effect(name) for name in self.model.names]
-        effects.sort(key=lambda e: -self.confirmed.without[e["effect"]].rmse)
+        effects.sort(key=lambda e: -float(np.sum(score(self.confirmed.without[e["effect"]].misfit, 1.0))))
         return effects + sensors
 
     def _effect(self, name: str) -> dict:
