@@ -17,7 +17,8 @@ from ers_mj.advice import next_recording
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import read_datasheet
 from ers_mj.excitation import signal
-from ers_mj.identification import fit, fitted_start
+from ers_mj.identification import fit
+from ers_mj.starts import fitted_start
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped

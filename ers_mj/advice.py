@@ -15,7 +15,8 @@ import numpy as np
 from ers_mj.design import CHANNELS, DESIGN_RATE, SETTLED, VAGUE, Bench, Check, Design, Explanation, Pair, chances, channels, checked, designed, solved
 from ers_mj.effects import BY_NAME
 from ers_mj.excitation import GENTLE, SHARES, Limits, excitations
-from ers_mj.identification import DIFFERENCE, STATES, Fit, Model, tau_of
+from ers_mj.identification import DIFFERENCE, Fit, tau_of
+from ers_mj.model import STATES, Model
 from ers_mj.traces import Blocks, Trace
 
 RIVALS = 2  # explanations beside the leader that an input is designed against, the most probable first

@@ -13,7 +13,9 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.errors import InputError
 from ers_mj.guess import guesses
-from ers_mj.identification import Fit, Model, descend, fit, hopped, tau_of, with_starts, without_spikes
+from ers_mj.identification import Fit, descend, fit, hopped, tau_of
+from ers_mj.model import Model
+from ers_mj.starts import with_starts, without_spikes
 from ers_mj.traces import Trace
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself

@@ -10,7 +10,8 @@ import numpy as np
 
 from ers_mj.baseline import Start
 from ers_mj.evaluation import Fold, Score, folds, paired_p, pooled, recalibrated, refits, scored
-from ers_mj.identification import Fit, Model, fit, polished, score
+from ers_mj.identification import Fit, fit, polished, score
+from ers_mj.model import Model
 from ers_mj.selection import Selection
 from ers_mj.traces import Trace
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME
 from ers_mj.excitation import GENTLE, SHARES, Limits, excitations, signal
-from ers_mj.identification import DIFFERENCE, OBSERVER_RATE, STATES, Fit, Free, Model
+from ers_mj.identification import DIFFERENCE, Fit
+from ers_mj.model import OBSERVER_RATE, STATES, Free, Model
 from ers_mj.traces import Blocks, Trace, make_trace
 
 DESIGN, DESIGN_SAMPLES = 3.0, 3000  # [s] and samples, whichever is longer, of the short recording that inputs are ranked on
@@ -135,7 +136,7 @@ class Bench:
     def further(self, model: Model, trace: Trace) -> dict[str, np.ndarray]:
         """What CHANNELS would read (N,): the motor's torque for the current, the motor's side, and the share of the supply that is left."""
         self.simulations += 1
-        plant, run = model._run(trace, 1, OBSERVER_RATE, None)
+        plant, run = model.staged(trace, 1, OBSERVER_RATE, None)
         path = plant.path(trace.t, trace.u, **run)
         added = plant.read(trace.t, path[:, 0]) - path[:, 0]
         if np.any(added):

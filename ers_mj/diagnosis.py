@@ -14,7 +14,8 @@ from ers_mj.baseline import baseline
 from ers_mj.confirmation import confirmed
 from ers_mj.datasheet import Datasheet
 from ers_mj.document import Case, Diagnosis
-from ers_mj.identification import polished, without_spikes
+from ers_mj.identification import polished
+from ers_mj.starts import without_spikes
 from ers_mj.multibody import Rig
 from ers_mj.recording import Recording
 from ers_mj.selection import select

@@ -17,7 +17,9 @@ from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.evaluation import free_run, pooled, recalibrated, scored
 from ers_mj.evidence import Evidence, RecordView, Rung
-from ers_mj.identification import BASE, STATES, Fit, Model, residuals, score, with_starts
+from ers_mj.identification import Fit, residuals, score
+from ers_mj.model import BASE, STATES, Model
+from ers_mj.starts import with_starts
 from ers_mj.intervals import standard_errors
 from ers_mj.isolability import isolability, probabilities
 from ers_mj.localisation import Place, gather, places, residual_map, shaded

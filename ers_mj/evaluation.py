@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import OBSERVER_RATE, Model, fit, fitted_start, residuals, score, tau_of
+from ers_mj.identification import fit, residuals, score, tau_of
+from ers_mj.model import OBSERVER_RATE, Model
+from ers_mj.starts import fitted_start
 from ers_mj.intervals import standard_errors
 from ers_mj.traces import Blocks, Trace
 

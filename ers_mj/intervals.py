@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from ers_mj.identification import OBSERVER_RATE, Model, jacobian_of, residuals
+from ers_mj.identification import jacobian_of, residuals
+from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.traces import Blocks, Trace
 
 FEWEST_RECORDS = 3

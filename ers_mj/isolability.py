@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.identification import OBSERVER_RATE, Fit, residuals, score
+from ers_mj.identification import Fit, residuals, score
+from ers_mj.model import OBSERVER_RATE
 from ers_mj.selection import PARAMETER_PRICE
 from ers_mj.traces import Trace
 

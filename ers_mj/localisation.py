@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import welch
 
 from ers_mj.evidence import ResidualMap
-from ers_mj.identification import Model
+from ers_mj.model import Model
 from ers_mj.selection import Candidate
 from ers_mj.effects import BY_NAME
 from ers_mj.traces import Trace

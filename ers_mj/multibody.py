@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.evaluation import Fold
-from ers_mj.identification import Model, fitted_start
+from ers_mj.model import Model
+from ers_mj.starts import fitted_start
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped
 from ers_mj.plants.skeletons import bodily

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME, Effect
-from ers_mj.identification import OBSERVER_RATE, STATES, Columns, Fit, Model, converged, fit, hopped, jacobian_of, near_noise, residuals, score, tau_of
+from ers_mj.identification import Fit, converged, fit, hopped, jacobian_of, near_noise, residuals, score, tau_of
+from ers_mj.model import OBSERVER_RATE, STATES, Columns, Model
 from ers_mj.traces import BLOCK, Blocks, Trace
 
 LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error of about 0.3 sigma RMS

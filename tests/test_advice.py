@@ -9,7 +9,8 @@ from ers_mj.commands.diagnose import _input_table
 from ers_mj.datasheet import Datasheet
 from ers_mj.design import SETTLED
 from ers_mj.excitation import SHARES, WAVES, Limits, excitations, signal
-from ers_mj.identification import fit, with_starts
+from ers_mj.identification import fit
+from ers_mj.starts import with_starts
 from ers_mj.isolability import isolability, probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped

@@ -6,7 +6,8 @@ import pytest
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import read_datasheet
 from ers_mj.diagnosis import diagnose
-from ers_mj.identification import OBSERVER_RATE, residuals
+from ers_mj.identification import residuals
+from ers_mj.model import OBSERVER_RATE
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays

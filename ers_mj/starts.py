@@ -1,0 +1,63 @@
+"""What a model says of a recording before it is fitted: its initial state, and the spikes that are no motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ers_mj.model import OBSERVER_RATE, Model
+from ers_mj.symptoms import excursions
+from ers_mj.traces import Trace, parabola_start, start_samples
+
+SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
+SPIKE_SAMPLES, SPIKE_TIME = 5, 0.005  # length of a spike at most, and [s]
+
+
+def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
+    """The traces without the spikes that stand out of the model's error: within SPIKE_TIME a rudder's own error is smooth, however wrong
+    the model is."""
+    out = []
+    for k, trace in enumerate(traces):
+        e = np.where(trace.valid, (trace.y - model.predict(trace, k, OBSERVER_RATE)) / trace.sigma, np.nan)
+        longest = min(SPIKE_SAMPLES, int(SPIKE_TIME / trace.sample_time + 1e-6))
+        out.append(trace.without(excursions(e, 1.0, *SPIKE, longest)) if longest and np.isfinite(e[trace.valid]).all() else trace)
+    return out
+
+
+def with_starts(model: Model, traces: Sequence[Trace]) -> list[Trace]:
+    """The traces with their initial states fitted by the model on the first 50 ms or 10 samples of each."""
+    return [replace(trace, start=fitted_start(model, trace, k)) for k, trace in enumerate(traces)]
+
+
+def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, float]:
+    """(output, speed) at the first sample by least squares of a free run on the first 50 ms or 10 samples.
+
+    The search begins at rest and at a parabola's speed; rest is kept unless a speed buys more than 9 sigma^2.
+    """
+    n = start_samples(trace.t)
+    head = trace.part(0, n)
+
+    def misses(x):
+        e = np.where(head.valid, head.y - model.predict(head, record, start=x), 0.0) / trace.sigma
+        return e if np.all(np.isfinite(e)) else np.full(n, 1e9)
+
+    def settle(x, moving):
+        step = np.array([0.1 * trace.sigma, trace.sigma / (trace.t[n - 1] - trace.t[0])])[:1 + moving]
+        e = misses(x)
+        for _ in range(6):
+            j = np.column_stack([(misses(x + np.eye(2)[k] * step[k]) - e) / step[k] for k in range(1 + moving)])
+            move = np.zeros(2)
+            move[:1 + moving] = -np.linalg.lstsq(j, e, rcond=1e-9)[0]
+            trial = misses(x + move)
+            if not trial @ trial < e @ e:
+                break
+            x, e = x + move, trial
+        return float(e @ e), x
+
+    first = float(np.mean(head.y[head.valid][:3])) if head.valid.any() else trace.start[0]
+    at_rest = settle(np.array([first, 0.0]), 0)
+    moving = min((settle(np.array(s, float), 1) for s in (trace.start, parabola_start(head.t, head.y))), key=lambda f: f[0])
+    cost, x = at_rest if at_rest[0] <= moving[0] + 9.0 else moving
+    return float(x[0]), float(x[1])
