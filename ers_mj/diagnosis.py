@@ -15,6 +15,7 @@ from ers_mj.confirmation import confirmed
 from ers_mj.datasheet import Datasheet
 from ers_mj.document import Case, Diagnosis
 from ers_mj.identification import polished
+from ers_mj.model import MOST_TAU, Model
 from ers_mj.starts import without_spikes
 from ers_mj.multibody import Rig
 from ers_mj.recording import Recording
@@ -22,6 +23,7 @@ from ers_mj.selection import select
 from ers_mj.traces import Trace, trace_of
 
 FEWEST_LOST = 3  # dropouts from which a sensor is said to have them
+AT_BOUND = 0.95  # share of the most that the baseline allows of a known inductance, from which it may be more than an ordinary one
 COARSE = 1 / 300  # a converter whose step is more than this share of the travel is an effect, not an ordinary one
 
 Progress = Callable[[str, float], None]
@@ -49,7 +51,7 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     progress("fitting the baseline", 0.03)
     start = baseline(traces, datasheet, first.output_unit == "rad", jobs)
     sensors = _symptoms(start.traces, 2 * start.fit.model.scales.position)
-    chosen = select(start.fit, start.traces, anchors=start.anchors, jobs=jobs, progress=progress)
+    chosen = select(start.fit, start.traces, anchors=start.anchors, exclude=_ordinary(start.fit.model), jobs=jobs, progress=progress)
     start = replace(start, fit=polished(start.fit, start.traces))
     chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
     progress("judging on held-out data", 0.75)
@@ -62,6 +64,12 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     progress("locating", 0.92)
     case = Case(recordings, list(holdout), datasheet, start, selection, judged, sensors, seed, rig, multibody)
     return case.told(held)
+
+
+def _ordinary(model: Model) -> tuple[str, ...]:
+    """Effects that are none here: a winding whose inductance a datasheet gives has it, as long as it is not about twice that."""
+    known = model.scales.tau_e_datasheet
+    return ("inductance",) if known and model.values["tau_e"] < AT_BOUND * MOST_TAU * known else ()
 
 
 def _symptoms(traces: Sequence[Trace], travel: float) -> dict[str, np.ndarray]:

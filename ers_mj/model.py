@@ -21,6 +21,7 @@ STATES = ("gain", "offset", "friction_level")
 STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
 NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
+LEAST_TAU, MOST_TAU = 0.1, 2.0  # of a datasheet's electrical time constant, between which the baseline's is an ordinary one
 FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
 CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 
@@ -126,7 +127,7 @@ class Model:
 
     def _tau_bounds(self) -> tuple[float, float]:
         known = self.scales.tau_e_datasheet
-        return (0.1 * known, 2.0 * known) if known else (1e-6, 1.0)
+        return (LEAST_TAU * known, MOST_TAU * known) if known else (1e-6, 1.0)
 
     def vector(self, layout: Sequence[Free]) -> np.ndarray:
         """The fitted numbers, transformed (logarithm of positive ones, others over their scale)."""

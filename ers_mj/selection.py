@@ -22,6 +22,7 @@ from ers_mj.traces import BLOCK, Blocks, Trace
 LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error of about 0.3 sigma RMS
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
+ONCE = 6.0  # of C that suffices where an effect acts once, in so few blocks that their z-score cannot be large
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 MOST_SENT, LATER = 10, 5  # candidates of the screening that are refitted at most, in the first round and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
@@ -284,7 +285,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
             pace = max(PACE * least, PACE_SHARE * leading)
             ends = dict(pool.map(onward, ((name, best[name]) for name in running)))
-            running = [name for name in running if total(best[name]) - total(ends[name]) > pace]
+            running = [name for name in running if total(best[name]) - total(ends[name]) > pace and not (name in BY_NAME and BY_NAME[name].dear)]
             best |= {name: found for name, found in ends.items() if total(found) < total(best[name])}
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
@@ -344,14 +345,22 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         least = max(LEAST_GAIN * blocks, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
         rounds.append(tuple(ranked))
-        if not ranked or ranked[0].gain < least or ranked[0].z < LEAST_Z:
+        if not ranked or ranked[0].gain < least or not _sure(ranked[0]):
             break
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
-        current, _ = hopped(fit(current.model, traces, tau=tau, steps=20), traces, tau, jobs)
+        current = fit(current.model, traces, tau=tau, steps=20)
+        if not any(BY_NAME[name].dear for name in current.model.names):
+            current, _ = hopped(current, traces, tau, jobs)
         if near_noise(current):
             current = _exchanged(current, rounds[:-1], traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau)
+
+
+def _sure(candidate: Candidate) -> bool:
+    """Whether the gain is more than chance: over the blocks, or, of what acts in a few blocks once, by its size."""
+    once = candidate.name in BY_NAME and any(p.name == "record" for p in BY_NAME[candidate.name].parameters)
+    return candidate.z >= LEAST_Z or (once and candidate.gain >= ONCE)
 
 
 def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
