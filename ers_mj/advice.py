@@ -56,7 +56,7 @@ def next_recording(leader: tuple[str, Fit], rivals: Sequence[tuple[str, Fit, flo
 
 def _once(model: Model) -> bool:
     """Whether the model tells of what happened once and will not again."""
-    return any(p.name == "record" for name in model.names for p in BY_NAME[name].parameters)
+    return any(BY_NAME[name].once for name in model.names)
 
 
 # -- where explanations are left --------------------------------------------------------------------------------------

@@ -75,7 +75,7 @@ def settled(model: Model, trace: Trace, tau: float) -> Model:
 
 def _strange(model: Model) -> Model:
     """The model as a recording of another day gets it: what happened once does not happen again."""
-    once = [name for name in model.local or {} if any(p.name == "record" for p in BY_NAME[name].parameters)]
+    once = [name for name in model.local or {} if BY_NAME[name].once]
     for name in once:
         model = model.without_effect(name)
     return model

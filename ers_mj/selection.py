@@ -22,7 +22,7 @@ from ers_mj.traces import BLOCK, Blocks, Trace
 LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error of about 0.3 sigma RMS
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
-ONCE = 6.0  # of C that suffices where an effect acts once, in so few blocks that their z-score cannot be large
+ONCE = 8.0  # of C that suffices where an effect acts once, in so few blocks that their z-score cannot be large
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 MOST_SENT, LATER = 10, 5  # candidates of the screening that are refitted at most, in the first round and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
@@ -359,8 +359,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
 
 def _sure(candidate: Candidate) -> bool:
     """Whether the gain is more than chance: over the blocks, or, of what acts in a few blocks once, by its size."""
-    once = candidate.name in BY_NAME and any(p.name == "record" for p in BY_NAME[candidate.name].parameters)
-    return candidate.z >= LEAST_Z or (once and candidate.gain >= ONCE)
+    return candidate.z >= LEAST_Z or (candidate.name in BY_NAME and BY_NAME[candidate.name].once and candidate.gain >= ONCE)
 
 
 def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:

@@ -159,6 +159,11 @@ class Effect:
         return any(p.per_record for p in self.parameters)
 
     @property
+    def once(self) -> bool:
+        """Whether it acts in one recording only."""
+        return any(p.name == "record" for p in self.parameters)
+
+    @property
     def local_columns(self) -> list[int]:
         """Which of its parameters are ``per_record``."""
         return [k for k, p in enumerate(self.parameters) if p.per_record]
