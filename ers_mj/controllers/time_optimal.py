@@ -14,14 +14,17 @@ import math
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from ers_mj.controllers.base import SIDE_BAND, STICK_BAND, Controller, State
+from ers_mj.controllers.base import SIDE_BAND, STICK_BAND, Aim, Controller, State
 
 NOISE = math.radians(0.01)  # [rad] of the measurement, for which the observer is tuned
-RATTLE = 300.0  # [rad/s^2/sqrt(Hz)] acceleration that the model does not tell, white
+RATTLE = 10.0  # [rad/s^2/sqrt(Hz)] acceleration that the model does not tell, white
 DRIFT = 300.0  # [rad/s^3/sqrt(Hz)] by which the disturbance wanders
-SPEED_GAIN, CLOSING = 0.45, 0.45  # speed loop [1/s] as a share of the sample rate; closing rate lambda as a share of it
-MOST_GAIN = 500.0  # [1/s] of the speed loop, whatever the sample rate
-TRUST = 0.85  # alpha: share of the braking that the profile counts on
+SPEED_GAIN, CLOSING = 0.4, 0.45  # k_w as a share of the sample rate; lambda as a share of k_w
+MOST_GAIN = 500.0  # k_w [1/s] whatever the sample rate
+TRUST = 0.9  # alpha: share of the braking that the profile counts on
+ROOM = 0.05  # share of the full voltage that the reference must leave for the law to have its whole stiffness
+LAZY, BOOST = 20.0, 1.3  # lambda [1/s], and by how much theta_r'' is raised, where it leaves none: the phase can be kept, the amplitude cannot
+MEMORY = 0.3  # [s] over which the peak of what the reference needs is forgotten
 SURE_SLIP = 0.5  # [rad/s] above which the estimated speed tells the friction's sign
 
 
@@ -35,6 +38,7 @@ class TimeOptimal(Controller):
         h = 1.0 / rate_hz
         self.k_w = min(SPEED_GAIN * rate_hz, MOST_GAIN)
         self.closing = CLOSING * self.k_w
+        self._forget = math.exp(-h / MEMORY)
         whole = expm(h * np.array([[0.0, 1.0, 0.0], [-servo.a_1, -servo.a_2, 1.0], [0.0, 0.0, 0.0]]))
         (self._f11, self._f12, self._g1), (self._f21, self._f22, self._g2) = whole[:2].tolist()
         spread = np.diag([0.0, RATTLE**2 * h, DRIFT**2 * h])
@@ -45,7 +49,7 @@ class TimeOptimal(Controller):
 
     def reset(self, theta: float) -> None:
         super().reset(theta)
-        self._theta, self._speed, self._d, self._alpha = theta, 0.0, 0.0, None
+        self._theta, self._speed, self._d, self._alpha, self._need = theta, 0.0, 0.0, None, 0.0
 
     # -- the observer --
 
@@ -80,11 +84,20 @@ class TimeOptimal(Controller):
         servo = self.servo
         alpha = s.aim.alpha if self._alpha is None else s.aim.alpha + 0.5 * (s.aim.alpha - self._alpha)  # at mid-sample, extrapolated
         self._alpha = s.aim.alpha
-        wanted = self._profile(s)
-        a = alpha + self.k_w * (wanted + s.x3)
-        omega = s.omega + 0.5 * self.h * a
-        theta = s.theta + 0.5 * self.h * s.omega
+        spare = self._spare(s.aim)
+        full = abs(servo.b) * self.u_max
+        free = min(max(spare / (ROOM * full), 0.0), 1.0)
+        wanted = _profile(s.x2, LAZY + free * (self.closing - LAZY), TRUST * max(spare, ROOM * full))
+        a = alpha * (BOOST + free * (1.0 - BOOST)) + self.k_w * (wanted + s.x3)
+        omega, theta = s.omega + 0.5 * self.h * a, s.theta + 0.5 * self.h * s.omega
         return (a + servo.spring(theta) + servo.a_2 * omega + servo.c_2 * self._slip(s, wanted) - self._d) / servo.b
+
+    def _spare(self, aim: Aim) -> float:
+        """Acceleration [rad/s^2] that the reference's own needs leave of the full voltage, their peak forgotten over MEMORY."""
+        servo = self.servo
+        slip = math.copysign(servo.c_2, aim.omega) if aim.omega else 0.0
+        self._need = max(abs(aim.alpha + servo.spring(aim.theta) + servo.a_2 * aim.omega + slip), self._need * self._forget)
+        return abs(servo.b) * self.u_max - self._need
 
     def _slip(self, s: State, wanted: float) -> float:
         """The friction's sign: of the speed where that is sure, else of the motion that is wanted."""
@@ -92,13 +105,9 @@ class TimeOptimal(Controller):
             return math.copysign(1.0, s.omega)
         return min(max((s.aim.omega + wanted) / (self.closing * STICK_BAND), -1.0), 1.0)
 
-    def _profile(self, s: State) -> float:
-        """v(x2) [rad/s]."""
-        servo, way = self.servo, math.copysign(1.0, s.x2)
-        phi = s.theta - servo.theta_0
-        A = abs(servo.b) * self.u_max + servo.c_2 + way * (servo.a_1 * phi + servo.c_1 * math.copysign(1.0, phi) + s.aim.alpha - self._d)
-        A = TRUST * max(A, 0.2 * abs(servo.b) * self.u_max)
-        reach = 0.5 * A / self.closing**2
-        if abs(s.x2) <= reach:
-            return self.closing * s.x2
-        return way * (math.sqrt(2.0 * A * abs(s.x2)) - 0.5 * A / self.closing)
+
+def _profile(x2: float, closing: float, A: float) -> float:
+    """v(x2) [rad/s], of the rate near the reference [1/s] and the braking far from it [rad/s^2]."""
+    if abs(x2) <= 0.5 * A / closing**2:
+        return closing * x2
+    return math.copysign(math.sqrt(2.0 * A * abs(x2)) - 0.5 * A / closing, x2)
