@@ -6,7 +6,7 @@ import importlib
 import pkgutil
 
 from ers_mj.controllers.base import Aim, Controller, Servo, State
-from ers_mj.controllers.finite_time import FiniteTime, Gains
+from ers_mj.controllers.finite_time import FiniteTime, Gains, parse_gains
 
 FIRST = ("ftrc", "ftrc-literal", "pid", "pid-ff", "hinf")  # the order in which they are told; others follow by name
 
@@ -23,4 +23,4 @@ def _members() -> dict[str, type[Controller]]:
 
 CONTROLLERS = _members()
 
-__all__ = ["CONTROLLERS", "Aim", "Controller", "FiniteTime", "Gains", "Servo", "State"]
+__all__ = ["CONTROLLERS", "Aim", "Controller", "FiniteTime", "Gains", "Servo", "State", "parse_gains"]

@@ -13,6 +13,9 @@ def sig(x: float, p: float) -> float:
     return abs(x) ** p if x >= 0 else -(abs(x) ** p)
 
 
+NAMES = ("q", "k_1", "k_2", "k_3", "l", *(f"gamma_{k}" for k in range(1, 8)))
+
+
 @dataclass(frozen=True)
 class Gains:
     """Eq. (40), with the odd/odd q that the text demands and that the printed m_1..m_3 belong to.
@@ -34,7 +37,35 @@ class Gains:
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} = {getattr(self, name):g} is not above zero")
         if len(self.gamma) != 7 or min(self.gamma) <= 0:
-            raise InputError(f"gamma has {len(self.gamma)} values, seven above zero were expected")
+            raise InputError(f"gamma is {', '.join(f'{x:g}' for x in self.gamma)}, seven values above zero were expected")
+
+    def as_document(self) -> dict[str, float | str]:
+        """By name."""
+        return {"q": str(self.q), "k_1": self.k_1, "k_2": self.k_2, "k_3": self.k_3, "l": self.l,
+                **{f"gamma_{k}": x for k, x in enumerate(self.gamma, start=1)}}
+
+
+def parse_gains(text: str) -> Gains:
+    """ "q=97/99,k_2=60,k_3=630" -> Gains, what is not given as in Eq. (40); gamma_1 to gamma_7 one by one.
+
+    Raises:
+        InputError: not of this form, or gains that no law can have.
+    """
+    given: dict = {}
+    gamma = list(Gains.gamma)
+    for pair in filter(None, (part.strip() for part in text.split(","))):
+        key, mark, value = (part.strip() for part in pair.partition("="))
+        if key not in NAMES:
+            raise InputError(f"--gains: there is no gain {key[:40]!r}; there are {', '.join(NAMES)}")
+        try:
+            x = Fraction(value)
+        except (ValueError, ZeroDivisionError):
+            raise InputError(f"--gains: {key} is {value[:40]!r}, a number or a fraction was expected, as in q=97/99") from None
+        if key.startswith("gamma_"):
+            gamma[int(key[6:]) - 1] = float(x)
+        else:
+            given[key] = x if key == "q" else float(x)
+    return Gains(**given, gamma=tuple(gamma))
 
 
 class FiniteTime:

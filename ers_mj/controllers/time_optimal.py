@@ -17,8 +17,8 @@ from scipy.linalg import expm, solve_discrete_are
 from ers_mj.controllers.base import SIDE_BAND, STICK_BAND, Aim, Controller, State
 
 NOISE = math.radians(0.01)  # [rad] of the measurement, for which the observer is tuned
-RATTLE = 10.0  # [rad/s^2/sqrt(Hz)] acceleration that the model does not tell, white
-DRIFT = 300.0  # [rad/s^3/sqrt(Hz)] by which the disturbance wanders
+RATTLE = 4.0  # [rad/s^2/sqrt(Hz)] acceleration that the model does not tell, white
+DRIFT = 100.0  # [rad/s^3/sqrt(Hz)] by which the disturbance wanders
 SPEED_GAIN, CLOSING = 0.4, 0.45  # k_w as a share of the sample rate; lambda as a share of k_w
 MOST_GAIN = 500.0  # k_w [1/s] whatever the sample rate
 TRUST = 0.9  # alpha: share of the braking that the profile counts on
