@@ -9,8 +9,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
+import numpy as np
+
 from ers_mj.closed_loop import Run, Sampled, Sensor, close
-from ers_mj.controllers import CONTROLLERS, Servo
+from ers_mj.controllers import CONTROLLERS, Gains, Servo
 from ers_mj.controllers.base import FILTER_S
 from ers_mj.datasheet import Datasheet
 from ers_mj.errors import InputError
@@ -36,11 +38,12 @@ class Conditions:
     noise: float = 0.0
     seed: int = 0
     filter_s: float = FILTER_S
+    gains: Gains = Gains()
     effects: EffectSettings = ()
 
     def as_document(self) -> dict:
         """As the key `conditions`."""
-        plain = asdict(self) | {"effects": [{"name": name, "parameters": dict(values)} for name, values in self.effects]}
+        plain = asdict(self) | {"gains": self.gains.as_document(), "effects": [{"name": name, "parameters": dict(values)} for name, values in self.effects]}
         units = {"amplitude": "amplitude_rad", "start": "start_rad", "u_max": "u_max_V", "gap": "gap_rad", "noise": "noise_rad"}
         return {units.get(key, key): x for key, x in plain.items()}
 
@@ -100,19 +103,29 @@ def try_out(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[s
         InputError: the datasheet, an effect or a reference cannot be used.
     """
     known = Servo.of(design or datasheet)
-    aims, trials = references(cases, known, conditions), []
+    ampere = datasheet.to_lumped().get("ampere")
     built = {name: build_plant(datasheet, plant=name, effects=conditions.effects, gap=conditions.gap, inductance=conditions.inductance,
                                linkage=conditions.linkage if name == "mujoco" else "constant") for name in plants}
-    wanted = [(aim, plant, controller) for aim in aims for plant in plants for controller in controllers]
+    wanted = [(aim, plant, controller) for aim in references(cases, known, conditions) for plant in plants for controller in controllers]
+    trials = []
     for k, (aim, plant, controller) in enumerate(wanted):
         progress(f"{controller} on the {plant} plant, {aim.name}", k / len(wanted))
-        run = _run(built[plant], controller, known, aim, conditions)
-        trials.append(Trial(controller, plant, aim.name, run, measured(run, conditions.u_max, datasheet.to_lumped().get("ampere"))))
+        run = run_once(built[plant], controller, known, aim, conditions)
+        trials.append(Trial(controller, plant, aim.name, run, measured(run, conditions.u_max, ampere)))
     return trials
 
 
-def _run(plant: Plant, controller: str, known: Servo, aim: Reference, conditions: Conditions) -> Run:
-    law = CONTROLLERS[controller](known, aim.rate_hz, conditions.u_max, filter_s=conditions.filter_s)
+def run_once(plant: Plant, controller: str, known: Servo, aim: Reference, conditions: Conditions) -> Run:
+    """One controller, new, on one plant, from rest where the conditions or the reference's file have it begin."""
+    law = CONTROLLERS[controller]
+    options = {"gains": conditions.gains} if law.takes_gains else {}
+    law = law(known, aim.rate_hz, conditions.u_max, filter_s=conditions.filter_s, **options)
     start = conditions.start if aim.name in CASES else float(aim.theta[0])
     law.reset(start)
     return close(law, sampled(plant, aim.rate_hz, (start, 0.0)), Sensor(plant.effects, aim.t, conditions.noise, conditions.seed), aim, plant.terminal)
+
+
+def needed(aim: Reference, known: Servo) -> float:
+    """The largest voltage [V] that a reference asks for where it does not jump, by the model alone."""
+    force = aim.alpha + known.a_1 * (aim.theta - known.theta_0) + known.c_1 * np.sign(aim.theta - known.theta_0) + known.a_2 * aim.omega + known.c_2 * np.sign(aim.omega)
+    return float(np.abs(force).max() / abs(known.b))

@@ -96,6 +96,7 @@ class Controller:
 
     name: ClassVar[str] = ""
     sentence: ClassVar[str] = ""
+    takes_gains: ClassVar[bool] = False  # whether the law has the finite-time gains, as the keyword ``gains``
 
     def __init__(self, servo: Servo, rate_hz: float, u_max: float = 24.0, filter_s: float = FILTER_S):
         self.servo, self.h, self.u_max = servo, 1.0 / rate_hz, u_max
