@@ -81,7 +81,7 @@ def named(name: str, amplitude: float, start: float, rate_hz: float) -> Referenc
         InputError: the rate makes too few or too many samples of it.
     """
     shape, duration = CASES[name]
-    n = round(duration * rate_hz) + 1
+    n = round(duration * rate_hz)
     if not 100 <= n <= MOST_SAMPLES:
         raise InputError(f"{duration:g} s at {rate_hz:g} Hz are {n} samples, 100 to {MOST_SAMPLES} were expected")
     t = np.arange(n) / rate_hz

@@ -2,9 +2,11 @@
 
     measurement -> Kalman observer of (theta, w, d) with stick and slip -> wanted speed -> wanted acceleration -> inverse model -> voltage
 
-The wanted speed of closing follows Workman's proximate time-optimal servo: v(x2) = lambda x2 near the reference, sqrt(2 alpha A |x2|) - v_s far
-from it, joined with equal slope; A is what the drive can brake at the full voltage with the help of friction, spring and preload. The
-disturbance d [rad/s^2] takes the integral's place. Causal: of the reference it knows what every other law here knows.
+The wanted speed of closing is Workman's proximate time-optimal profile: v(x2) = lambda x2 near the reference, sqrt(2 alpha A |x2|) - v_s far from
+it, joined with equal slope; A is what brakes with the voltage that the reference's own needs leave, and with friction and damping. A
+reference that leaves none is followed in phase, its acceleration raised and its position let go: the amplitude cannot be had. The
+disturbance d [rad/s^2] takes the integral's place. Causal: of the reference it knows what every other law here knows. Its
+observer stands where the others have the filter of ``filter_s``.
 """
 
 from __future__ import annotations
@@ -19,9 +21,9 @@ from ers_mj.controllers.base import SIDE_BAND, STICK_BAND, Aim, Controller, Stat
 NOISE = math.radians(0.01)  # [rad] of the measurement, for which the observer is tuned
 RATTLE = 4.0  # [rad/s^2/sqrt(Hz)] acceleration that the model does not tell, white
 DRIFT = 100.0  # [rad/s^3/sqrt(Hz)] by which the disturbance wanders
-SPEED_GAIN, CLOSING = 0.4, 0.45  # k_w as a share of the sample rate; lambda as a share of k_w
+SPEED_GAIN, CLOSING = 0.4, 0.5  # k_w as a share of the sample rate; lambda as a share of k_w
 MOST_GAIN = 500.0  # k_w [1/s] whatever the sample rate
-TRUST = 0.9  # alpha: share of the braking that the profile counts on
+TRUST = 0.95  # alpha: share of the braking that the profile counts on
 ROOM = 0.05  # share of the full voltage that the reference must leave for the law to have its whole stiffness
 LAZY, BOOST = 20.0, 1.3  # lambda [1/s], and by how much theta_r'' is raised, where it leaves none: the phase can be kept, the amplitude cannot
 MEMORY = 0.3  # [s] over which the peak of what the reference needs is forgotten
@@ -87,7 +89,8 @@ class TimeOptimal(Controller):
         spare = self._spare(s.aim)
         full = abs(servo.b) * self.u_max
         free = min(max(spare / (ROOM * full), 0.0), 1.0)
-        wanted = _profile(s.x2, LAZY + free * (self.closing - LAZY), TRUST * max(spare, ROOM * full))
+        aid = servo.c_2 + 0.5 * servo.a_2 * abs(s.omega)  # what friction and damping brake, the speed's half on the way down
+        wanted = _profile(s.x2, LAZY + free * (self.closing - LAZY), TRUST * max(spare + free * aid, ROOM * full))
         a = alpha * (BOOST + free * (1.0 - BOOST)) + self.k_w * (wanted + s.x3)
         omega, theta = s.omega + 0.5 * self.h * a, s.theta + 0.5 * self.h * s.omega
         return (a + servo.spring(theta) + servo.a_2 * omega + servo.c_2 * self._slip(s, wanted) - self._d) / servo.b
