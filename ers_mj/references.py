@@ -114,6 +114,7 @@ def read_reference(path: str | os.PathLike, servo: Servo, u_max: float) -> Refer
     alpha = np.diff(omega, prepend=omega[0]) / h
     alpha[np.abs(alpha) > abs(servo.b) * u_max] = 0.0
     alpha[jump | np.roll(jump, 1)] = 0.0
+    alpha[:2] = 0.0  # the first speed is not known before the second sample
     return Reference(file.stem, t, theta, omega, alpha, tuple(int(k) for k in np.flatnonzero(jump)))
 
 

@@ -17,6 +17,7 @@ from ers_mj.controllers.base import FILTER_S
 from ers_mj.datasheet import Datasheet
 from ers_mj.errors import InputError
 from ers_mj.measures import Measures, measured
+from ers_mj.plants.reduced import ReducedModel
 from ers_mj.references import CASES, Reference, named, read_reference
 from ers_mj.simulation import EffectSettings, Plant, build_plant
 
@@ -65,13 +66,13 @@ class Trial:
 
 def sampled(plant: Plant, rate_hz: float, start: tuple[float, float]) -> Sampled:
     """A plant that is given its voltage sample by sample."""
-    if hasattr(plant, "model"):
-        from ers_mj.plants.sampled_mujoco import SampledMuJoCo
+    if isinstance(plant, ReducedModel):
+        from ers_mj.plants.sampled_reduced import SampledReduced
 
-        return SampledMuJoCo(plant, rate_hz, start)
-    from ers_mj.plants.sampled_reduced import SampledReduced
+        return SampledReduced(plant, rate_hz, start)
+    from ers_mj.plants.sampled_mujoco import SampledMuJoCo
 
-    return SampledReduced(plant, rate_hz, start)
+    return SampledMuJoCo(plant, rate_hz, start)
 
 
 def references(cases: Sequence[str], servo: Servo, conditions: Conditions) -> list[Reference]:

@@ -60,9 +60,9 @@ def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | N
         voltage.plot(*decimate(t, trial.run.u[inside], points), color=shade, linewidth=0.8)
         if np.isfinite(off).any():
             largest.append(float(np.nanmax(np.abs(off))))
-    low, high = np.degrees([reference.theta.min(), reference.theta.max()])
-    room = 0.35 * max(high - low, 1e-6)
-    angle.set_ylim(min(low, np.degrees(reference.theta[0])) - room, high + room)
+    ends = np.degrees([*reference.theta[inside], trials[0].run.theta[inside][0]])
+    room = 0.2 * (np.ptp(ends) or 1.0)
+    angle.set_ylim(ends.min() - room, ends.max() + room)
     if largest:
         limit = min(1.05 * max(largest), ROOMY * float(np.median(largest))) or 1.0
         error.set_ylim(-limit, limit)

@@ -29,20 +29,20 @@ def trial_page(document: Mapping, trials: Sequence[Trial]) -> str:
 
 def _header(document: Mapping, trials: Sequence[Trial]) -> str:
     tiles = []
-    for case, plant in list(dict.fromkeys((t.case, t.plant) for t in trials))[:4]:
-        ran = [t for t in trials if (t.case, t.plant) == (case, plant) and t.measures.stable]
+    for case in list(dict.fromkeys(t.case for t in trials))[:4]:
+        ran = [t for t in trials if (t.case, t.plant) == (case, trials[0].plant) and t.measures.stable]
         if ran:
             best = min(ran, key=lambda t: t.measures.rmse_rad)
-            tiles.append((page.text(f"{case}, {plant}: {best.controller}"), f'<span class="a">{degrees(best.measures.rmse_rad)}</span>'))
+            tiles.append((page.text(f"{case}, {best.plant}: {best.controller}"), f'<span class="a">{degrees(best.measures.rmse_rad)}</span>'))
     return page.header("consistent", "Controllers on trial", "ers trial", document["sentence"], tiles)
 
 
 def _claims(trials: Sequence[Trial]) -> str:
-    rows = [((page.text(c.claim), page.text(c.where), page.text(c.measured), f"<b>{VERDICT[c.holds]}</b>" if c.holds is False else VERDICT[c.holds]), "")
+    rows = [((page.text(c.claim), page.text(c.case), page.text(c.measured), f"<b>{VERDICT[c.holds]}</b>" if c.holds is False else VERDICT[c.holds]), "")
             for c in claims(trials)]
     lead = ("Claims for FTRC. What it gains over PID and H-infinity comes from the feed-forward: the line with PID beside the same feed-forward tells how much "
             "is left to the law.")
-    return page.section("The paper's claims", lead, page.table(["claim", "run", "measured", ""], rows))
+    return page.section("The paper's claims", lead, page.table(["claim", "case", "measured", ""], rows))
 
 
 def _group(trials: Sequence[Trial]) -> str:
@@ -58,7 +58,7 @@ def _cells(trial: Trial) -> tuple[str, ...]:
     if not m.stable:
         return (page.text(trial.controller), "unstable", *[NONE] * (len(HEADS) - 2))
     settles = "never" if m.settling_time_s is None else f"{1e3 * m.settling_time_s:.1f} ms"
-    return (page.text(trial.controller), settles, _with(m.overshoot_pct, "%"), degrees(m.steady_state_error_rad), degrees(m.rmse_rad), _with(m.peak_u_V, "V"),
+    return (page.text(trial.controller), settles, NONE if m.overshoot_pct is None else f"{m.overshoot_pct:.2f} %", degrees(m.steady_state_error_rad), degrees(m.rmse_rad), _with(m.peak_u_V, "V"),
             _with(m.rms_u_V, "V"), _with(m.chatter_V, "V"), _with(m.energy_J, "J"))
 
 
