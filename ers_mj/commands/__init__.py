@@ -5,4 +5,4 @@ What is slow to import is imported inside `run`, so that `ers --help` is quick.
 
 from ers_mj.commands import demo, diagnose, gains, prove, simulate, trial, validate, view
 
-COMMANDS = (demo, diagnose, simulate, validate, trial, gains, view, prove)
+COMMANDS = (demo, diagnose, simulate, validate, view, prove, trial, gains)
