@@ -128,5 +128,6 @@ def run_once(plant: Plant, controller: str, known: Servo, aim: Reference, condit
 
 def needed(aim: Reference, known: Servo) -> float:
     """The largest voltage [V] that a reference asks for where it does not jump, by the model alone."""
-    force = aim.alpha + known.a_1 * (aim.theta - known.theta_0) + known.c_1 * np.sign(aim.theta - known.theta_0) + known.a_2 * aim.omega + known.c_2 * np.sign(aim.omega)
-    return float(np.abs(force).max() / abs(known.b))
+    phi, omega = aim.theta - known.theta_0, aim.omega
+    wanted = aim.alpha + known.a_1 * phi + known.c_1 * np.sign(phi) + known.a_2 * omega + known.c_2 * np.sign(omega)
+    return float(np.abs(wanted).max() / abs(known.b))

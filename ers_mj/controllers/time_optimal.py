@@ -24,8 +24,10 @@ DRIFT = 100.0  # [rad/s^3/sqrt(Hz)] by which the disturbance wanders
 SPEED_GAIN, CLOSING = 0.4, 0.5  # k_w as a share of the sample rate; lambda as a share of k_w
 MOST_GAIN = 500.0  # k_w [1/s] whatever the sample rate
 TRUST = 0.95  # alpha: share of the braking that the profile counts on
-ROOM = 0.05  # share of the full voltage that the reference must leave for the law to have its whole stiffness
-LAZY, BOOST = 20.0, 1.3  # lambda [1/s], and by how much theta_r'' is raised, where it leaves none: the phase can be kept, the amplitude cannot
+ROOM = 0.05  # share of the full voltage that the braking counts on at least
+SLACK = 0.05  # share of the full voltage by which a reference's needs exceed it when the position is let go
+LAZY = 10.0  # lambda [1/s] from there on: the phase can be kept, the amplitude cannot
+BOOST = 0.3  # by how much theta_r'' is raised at most: by the share that its needs exceed the full voltage
 MEMORY = 0.3  # [s] over which the peak of what the reference needs is forgotten
 SURE_SLIP = 0.5  # [rad/s] above which the estimated speed tells the friction's sign
 
@@ -70,13 +72,11 @@ class TimeOptimal(Controller):
         side = math.tanh(phi / (0.2 * SIDE_BAND))
         net = push - servo.a_1 * phi - servo.c_1 * side
         w_free = w + self.h * net
-        slip = math.copysign(1.0, w_free)
-        brake = servo.c_2 + (servo.c_1 * (1.0 - abs(side)) if phi * slip <= 0 or abs(side) < 1 else 0.0)
-        if abs(w_free) <= self.h * brake:
+        if abs(w_free) <= self.h * (servo.c_2 + servo.c_1 * (1.0 - abs(side))):
             self._theta += 0.5 * self.h * w
             self._speed = 0.0
             return
-        force = net + servo.a_1 * phi - servo.c_2 * slip
+        force = net + servo.a_1 * phi - math.copysign(servo.c_2, w_free)
         self._theta = servo.theta_0 + self._f11 * phi + self._f12 * w + self._g1 * force
         self._speed = self._f21 * phi + self._f22 * w + self._g2 * force
 
@@ -86,12 +86,12 @@ class TimeOptimal(Controller):
         servo = self.servo
         alpha = s.aim.alpha if self._alpha is None else s.aim.alpha + 0.5 * (s.aim.alpha - self._alpha)  # at mid-sample, extrapolated
         self._alpha = s.aim.alpha
-        spare = self._spare(s.aim)
-        full = abs(servo.b) * self.u_max
-        free = min(max(spare / (ROOM * full), 0.0), 1.0)
+        spare, full = self._spare(s.aim), abs(servo.b) * self.u_max
+        free = min(max(1.0 + spare / (SLACK * full), 0.0), 1.0)
+        boost = 1.0 + min(max(-spare / full, 0.0), BOOST)
         aid = servo.c_2 + 0.5 * servo.a_2 * abs(s.omega)  # what friction and damping brake, the speed's half on the way down
         wanted = _profile(s.x2, LAZY + free * (self.closing - LAZY), TRUST * max(spare + free * aid, ROOM * full))
-        a = alpha * (BOOST + free * (1.0 - BOOST)) + self.k_w * (wanted + s.x3)
+        a = boost * alpha + self.k_w * (wanted + s.x3)
         omega, theta = s.omega + 0.5 * self.h * a, s.theta + 0.5 * self.h * s.omega
         return (a + servo.spring(theta) + servo.a_2 * omega + servo.c_2 * self._slip(s, wanted) - self._d) / servo.b
 
