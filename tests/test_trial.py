@@ -11,7 +11,7 @@ from test_report import read
 from ers_mj import cli
 from ers_mj.claims import claims, headline
 from ers_mj.closed_loop import Run, Sensor
-from ers_mj.controllers import CONTROLLERS, Servo
+from ers_mj.controllers import Servo
 from ers_mj.datasheet import read_datasheet, write_model
 from ers_mj.effects import BY_NAME
 from ers_mj.measures import energy, measured, overshoot, settling_time
@@ -61,6 +61,13 @@ def test_no_other_filter_of_the_speed_lets_them_win(filter_s):
         assert ours["time-optimal", "reduced", case].rmse_rad < 0.97 * m.rmse_rad, (law, case)
 
 
+@pytest.mark.parametrize("rate_hz", [1000.0, 2000.0, 10_000.0])
+def test_play_and_inductance_together_make_no_law_cycle(rate_hz):
+    found = tried(["ftrc", "pid-ff", "time-optimal"], ["reduced"], ["step"], Conditions(rate_hz=rate_hz, gap=math.radians(0.5), inductance=True))
+    for key, m in found.items():
+        assert m.settling_time_s < 0.12 and m.chatter_V < 0.2 and m.steady_state_error_rad < math.radians(0.05), key
+
+
 def test_our_rival_needs_no_exact_model():
     for letter, factor in (("J", 1.15), ("F_c", 0.7), ("K_t", 1.15)):
         design = replace(SHEET, parameters={**SHEET.parameters, letter: factor * SHEET.parameters[letter]})
@@ -71,11 +78,11 @@ def test_our_rival_needs_no_exact_model():
 
 def test_the_audited_figures():
     """notes: literal (31) never settles; (39) rests off by its missing integral; the feed-forward makes the difference on the chirp."""
-    found = tried(list(CONTROLLERS), ["reduced"], ["step"])
+    found = tried(["ftrc-literal", "hinf", "pid", "pid-ff"], ["reduced"], ["step"])
     assert found["ftrc-literal", "reduced", "step"].settling_time_s is None
     assert math.degrees(found["hinf", "reduced", "step"].steady_state_error_rad) == pytest.approx(0.232, abs=0.005)
     assert found["pid-ff", "reduced", "step"].settling_time_s < found["pid", "reduced", "step"].settling_time_s < 0.085
-    chirp = tried(["ftrc", "pid", "pid-ff"], ["reduced"], ["chirp"], Conditions(amplitude=math.radians(3.0), rate_hz=5000.0))
+    chirp = tried(["ftrc", "pid", "pid-ff"], ["reduced"], ["chirp"], Conditions(amplitude=math.radians(3.0), rate_hz=2500.0))
     rmse = {law: m.rmse_rad for (law, _, _), m in chirp.items()}
     assert rmse["ftrc"] < 0.3 * rmse["pid"] and rmse["pid-ff"] == pytest.approx(rmse["ftrc"], rel=0.1)
 

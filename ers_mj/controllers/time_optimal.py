@@ -21,8 +21,8 @@ from ers_mj.controllers.base import SIDE_BAND, STICK_BAND, Aim, Controller, Stat
 NOISE = math.radians(0.01)  # [rad] of the measurement, for which the observer is tuned
 RATTLE = 4.0  # [rad/s^2/sqrt(Hz)] acceleration that the model does not tell, white
 DRIFT = 100.0  # [rad/s^3/sqrt(Hz)] by which the disturbance wanders
-SPEED_GAIN, CLOSING = 0.4, 0.5  # k_w as a share of the sample rate; lambda as a share of k_w
-MOST_GAIN = 500.0  # k_w [1/s] whatever the sample rate
+SPEED_GAIN, CLOSING = 0.375, 0.4  # k_w as a share of the sample rate; lambda as a share of k_w
+MOST_GAIN = 375.0  # k_w [1/s] whatever the sample rate: with 500 a play of 0.5 deg and a lag of 1 ms (L/R) together make it cycle
 TRUST = 0.95  # alpha: share of the braking that the profile counts on
 ROOM = 0.05  # share of the full voltage that the braking counts on at least
 SLACK = 0.05  # share of the full voltage by which a reference's needs exceed it when the position is let go
