@@ -12,12 +12,17 @@ from ers_mj.symptoms import excursions
 from ers_mj.traces import Trace, parabola_start, start_samples
 
 SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
-SPIKE_SAMPLES, SPIKE_TIME = 5, 0.005  # length of a spike at most, and [s]
+SPIKE_SAMPLES, SPIKE_TIME = 3, 0.005  # length of a spike at most, and [s]
+FEWEST_SPIKES = 3  # that the recordings must show by themselves before the model's error is searched
 
 
 def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
-    """The traces without the spikes that stand out of the model's error: within SPIKE_TIME a rudder's own error is smooth, however wrong
-    the model is."""
+    """The traces without the spikes that stand out of the model's error, where the recordings themselves show that their sensor has some.
+
+    Within SPIKE_TIME a rudder's own error is smooth, but for the blows of a play or a stop, which look like a spike.
+    """
+    if sum(len(trace.lost) for trace in traces) < FEWEST_SPIKES:
+        return list(traces)
     out = []
     for k, trace in enumerate(traces):
         e = np.where(trace.valid, (trace.y - model.predict(trace, k, OBSERVER_RATE)) / trace.sigma, np.nan)
