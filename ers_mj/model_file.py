@@ -12,7 +12,7 @@ import numpy as np
 
 from ers_mj.errors import InputError
 from ers_mj.plants.staging import staged
-from ers_mj.plants.stepping import unlogged
+from ers_mj.plants.mjcf import unlogged
 from ers_mj.replay import Replay
 from ers_mj.traces import Trace
 

@@ -71,15 +71,6 @@ def paired_z(better: np.ndarray, worse: np.ndarray, tau: float) -> float:
     return float(np.mean(d)) * math.sqrt(d.size) / spread if spread > 0 else 0.0
 
 
-def tie(best: Candidate, other: Candidate) -> float:
-    """How probable the other is against the best (1 = equal): the chance that its score over the blocks is no worse."""
-    d = score(other.fit.misfit, 1.0) - score(best.fit.misfit, 1.0)
-    spread = float(np.std(d, ddof=1)) * math.sqrt(d.size)
-    if spread == 0.0:
-        return 1.0
-    return math.erfc(max(float(np.sum(d)), 0.0) / spread / math.sqrt(2.0))
-
-
 def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Begin]]]]:
     """The promising effects, each with the models to refit: for every place, those of its best starts.
 

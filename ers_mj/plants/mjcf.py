@@ -1,10 +1,14 @@
-"""The MJCF folder, wherever the package lies: inside an installed wheel or beside the source."""
+"""The MJCF folder, wherever the package lies, inside an installed wheel or beside the source; and MuJoCo kept silent."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
+
+import mujoco
 
 from ers_mj.errors import InputError
 
@@ -24,3 +28,14 @@ def mjcf_folder() -> Traversable:
 def read_mjcf() -> dict[str, str]:
     """Name -> text of every XML file in the folder."""
     return {item.name: item.read_text("utf-8") for item in mjcf_folder().iterdir() if item.name.endswith(".xml")}
+
+
+@contextmanager
+def unlogged() -> Iterator[None]:
+    """Keep MuJoCo from printing and from writing MUJOCO_LOG.TXT where a motion runs away: NaN says it."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import mujoco
@@ -13,19 +12,9 @@ import mujoco.batch
 import numpy as np
 
 from ers_mj.effects.base import Coefficients
+from ers_mj.plants.mjcf import unlogged
 
 MOTOR_GROUP = 1  # actuator group that an open circuit disables
-
-
-@contextmanager
-def unlogged() -> Iterator[None]:
-    """Keep MuJoCo from printing and from writing MUJOCO_LOG.TXT where a motion runs away: NaN says it."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ stepped by Heun's rule at 15 us or less, with the speed running on as in the las
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import contextmanager
 
 import mujoco
 import numpy as np
 from numba import njit
 
+from ers_mj.plants.mjcf import unlogged
 from ers_mj.proving.catalogue import put_effects, samples_of
 from ers_mj.proving.laws import (APP, BRI, BUS, CONTROLLER, CUR, LAG, STATES, TABLE_1, TH, THM, W, WM, bristle_rate, current_rate, dry, free_torques,
                                  friction_level, inertia, motor_torque, plant_of, slow_rates)
@@ -61,7 +61,7 @@ def record(params: Mapping[str, float], effects: Sequence[Mapping], t: np.ndarra
     ring = np.full(max(2 * late, 1) if laws["lag_form"][0] == 3 else late + 1, float(laws["theta_0"][0]))
     views = (data.qpos, data.qvel, data.ctrl, model.tendon_frictionloss, model.dof_frictionloss, model.dof_armature, m.places)
     stood = -round(STAND_S / h)
-    with _unlogged():
+    with unlogged():
         for count in range(stood, 0):
             push(laws, y, work, speeds, count, h, parts, out, substeps, delay, 1.0, ring, *views)
             mujoco.mj_step(model, data)
@@ -81,17 +81,6 @@ def _relaxed(laws: np.ndarray) -> np.ndarray:
     y[[TH, THM, LAG, APP]] = laws["theta_0"][0]
     y[BUS] = laws["sag_V"][0]
     return y
-
-
-@contextmanager
-def _unlogged():
-    """Keep MuJoCo from printing and from writing MUJOCO_LOG.TXT."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 @njit(cache=True)
