@@ -132,7 +132,7 @@ def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
     for level in (tau, max(tau, float(np.mean(m)))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
         basis, _ = np.linalg.qr(jacobian * root[:, None])
-        out.append((root, basis, _beside(basis, root * e)))
+        out.append((root, basis, root * e - basis @ (basis.T @ (root * e))))
     return {f.key: column for f, column in zip(layout, jacobian.T)}, out
 
 
@@ -177,10 +177,11 @@ def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, M
 def _mixed(columns: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[float, np.ndarray]:
     """Share of a target that the columns (N, 2 g) explain together, and the multiples (2 g,) of them that do."""
     root, basis, residual = target
-    free = _beside(basis, root[:, None] * columns)
-    multiples = np.linalg.lstsq(free, -residual, rcond=1e-9)[0]
-    left = residual + free @ multiples
-    return 1.0 - float(left @ left) / float(residual @ residual), multiples
+    weighted = root[:, None] * columns
+    known = basis.T @ weighted
+    pull = -(weighted.T @ residual)
+    multiples = np.linalg.lstsq(weighted.T @ weighted - known.T @ known, pull, rcond=1e-12)[0]
+    return float(pull @ multiples) / float(residual @ residual), multiples
 
 
 def _quarter(effect: Effect, start: np.ndarray) -> np.ndarray:
@@ -212,16 +213,12 @@ def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int,
 def _explained(secant: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray], signed: bool) -> tuple[float, float]:
     """Share of a target that a secant (N,) explains, and the multiple of the secant that does."""
     root, basis, residual = target
-    free = _beside(basis, root * secant)
-    size, pull = float(free @ free), -float(free @ residual)
+    weighted = root * secant
+    known = basis.T @ weighted
+    size, pull = float(weighted @ weighted) - float(known @ known), -float(weighted @ residual)
     if size <= 1e-12 or (pull <= 0 and not signed):
         return 0.0, LEAST_SIZE
     return pull**2 / size / float(residual @ residual), pull / size
-
-
-def _beside(basis: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """What of x (N,) is orthogonal to the basis (N, k)."""
-    return x - basis @ (basis.T @ x)
 
 
 def _resized(start: np.ndarray, sized: int, factor: float) -> np.ndarray:
