@@ -20,7 +20,7 @@ from ers_mj.evidence import Evidence, RecordView, Rung
 from ers_mj.identification import Fit, residuals, score
 from ers_mj.model import BASE, STATES, Model
 from ers_mj.starts import with_starts
-from ers_mj.intervals import standard_errors
+from ers_mj.intervals import half_widths
 from ers_mj.isolability import isolability, probabilities
 from ers_mj.localisation import Place, gather, places, residual_map, shaded
 from ers_mj.multibody import Rig
@@ -249,10 +249,9 @@ class Case:
         if not hasattr(self, "_cached"):
             model = replace(self.model, states=None)
             left_out = self.confirmed.models if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2 else []
-            error, factor = standard_errors(model, self.start.traces, left_out, self.selection.tau)
             layout = model.layout()
             z, out = model.vector(layout), {}
-            for f, q, e in zip(layout, z, error * factor):
+            for f, q, e in zip(layout, z, half_widths(model, self.start.traces, left_out, self.selection.tau)):
                 if (f.owner, f.name) in out:  # of a further recording
                     continue
                 ends = f.ends(q, e)
@@ -312,8 +311,8 @@ class Case:
         if not self.model.states:
             return {}
         layout = self.model.layout()
-        error, factor = standard_errors(self.model, self.start.traces, (), self.selection.tau)
-        return {(f.owner, f.index): f.ends(q, factor * s) for f, q, s in zip(layout, self.model.vector(layout), error) if f.owner in STATES}
+        widths = half_widths(self.model, self.start.traces, (), self.selection.tau)
+        return {(f.owner, f.index): f.ends(q, w) for f, q, w in zip(layout, self.model.vector(layout), widths) if f.owner in STATES}
 
     # words
 

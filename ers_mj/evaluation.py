@@ -13,7 +13,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.identification import fit, residuals, score, tau_of
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.starts import fitted_start
-from ers_mj.intervals import standard_errors
+from ers_mj.intervals import half_widths
 from ers_mj.traces import Blocks, Trace
 
 TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
@@ -136,8 +136,8 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     if float(score(misfit, tau).sum() - score(found.misfit, tau).sum()) < 0.5 * found.size:
         found = replace(found, model=pair)
     layout = found.model.layout()
-    error, factor = standard_errors(found.model, [blank, head], (), tau)
-    ends = {f.name: f.ends(q, factor * s) for f, q, s in zip(layout, found.model.vector(layout), error)}
+    widths = half_widths(found.model, [blank, head], (), tau)
+    ends = {f.name: f.ends(q, w) for f, q, w in zip(layout, found.model.vector(layout), widths)}
     return scored(found.model, trace, 1, cut), {name: (float(v[1]), *ends[name]) for name, v in found.model.states.items()}
 
 

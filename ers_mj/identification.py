@@ -226,15 +226,20 @@ def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, ste
 
 
 def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None):
-    """Finite differences of the residuals e (N,) by the fitted numbers, but for the ``known`` ones: (N, k)."""
+    """Slopes of the residuals e (N,) by the fitted numbers, but for the ``known`` ones: (N, k).
+
+    By tangents of the motion where the model has them, else by finite differences of simulations.
+    """
     jacobian = np.empty((e.size, z.size))
-    for k in range(z.size):
-        if known and layout[k].key in known:
-            jacobian[:, k] = known[layout[k].key]
-            continue
-        shifted = z.copy()
-        shifted[k] += DIFFERENCE
-        jacobian[:, k] = (residuals(model.at(layout, shifted), traces, rate) - e) / DIFFERENCE
+    wanted = [k for k in range(z.size) if not (known and layout[k].key in known)]
+    for k in set(range(z.size)) - set(wanted):
+        jacobian[:, k] = known[layout[k].key]
+    others = [model.at(layout, z + DIFFERENCE * (np.arange(z.size) == k)) for k in wanted]
+    if model.has_tangents and all(t.is_uniform for t in traces):
+        jacobian[:, wanted] = -model.at(layout, z).changes(traces, rate, others, 1.0 / DIFFERENCE)
+    else:
+        for k, other in zip(wanted, others):
+            jacobian[:, k] = (residuals(other, traces, rate) - e) / DIFFERENCE
     jacobian[~np.isfinite(jacobian)] = 0.0
     return jacobian
 

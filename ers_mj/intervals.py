@@ -1,6 +1,8 @@
-"""Intervals that survive model error: recording-level jackknife, or a block sandwich where there are too few recordings.
+"""Intervals that survive model error: a jackknife over recordings and a sandwich over blocks.
 
-(J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that.
+(J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what differs between
+recordings, but a refit may rest in the dent of the cost where it begins, and then says nothing; the sandwich only sees
+the scatter within them.
 """
 
 from __future__ import annotations
@@ -18,22 +20,23 @@ FEWEST_RECORDS = 3
 RUN = 4  # neighbouring blocks that are resampled together
 
 
-def standard_errors(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> tuple[np.ndarray, float]:
-    """Standard errors (k,) of the model's transformed numbers, and the factor that makes them 95 % half-widths.
+def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> np.ndarray:
+    """95 % half-widths (k,) of the model's transformed numbers: those of jackknife and sandwich, squared and added.
 
     ``left_out`` holds the model refitted without each recording in turn; with fewer than three, or where
-    some numbers belong to one recording only, the block sandwich serves.
+    some numbers belong to one recording only, the sandwich serves alone.
     """
     layout = model.layout()
+    widths = _sandwich(model, traces, tau)
     if len(left_out) >= FEWEST_RECORDS and not any(f.local for f in layout):
         z = np.array([m.vector(layout) for m in left_out])
         n = len(left_out)
-        return np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0)), float(student.ppf(0.975, n - 1))
-    return _sandwich(model, traces, tau)
+        widths = np.hypot(widths, student.ppf(0.975, n - 1) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0)))
+    return widths
 
 
-def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> tuple[np.ndarray, float]:
-    """H^-1 (sum of outer products of the slopes of runs of blocks) H^-1."""
+def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
+    """95 % half-widths (k,) by H^-1 (sum of outer products of the slopes of runs of blocks) H^-1."""
     layout, blocks = model.layout(), Blocks.of(traces)
     e = residuals(model, traces, OBSERVER_RATE)
     jacobian = jacobian_of(model, layout, model.vector(layout), e, traces, OBSERVER_RATE)
@@ -45,4 +48,4 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> tuple[np.nda
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
     n = slopes.shape[0]
     covariance = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
-    return np.sqrt(np.maximum(np.diag(covariance), 0.0)), float(student.ppf(0.975, max(n - len(layout), 1)))
+    return student.ppf(0.975, max(n - len(layout), 1)) * np.sqrt(np.maximum(np.diag(covariance), 0.0))

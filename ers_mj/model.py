@@ -226,21 +226,39 @@ class Model:
         """What ``predict`` gives, and behind it what each further channel of the recording would show, (N,) each."""
         plant, run = self.staged(trace, record, rate, None)
         theta, motion = plant.outputs(trace.t, trace.u, **run)
-        out = [theta + self.offset(record)]
-        for channel in trace.channels:
-            out.append({"speed": lambda: motion[:, 1], "motor": lambda: motion[:, 3],
-                        "current": lambda: plant.current(trace.t, motion) / self.values["ampere"]}[channel.kind]())
-        return out
+        return [theta + self.offset(record), *self._shown(trace, plant, motion)]
 
-    def first_orders(self, traces: Sequence[Trace], rate: float, name: str, starts: Sequence[np.ndarray]) -> np.ndarray:
-        """First-order change of the predicted outputs (len(starts), all residuals; none of the channels) by the law of one more effect, at each of its starts."""
+    def _shown(self, trace: Trace, plant: ReducedModel, motion: np.ndarray) -> list[np.ndarray]:
+        """What each further channel of a recording would show (N,) along a motion (N, 4)."""
+        reading = {"speed": lambda: motion[:, 1], "motor": lambda: motion[:, 3],
+                   "current": lambda: plant.current(trace.t, motion) / self.values["ampere"]}
+        return [reading[channel.kind]() for channel in trace.channels]
+
+    @property
+    def has_tangents(self) -> bool:
+        """Whether ``changes`` can tell the first-order changes of this model's outputs."""
+        return ReducedModel(lumped(self.values), self.effects).has_tangents
+
+    def changes(self, traces: Sequence[Trace], rate: float, others: Sequence[Model], scale: float) -> np.ndarray:
+        """First-order changes (rows of all traces, others) of the predicted outputs, in sigmas, 0 where a sample is missing.
+
+        They point from this model towards each other one, times ``scale`` (see ReducedModel.tangents).
+        """
         columns = []
         for k, trace in enumerate(traces):
             plant, run = self.staged(trace, k, rate, None)
-            path, clock = plant.path(trace.t, trace.u, **run), {key: run[key] for key in ("gain", "every")}
-            rest = np.zeros(trace.rows - trace.t.size)
-            columns.append([np.concatenate([plant.first_order(trace.t, path, name, start, **clock), rest]) for start in starts])
-        return np.concatenate(columns, axis=1)
+            path, clock = plant.path(trace.t, trace.u, **run), {key: v for key, v in run.items() if key != "start"}
+            plants = [other.plant(k) for other in others]
+            moved = plant.tangents(trace.t, trace.u, path, plants, scale, **clock)
+            here = self._shown(trace, plant, path)
+            columns.append(np.empty((trace.rows, len(others))))
+            for i, (other, its, move) in enumerate(zip(others, plants, moved)):
+                parts = [np.where(trace.valid, move[:, 0] + (other.offset(k) - self.offset(k)) * scale, 0.0) / trace.sigma]
+                if trace.channels:
+                    there = other._shown(trace, its, path + np.column_stack([move, move[:, 0]]) / scale)
+                    parts += [np.where(np.isfinite(c.values), (b - a) * scale, 0.0) / c.sigma for c, a, b in zip(trace.channels, here, there)]
+                columns[-1][:, i] = np.concatenate(parts)
+        return np.concatenate(columns)
 
     def staged(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
         """The plant of a recording, and how it is run along it."""

@@ -19,10 +19,12 @@ from ers_mj.identification import Fit, converged, fit, hopped, jacobian_of, near
 from ers_mj.model import OBSERVER_RATE, STATES, Columns, Model
 from ers_mj.traces import BLOCK, Blocks, Trace
 
-LEAST_GAIN = 0.04  # decrease of C per block that an effect must buy: an error of about 0.3 sigma RMS
+LEAST_GAIN = 5.0  # decrease of C that an effect must buy
+QUIET, LEAST_PROMISE = 0.04, 2.5  # C per block up to which a round goes on only for a candidate whose secant promises so much of C
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
-ONCE = 8.0  # of C that suffices where an effect acts once, in so few blocks that their z-score cannot be large
+LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
+ONCE = 8.0  # of C that suffices where an effect acts once
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 MOST_SENT, LATER = 10, 5  # candidates of the screening that are refitted at most, in the first round and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
@@ -51,12 +53,16 @@ class Begin:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A model that adds one effect to another: the fit, its gain in C over the reference, the paired z of that gain."""
+    """A model that adds one effect to another: the fit, its gain in C over the reference, the paired z of that gain.
+
+    ``lost`` is the C that the blocks which the effect makes worse lose together.
+    """
 
     name: str
     fit: Fit
     gain: float
     z: float
+    lost: float
 
     @property
     def worth(self) -> float:
@@ -71,14 +77,16 @@ def paired_z(better: np.ndarray, worse: np.ndarray, tau: float) -> float:
     return float(np.mean(d)) * math.sqrt(d.size) / spread if spread > 0 else 0.0
 
 
-def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str]) -> list[tuple[str, list[list[Begin]]]]:
+def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str],
+           quiet: bool = False) -> list[tuple[str, list[list[Begin]]]]:
     """The promising effects, each with the models to refit: for every place, those of its best starts.
 
     From each place (the refitted baseline first, and where else a fit may start from) the secant e(with effect) - e(without) is taken
     at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
     largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
     a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
-    the first place: MOST_SENT at most, those with PROMISING of the best one's promise.
+    the first place: MOST_SENT at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of
+    what is left is worth LEAST_PROMISE. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
     """
     tried: dict[str, list[list[Begin]]] = {}
     for place in places:
@@ -96,8 +104,11 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
                 begins[effect.name] = [Begin(model, known) for _, model in found[:effect.tries]]
         if not tried:
             best = sorted(promises, key=promises.get, reverse=True)[:LATER if place.names else MOST_SENT]
+            floor = 2.0 * LEAST_PROMISE / float(targets[0][2] @ targets[0][2]) if quiet else 0.0
             tried = {name: [] for name in best
-                     if promises[name] >= (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * promises[best[0]]}
+                     if promises[name] >= max(floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * promises[best[0]])}
+            if not tried:
+                break
         for name in tried:
             tried[name] += [begins[name]] if name in begins else []
     return list(tried.items())
@@ -105,17 +116,12 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
 
 def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
     """Of many starts of a law, those that promise most to first order along the place's own motion."""
-    if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or place.plant().coupled:
+    if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or not place.has_tangents:
         return starts
-    sigma = np.concatenate([np.full(t.rows, t.sigma) for t in traces])
-    valid = np.concatenate([np.pad(t.valid, (0, t.rows - t.t.size)) for t in traces])
     groups = _groups(effect, traces)
     waves = 2 if effect.wave else 1
     every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
-    changes = np.where(valid, -place.first_orders(traces, OBSERVER_RATE, effect.name, every) / sigma, 0.0)
-    if "record" in (names := [p.name for p in effect.parameters]):
-        record = np.repeat(np.arange(len(traces)), [t.rows for t in traces])
-        changes *= np.array([s[names.index("record")] for s in every])[:, None] == record
+    changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0).T
     shares = [max(_mixed(_split(changes[i:i + waves], groups), target)[0] if effect.signed else _explained(changes[i], target, False)[0]
                   for target in targets) for i in range(0, len(every), waves)]
     best = sorted(np.argsort(shares)[::-1][:effect.tries])
@@ -257,12 +263,17 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
 
     def judged(item):
         name, found = item
-        return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau))
+        lost = float(np.sum(np.maximum(score(found.misfit, tau) - score(base.misfit, tau), 0.0)))
+        return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau), lost)
 
     states = [(s, [[Begin(base.model.with_state(s, len(traces)), {})]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
-        screened = screen(places, traces, tau, exclude) + states
+        quiet = reference <= QUIET * base.misfit.size
+        screened = screen(places, traces, tau, exclude, quiet)
+        if quiet and not screened:
+            return []
+        screened += states
         first = refitted([(name, begins[0]) for name, per_place in screened for begins in per_place])
         most = max((reference - total(f) for f in first.values()), default=0.0)
         again = refitted([(name, begin) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
@@ -326,11 +337,11 @@ class Selection:
 def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str, float]] = (), exclude: Sequence[str] = (),
            jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless."""
-    current, rounds, blocks = base, [], base.misfit.size
+    current, rounds = base, []
     tau = tau_of(base.misfit)
-    while len(rounds) < (MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS) and float(score(current.misfit, tau).sum()) > LEAST_GAIN * blocks:
+    while len(rounds) < (MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS):
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
-        least = max(LEAST_GAIN * blocks, LEAST_SHARE * float(score(current.misfit, tau).sum()))
+        least = max(LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
         rounds.append(tuple(ranked))
         if not ranked or ranked[0].gain < least or not _sure(ranked[0]):
@@ -346,8 +357,9 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
 
 
 def _sure(candidate: Candidate) -> bool:
-    """Whether the gain is more than chance: over the blocks, or, of what acts in a few blocks once, by its size."""
-    return candidate.z >= LEAST_Z or (candidate.name in BY_NAME and BY_NAME[candidate.name].once and candidate.gain >= ONCE)
+    """Whether the gain is more than chance: over the blocks, or, of what acts in few of them, since hardly any is worse or by its size."""
+    once = candidate.name in BY_NAME and BY_NAME[candidate.name].once
+    return candidate.z >= LEAST_Z or candidate.lost <= LOST * candidate.gain or (once and candidate.gain >= ONCE)
 
 
 def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
@@ -367,7 +379,7 @@ def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequ
         without = current.model.without_effect(ranked[0].name)
         with ThreadPoolExecutor(jobs) as pool:
             best = min(pool.map(instead, rivals), key=lambda f: f.cost, default=current)
-        if best.cost < current.cost - LEAST_GAIN * current.misfit.size:
+        if best.cost < current.cost - LEAST_GAIN:
             current = best
     return current
 
@@ -376,6 +388,6 @@ def _pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> F
     """Without the earlier effects that no longer pay."""
     for name in (n for n in current.model.names if n != newest):
         without = fit(current.model.without_effect(name), traces, tau=tau, steps=12)
-        if without.cost - current.cost < LEAST_GAIN * current.misfit.size:
+        if without.cost - current.cost < LEAST_GAIN:
             current = without
     return current

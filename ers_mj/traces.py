@@ -53,6 +53,11 @@ class Trace:
         """Median step [s]."""
         return float(np.median(np.diff(self.t)))
 
+    @cached_property
+    def is_uniform(self) -> bool:
+        """Whether all steps are alike."""
+        return self.t.size > 1 and bool(np.ptp(np.diff(self.t)) < 1e-5 * self.sample_time)
+
     def part(self, begin: int, end: int) -> Trace:
         """Samples begin..end as a trace of their own."""
         cut = slice(begin, end)

@@ -790,31 +790,6 @@ def _steady(x, z):
     return abs(z[1]) >= CALM * abs(x[1]) and abs(z[4]) >= CALM * abs(x[4])
 
 
-def _perturb(t, x, gain, every, c, on, p, out):
-    """Fill out (N,) with the first-order change of theta that the laws of ``on`` make along a motion of one body.
-
-    ``x`` (N, >= 3) are theta, w, j of the motion at the sample times. A body that rests stays at rest; its observer
-    (see simulate_kernel) forgets the change as it would any other.
-    """
-    h = t[1] - t[0]
-    maps = _maps(c, c[TAU], c[A_EMF], h)[0]
-    a = b = d = 0.0
-    for k in range(t.size):
-        out[k] = a
-        if k == t.size - 1:
-            break
-        if k % every == 0:
-            a *= 1.0 - gain
-        if x[k, 1] == 0.0 and x[k + 1, 1] == 0.0:
-            b = d = 0.0
-            continue
-        s = 1 if x[k, 1] + x[k + 1, 1] > 0.0 else -1
-        e = maps[s + 1, 1, 1]
-        force = _extra(c, on, p, t[k], (x[k, 0], x[k, 1], x[k, 2], x[k, 0], 0.0), s)
-        a, b, d = (e[0, 0] * a + e[0, 1] * b + e[0, 2] * d + e[0, 8] * force, e[1, 0] * a + e[1, 1] * b + e[1, 2] * d + e[1, 8] * force,
-                   e[2, 0] * a + e[2, 1] * b + e[2, 2] * d)
-
-
 def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
 
@@ -938,5 +913,3 @@ VECTOR = types.float64[::1]
 with compiled_cache():  # one signature each: locked and other arrays alike
     simulate_kernel = njit(types.void(READ, READ, READ_BOOL, READ, READ, types.float64, types.int64, VECTOR, ROWS, LAWS, types.int64,
                                       VECTOR, LAWS), nogil=True, cache=True)(_simulate)
-    perturb_kernel = njit(types.void(READ, types.float64[:, ::1], types.float64, types.int64, VECTOR, ROWS, LAWS, VECTOR),
-                          nogil=True, cache=True)(_perturb)

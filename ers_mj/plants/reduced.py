@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
-from ers_mj.effects.base import Coefficients
-from ers_mj.plants.events import N_PARAMETERS, perturb_kernel, rows_of, simulate_kernel
+from ers_mj.effects.base import Coefficients, Effect
+from ers_mj.plants.events import N_PARAMETERS, rows_of, simulate_kernel
+from ers_mj.plants.tangents import prepare_kernel, tangent_kernel
 
 ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
 
@@ -111,14 +112,29 @@ class ReducedModel:
         """(N, 4): theta, omega, drive acceleration and motor side's angle of the run that ``theta`` makes."""
         return self._run(t, u, start, enable, load, y, gain, every, 1)
 
-    def first_order(self, t, path, name, values, *, gain=0.0, every=1) -> np.ndarray:
-        """First-order change of the output (N,) along a ``path`` of one body if the law of one more effect acted: a fiftieth of the work."""
-        effect, c = BY_NAME[name], Coefficients(*self._lowered[0])
-        p = np.zeros((len(EFFECTS), N_PARAMETERS))
-        constants = effect.constants(values, c)
-        p[ROW[name], :len(constants)] = constants
-        out = np.empty(t.size)
-        perturb_kernel(t, path, gain, every, self._lowered[0].copy(), rows_of([name]), p, out)
+    @property
+    def has_tangents(self) -> bool:
+        """Whether ``tangents`` can tell how the output changes: of one body that meets no stop, without delay, read by a plain sensor."""
+        c = Coefficients(*self._lowered[0])
+        return (c.two_body <= 0 and c.lower == -np.inf and c.upper == np.inf and c.delay <= 0
+                and all(type(BY_NAME[name]).measure is Effect.measure for name, _ in self.effects))
+
+    def tangents(self, t, u, path, others, scale, *, enable=None, load=None, y=None, gain=0.0, every=1) -> list[np.ndarray]:
+        """First-order changes (N, 3) of theta, omega and drive acceleration along a ``path``, towards each of the ``others``.
+
+        Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect. A tenth of a simulation.
+        """
+        c, on, p = self._lowered
+        enable = np.ones(t.size, np.bool_) if enable is None else enable
+        load = np.zeros(t.size) if load is None else load
+        maps, slopes, terminal, out = np.empty((2, 3, 5, 11)), np.zeros((t.size, 3)), self.terminal(u), []
+        prepare_kernel(t, path, c.copy(), on, p, maps, slopes)
+        for other in others:
+            c_2, on_2, p_2 = other._lowered
+            change = np.empty((t.size, 3))
+            tangent_kernel(t, terminal, (other.terminal(u) - terminal) * scale, enable, load, t if y is None else y, path, maps, slopes, gain, every,
+                           c.copy(), on, p, c_2, on_2, p_2, scale, change)
+            out.append(change)
         return out
 
     def read(self, t: np.ndarray, theta: np.ndarray) -> np.ndarray:
