@@ -31,7 +31,8 @@ from ers_mj.simulation import PER_INERTIA, unit_of
 from ers_mj.traces import Blocks, Trace
 
 CONSISTENT = 0.05  # cost per block up to which a model explains the data within its noise (an error of 0.3 sigma RMS)
-SIGNIFICANT = 0.15  # cost per block from which what is left over is worth a warning
+SIGNIFICANT = 0.15  # cost per block from which the baseline is said to miss something
+REST, REST_SHARE, PLAIN = 0.05, 0.3, 0.5  # the same beside named effects: cost per block and its share of what the baseline leaves, or plain
 TIED = 0.02  # weight from which a rival is told as an alternative
 LEAST_FACTOR, LEAST_OFFSET = 0.02, 0.01  # of a gain or friction level, and of half the travel: a smaller drift is not worth a line
 VISIBLE = 1.5  # noise levels of free-run error from which a recording shows a mismatch
@@ -143,6 +144,13 @@ class Case:
             if before.rmse > VISIBLE * fold.held_out.sigma:
                 shares.append(min(max(1.0 - left / above, 0.0), 1.0))
         return float(np.mean(shares)) if shares else 0.0
+
+    def _more_is_missing(self) -> bool:
+        """Whether what the answer leaves is more than another form of the same law would: the mimic of an unknown effect takes a part only."""
+        left = self._left()
+        if not self.model.names:
+            return left > SIGNIFICANT
+        return left > PLAIN or left > max(REST, REST_SHARE * float(np.mean(score(self.start.fit.misfit, 1.0))))
 
     def _left(self) -> float:
         """Cost per block of the final model, at the noise."""
@@ -336,7 +344,7 @@ class Case:
                 f"error); {place or 'it is spread over the whole record'}.")
 
     def _remainder(self, verdict: str, explained: float) -> dict:
-        significant = verdict == "unexplained" or self._left() > SIGNIFICANT
+        significant = verdict == "unexplained" or self._more_is_missing()
         words = "nothing beyond the noise is left" if not significant else "a mismatch is left that nothing named accounts for"
         return {"explained_share": explained, "significant": significant, "cost_per_block": self._left(),
                 "sentence": f"{explained:.0%} of the squared held-out error above the noise is explained; {words}."}

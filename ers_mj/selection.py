@@ -78,40 +78,41 @@ def paired_z(better: np.ndarray, worse: np.ndarray, tau: float) -> float:
 
 
 def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str],
-           quiet: bool = False) -> list[tuple[str, list[list[Begin]]]]:
+           bent: bool, quiet: bool) -> list[tuple[str, list[list[Begin]]]]:
     """The promising effects, each with the models to refit: for every place, those of its best starts.
 
     From each place (the refitted baseline first, and where else a fit may start from) the secant e(with effect) - e(without) is taken
     at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
     largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
     a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
-    the first place: MOST_SENT at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of
-    what is left is worth LEAST_PROMISE. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
+    the first place, or from all of them where it is far from the noise, ``bent`` by what is missing: MOST_SENT at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth
+    LEAST_PROMISE. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
     """
-    tried: dict[str, list[list[Begin]]] = {}
+    names, floor = [name for name in BY_NAME if name not in exclude], 0.0
+    promises, begins = {}, {}
     for place in places:
         e = residuals(place, traces, OBSERVER_RATE)
         if not np.all(np.isfinite(e)):
             continue
         (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
-        promises, begins = {}, {}
-        for effect in (BY_NAME[name] for name in tried or BY_NAME if name not in exclude):
+        for effect in (BY_NAME[name] for name in names):
             starts = _hopeful(place, effect, effect.starts(scales), targets, traces)
             found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
-                promises[effect.name] = found[0][0]
-                begins[effect.name] = [Begin(model, known) for _, model in found[:effect.tries]]
-        if not tried:
-            best = sorted(promises, key=promises.get, reverse=True)[:LATER if place.names else MOST_SENT]
-            floor = 2.0 * LEAST_PROMISE / float(targets[0][2] @ targets[0][2]) if quiet else 0.0
-            tried = {name: [] for name in best
-                     if promises[name] >= max(floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * promises[best[0]])}
-            if not tried:
-                break
-        for name in tried:
-            tried[name] += [begins[name]] if name in begins else []
-    return list(tried.items())
+                promises[effect.name] = max(promises.get(effect.name, 0.0), found[0][0])
+                begins.setdefault(effect.name, []).append([Begin(model, known) for _, model in found[:effect.tries]])
+        if quiet and not floor:
+            floor = 2.0 * LEAST_PROMISE / float(targets[0][2] @ targets[0][2])
+        if not bent:
+            names = _promising(promises, floor, LATER if place.names else MOST_SENT)
+    return [(name, begins[name]) for name in _promising(promises, floor, LATER if places[0].names else MOST_SENT)]
+
+
+def _promising(promises: Mapping[str, float], floor: float, most: int) -> list[str]:
+    """The effects that are refitted, the most promising first."""
+    best = sorted(promises, key=promises.get, reverse=True)[:most]
+    return [name for name in best if promises[name] >= max(floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * promises[best[0]])]
 
 
 def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
@@ -239,7 +240,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
 
     They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow and a
-    mimic's short. Where none comes near the ``least`` gain that matters they are left at that.
+    mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that matters they are left at that.
     """
     reference = float(score(base.misfit, tau).sum())
 
@@ -250,10 +251,14 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         return fit(begin.model, traces, tau=tau, steps=QUICK, ceiling=base.misfit, known=begin.known, renewals=0)
 
     def refitted(starts):
-        """The best fit by name from pairs (name, Begin), those with the most parameters begun first since they take longest."""
+        """The best fit by label from pairs (label, Begin), those with the most parameters begun first since they take longest."""
         order = sorted(starts, key=lambda start: -len(start[1].model.layout()))
-        ends = list(zip((name for name, _ in order), pool.map(quick, (begin for _, begin in order))))
-        return {name: min((found for other, found in ends if other == name), key=total) for name, _ in starts}
+        ends = list(zip((label for label, _ in order), pool.map(quick, (begin for _, begin in order))))
+        return {label: min((found for other, found in ends if other == label), key=total) for label, _ in starts}
+
+    def leaders(ends):
+        """The best fit by name of those by (name, place)."""
+        return {name: min((found for (other, _), found in ends.items() if other == name), key=total) for name, _ in ends}
 
     def onward(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=RENEWALS)
@@ -269,23 +274,27 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     states = [(s, [[Begin(base.model.with_state(s, len(traces)), {})]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
-        quiet = reference <= QUIET * base.misfit.size
-        screened = screen(places, traces, tau, exclude, quiet)
+        quiet, bent = reference <= QUIET * base.misfit.size, not near_noise(base)
+        screened = screen(places, traces, tau, exclude, bent, quiet)
         if quiet and not screened:
             return []
-        screened += states
-        first = refitted([(name, begins[0]) for name, per_place in screened for begins in per_place])
+        starts = {(name, place): begins for name, per_place in screened + states for place, begins in enumerate(per_place)}
+        first = refitted([(label, begins[0]) for label, begins in starts.items()])
         most = max((reference - total(f) for f in first.values()), default=0.0)
-        again = refitted([(name, begin) for name, per_place in screened if reference - total(first[name]) >= AGAIN * most
-                          for begins in per_place for begin in begins[1:]])
-        best = {name: min((ends[name] for ends in (first, again) if name in ends), key=total) for name in first}
+        worth = {name for name, found in leaders(first).items() if bent or reference - total(found) >= AGAIN * most}
+        again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth for begin in begins[1:]])
+        best = {label: min((ends[label] for ends in (first, again) if label in ends), key=total) for label in first}
+        if not bent:
+            best = {(name, 0): found for name, found in leaders(best).items()}
         running = list(best)
         for _ in range(LATER_LAPS if base.model.names else LAPS):
             leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
             pace = max(PACE * least, PACE_SHARE * leading)
-            ends = dict(pool.map(onward, ((name, best[name]) for name in running)))
-            running = [name for name in running if total(best[name]) - total(ends[name]) > pace and not (name in BY_NAME and BY_NAME[name].dear)]
-            best |= {name: found for name, found in ends.items() if total(found) < total(best[name])}
+            ends = dict(pool.map(onward, ((label, best[label]) for label in running)))
+            running = [label for label in running if total(best[label]) - total(ends[label]) > pace
+                       and not (label[0] in BY_NAME and BY_NAME[label[0]].dear)]
+            best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
+        best = leaders(best)
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:

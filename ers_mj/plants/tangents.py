@@ -23,6 +23,7 @@ from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_M
                                   _derivative, _extra, _maps)
 
 NUDGE = 1e-6  # of the motion's largest angle, speed and drive: step of a law's slopes
+MOST = 10.0  # times the motion's extent and largest speed by which a unit of change may move it: beyond, stick and slip only fork otherwise
 CORNER = 1e-12  # [output unit] within which a rudder at rest is held in the corner
 
 
@@ -95,6 +96,10 @@ def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, 
         for k in range(on.shape[1]):
             laws = laws or on[i, k] != on_2[i, k]
     known, at, towards = 0.0, -1, 0  # the force at the end of the last sample, that sample, and its slip
+    low = high = path[0, 0]
+    fastest = 0.0
+    for k in range(t.size):
+        low, high, fastest = min(low, path[k, 0]), max(high, path[k, 0]), max(fastest, abs(path[k, 1]))
     a = b = d = 0.0
     for k in range(t.size):
         out[k, 0], out[k, 1], out[k, 2] = a, b, d
@@ -170,7 +175,7 @@ def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, 
                 b_1 -= 2.0 * c[C_1] * (a_1 - dc[THETA_0]) / passing
             else:
                 a_1, b_1 = dc[THETA_0], 0.0
-        a, b, d = a_1, b_1, d_1
+        a, b, d = min(max(a_1, -MOST * (high - low)), MOST * (high - low)), min(max(b_1, -MOST * fastest), MOST * fastest), d_1
 
 
 TABLE, MAPS = types.float64[:, ::1], types.float64[:, :, :, ::1]
