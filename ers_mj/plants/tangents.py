@@ -15,6 +15,8 @@ search, which weighs every step by a simulation, at a tenth of the work of finit
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit, types
 
@@ -125,8 +127,7 @@ def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, 
         rate_tau, rate_emf = (tau, a_emf) if enable[k] else (0.0, 0.0)
         if w == 0.0 and w_1 == 0.0:
             b = 0.0
-            e = maps[circuit, 1]
-            d = e[2, 2] * d + e[2, 6] * pull if rate_tau > 0 else 0.0
+            d = pull + (d - pull) * math.exp(-h / rate_tau) if rate_tau > 0 else 0.0
             continue
         s, s_1 = 1 if w > 0 else (-1 if w < 0 else 0), 1 if w_1 > 0 else (-1 if w_1 < 0 else 0)
         x, x_1 = (theta, w, j, theta, 0.0), (theta_1, w_1, j_1, theta_1, 0.0)
@@ -134,7 +135,7 @@ def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, 
         if s == 0:
             m = s_1
             forward = _acceleration(c, on, p, lawful, t[k + 1], x_1, s_1, int(side_1), drive, rate_tau, rate_emf, load[k])
-            share = min(1.0, w_1 / (forward * h)) if forward * w_1 > 0 else 1.0
+            share = min(1.0, 2.0 * w_1 / (forward * h)) if forward * w_1 > 0 else 1.0
         elif s_1 != s:
             before = _acceleration(c, on, p, lawful, t[k], x, s, int(side), drive, rate_tau, rate_emf, load[k])
             share = min(1.0, -w / (before * h)) if before * w < 0 else 1.0

@@ -1,0 +1,68 @@
+"""Tangents along a motion against central differences of simulations, for every coefficient and every effect that has them."""
+
+import numpy as np
+import pytest
+
+from ers_mj.effects import EFFECTS
+from ers_mj.effects.base import Effect
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel, lumped
+from test_reduced import SCALES, T, TABLE_1
+
+VALUES = {**TABLE_1.to_lumped(), "emf_share": 0.9}
+SEEN_BY_EQ_5 = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
+STEP = 1e-5
+FORKS = 0.1  # share of the samples where a finite difference may have caught another stick event than the tangent
+CLOSE, ROUGHLY = 0.1, 0.7  # distance allowed; a time constant's changes all but cancel over a motion, so that each stick's error shows
+LAWS = [e for e in EFFECTS if e.starts(SCALES) and ReducedModel(lumped(VALUES), [(e.name, e.starts(SCALES)[0])]).has_tangents]
+
+
+def agree(plant, up, down, scale, u, **options):
+    """Relative RMS distance between tangent and central difference, the worst samples left out."""
+    run = {"start": (VALUES["theta_0"], 0.0), **options}
+    path = plant.path(T, u, **run)
+    found = plant.tangents(T, u, path, [up], scale, **{k: v for k, v in run.items() if k != "start"})[0][:, 0]
+    true = 0.5 * scale * (up.path(T, u, **run)[:, 0] - down.path(T, u, **run)[:, 0])
+    apart = np.sort(np.abs(found - true))[:int((1 - FORKS) * T.size)]
+    return np.sqrt(np.mean(apart**2)) / np.sqrt(np.mean(true**2))
+
+
+@pytest.mark.parametrize("name, inductance", [*((n, True) for n in (*SEEN_BY_EQ_5, "tau_e", "emf_share")), *((n, False) for n in SEEN_BY_EQ_5)])
+def test_of_the_coefficients(name, inductance):
+    values = VALUES | ({} if inductance else {"tau_e": 0.0})
+
+    def plant(way):
+        return ReducedModel(lumped(values | {name: values[name] * (1.0 + way * STEP)}))
+
+    assert agree(plant(0), plant(1), plant(-1), 1 / STEP, INPUTS["multisine"](T)) < (ROUGHLY if name == "tau_e" else CLOSE)
+
+
+@pytest.mark.parametrize("effect", LAWS, ids=lambda e: e.name)
+def test_of_every_effect_that_has_them(effect):
+    start = effect.starts(SCALES)[0]
+    finite = [k for k, p in enumerate(effect.parameters) if np.isfinite(start[k]) and p.fitted and p.kind != "count"]
+    k = finite[0]
+    step = STEP * max(abs(start[k]), 1e-3)
+
+    def plant(way):
+        values = start.astype(float).copy()
+        values[k] += way * step
+        return ReducedModel(lumped(VALUES), [(effect.name, values)])
+
+    assert agree(plant(0), plant(1), plant(-1), 1 / step, INPUTS["multisine"](T)) < (ROUGHLY if effect.name == "inductance" else CLOSE)
+
+
+def test_an_observer_forgets_a_change():
+    """With y given, the change decays between its causes as the observer's error does."""
+    u = INPUTS["multisine"](T)
+    plain, moved = ReducedModel(lumped(VALUES)), ReducedModel(lumped(VALUES | {"b": VALUES["b"] * (1 + STEP)}))
+    less = ReducedModel(lumped(VALUES | {"b": VALUES["b"] * (1 - STEP)}))
+    y = plain.simulate(T, u).theta.copy()
+    assert agree(plain, moved, less, 1 / STEP, u, y=y, gain=0.025, every=5) < CLOSE
+
+
+def test_what_has_none_says_so():
+    with_tangents = {e.name for e in LAWS}
+    assert not with_tangents & {"backlash", "shaft_compliance", "presliding", "end_stop", "input_delay", "sensor_lag", "sensor_nonlinearity"}
+    assert all(type(e).measure is Effect.measure for e in LAWS)
+    assert len(with_tangents) >= 15
