@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ers_mj.closed_loop import Run, Sampled, Sensor, close
-from ers_mj.controllers import CONTROLLERS, Gains, Servo
+from ers_mj.controllers import CONTROLLERS, Controller, Gains, PidGains, Servo
 from ers_mj.controllers.base import FILTER_S
 from ers_mj.datasheet import Datasheet
 from ers_mj.errors import InputError
@@ -40,11 +40,13 @@ class Conditions:
     seed: int = 0
     filter_s: float = FILTER_S
     gains: Gains = Gains()
+    pid: PidGains = PidGains()
     effects: EffectSettings = ()
 
     def as_document(self) -> dict:
         """As the key `conditions`."""
-        plain = asdict(self) | {"gains": self.gains.as_document(), "effects": [{"name": name, "parameters": dict(values)} for name, values in self.effects]}
+        plain = asdict(self) | {"gains": self.gains.as_document(), "pid": self.pid.as_document(),
+                                "effects": [{"name": name, "parameters": dict(values)} for name, values in self.effects]}
         units = {"amplitude": "amplitude_rad", "start": "start_rad", "u_max": "u_max_V", "gap": "gap_rad", "noise": "noise_rad"}
         return {units.get(key, key): x for key, x in plain.items()}
 
@@ -116,11 +118,16 @@ def try_out(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[s
     return trials
 
 
+def make_controller(name: str, known: Servo, rate_hz: float, conditions: Conditions) -> Controller:
+    """A controller, new, of the conditions' limit, filter and gains."""
+    law = CONTROLLERS[name]
+    options = {law.takes: getattr(conditions, law.takes)} if law.takes else {}
+    return law(known, rate_hz, conditions.u_max, filter_s=conditions.filter_s, **options)
+
+
 def run_once(plant: Plant, controller: str, known: Servo, aim: Reference, conditions: Conditions) -> Run:
     """One controller, new, on one plant, from rest where the conditions or the reference's file have it begin."""
-    law = CONTROLLERS[controller]
-    options = {"gains": conditions.gains} if law.takes_gains else {}
-    law = law(known, aim.rate_hz, conditions.u_max, filter_s=conditions.filter_s, **options)
+    law = make_controller(controller, known, aim.rate_hz, conditions)
     start = conditions.start if aim.name in CASES else float(aim.theta[0])
     law.reset(start)
     return close(law, sampled(plant, aim.rate_hz, (start, 0.0)), Sensor(plant.effects, aim.t, conditions.noise, conditions.seed), aim, plant.terminal)

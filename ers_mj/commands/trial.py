@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -50,6 +51,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)")
     parser.add_argument("--filter-ms", type=number(least=0), default=0.5, metavar="X", help="time constant of the speed's filter (default 0.5)")
     parser.add_argument("--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them")
+    parser.add_argument("--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)")
     parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of the noise (default 0)")
     add_out(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
@@ -65,7 +67,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ers_mj.trial import try_out
 
     controllers = arguments.controller or list(CONTROLLERS)
-    _refuse_unknown(arguments, controllers)
+    refuse_unknown("--controller", controllers, CONTROLLERS)
+    _refuse_cases(arguments)
     datasheet = read_datasheet(arguments.model)
     design = datasheet if arguments.design is None else read_datasheet(arguments.design)
     conditions = _conditions(arguments)
@@ -73,22 +76,25 @@ def run(arguments: argparse.Namespace) -> int:
         trials = try_out(datasheet, controllers, arguments.plant, arguments.case, conditions, design=design, progress=progress)
         document = plain({"trials": [t.as_document() for t in trials], "sentence": headline(trials), "notes": _notes(trials, design, conditions),
                           "conditions": conditions.as_document(), "controllers": {name: CONTROLLERS[name].sentence for name in controllers},
-                          "datasheet": datasheet.name or arguments.model, "design": design.name or arguments.design, "versions": _versions()})
+                          "datasheet": datasheet.name or arguments.model, "design": design.name or arguments.design, "versions": versions()})
         files = _write(folder, document, trials, progress) if folder is not None else []
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
     return 0
 
 
-def _refuse_unknown(arguments: argparse.Namespace, controllers: list[str]) -> None:
-    """Raise InputError for a controller, a plant or a case that does not exist, or a rate that no case takes."""
-    from ers_mj.controllers import CONTROLLERS
+def refuse_unknown(option: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise InputError for a name that does not exist."""
+    for name in names:
+        if name not in known:
+            raise InputError(f"{option}: there is no {name[:40]!r}; there are {', '.join(known)}")
+
+
+def _refuse_cases(arguments: argparse.Namespace) -> None:
+    """Raise InputError for a plant or a case that does not exist, or a rate that no case takes."""
     from ers_mj.references import CASES
     from ers_mj.trial import PLANTS
 
-    for option, names, known in (("--controller", controllers, CONTROLLERS), ("--plant", arguments.plant, PLANTS)):
-        for name in names:
-            if name not in known:
-                raise InputError(f"{option}: there is no {name[:40]!r}; there are {', '.join(known)}")
+    refuse_unknown("--plant", arguments.plant, PLANTS)
     files = [case for case in arguments.case if case not in CASES]
     for case in files:
         if not Path(case).exists() and not Path(case).suffix:
@@ -98,7 +104,7 @@ def _refuse_unknown(arguments: argparse.Namespace, controllers: list[str]) -> No
 
 
 def _conditions(arguments: argparse.Namespace) -> Conditions:
-    from ers_mj.controllers import parse_gains
+    from ers_mj.controllers import parse_gains, parse_pid
     from ers_mj.simulation import parse_effect
     from ers_mj.trial import Conditions
 
@@ -109,7 +115,7 @@ def _conditions(arguments: argparse.Namespace) -> Conditions:
         amplitude=math.radians(arguments.amplitude_deg), start=math.radians(arguments.start_deg), rate_hz=arguments.rate_hz or 10_000.0,
         u_max=arguments.umax, gap=math.radians(arguments.gap), linkage=arguments.linkage, inductance=arguments.inductance == "on",
         noise=math.radians(arguments.noise_deg), seed=arguments.seed, filter_s=1e-3 * arguments.filter_ms, gains=parse_gains(arguments.gains),
-        effects=tuple(effects))
+        pid=parse_pid(arguments.pid), effects=tuple(effects))
 
 
 def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> list[str]:
@@ -125,7 +131,8 @@ def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> li
     return notes
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of this package and MuJoCo."""
     import mujoco
 
     from ers_mj import __version__

@@ -7,6 +7,7 @@ import pkgutil
 
 from ers_mj.controllers.base import Aim, Controller, Servo, State
 from ers_mj.controllers.finite_time import FiniteTime, Gains, parse_gains
+from ers_mj.controllers.pid import PidGains, parse_pid
 
 FIRST = ("ftrc", "ftrc-literal", "pid", "pid-ff", "hinf")  # the order in which they are told; others follow by name
 
@@ -23,4 +24,4 @@ def _members() -> dict[str, type[Controller]]:
 
 CONTROLLERS = _members()
 
-__all__ = ["CONTROLLERS", "Aim", "Controller", "FiniteTime", "Gains", "Servo", "State", "parse_gains"]
+__all__ = ["CONTROLLERS", "Aim", "Controller", "FiniteTime", "Gains", "PidGains", "Servo", "State", "parse_gains", "parse_pid"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 from ers_mj.datasheet import TABLE_1, Datasheet
@@ -78,7 +79,7 @@ class Servo:
         """theta_r'' + a_1 (theta - theta_0) + a_2 w + c_1 Sgn(theta - theta_0) + c_2 Sgn(w) [rad/s^2]: the torque of the wanted motion."""
         return s.aim.alpha + self.spring(s.theta) + self.a_2 * s.omega + self.friction(s.omega, s.x2)
 
-    @property
+    @cached_property
     def printed_gain(self) -> float:
         """By how much the paper's gains in V/deg, meant for Table 1's servo, are multiplied: the same acceleration for the same error, in V/rad."""
         return math.degrees(1.0) * Servo.of(Datasheet(parameters=TABLE_1)).b / self.b
@@ -96,7 +97,7 @@ class Controller:
 
     name: ClassVar[str] = ""
     sentence: ClassVar[str] = ""
-    takes_gains: ClassVar[bool] = False  # whether the law has the finite-time gains, as the keyword ``gains``
+    takes: ClassVar[str] = ""  # the keyword of its gains: "gains" of the finite-time laws, "pid", none
 
     def __init__(self, servo: Servo, rate_hz: float, u_max: float = 24.0, filter_s: float = FILTER_S):
         self.servo, self.h, self.u_max = servo, 1.0 / rate_hz, u_max
@@ -109,15 +110,25 @@ class Controller:
 
     def voltage(self, aim: Aim, y: float, t: float) -> float:
         """The voltage [V] to hold until the next sample, of the reference and the measured angle y [rad] at time t [s]."""
-        theta, omega = self.sense(y)
-        x2, x3 = aim.theta - theta, aim.omega - omega
-        x1 = self._x1 + self.h * x2
-        wanted = self.law(State(aim, theta, omega, x1, x2, x3))
+        wanted, x1, x2 = self._wanted(aim, y)
         u = min(max(wanted, -self.u_max), self.u_max)
         if (wanted - u) * x2 * self.servo.b <= 0:
             self._x1 = x1
         self.sent(u)
         return u
+
+    def unlimited(self, aim: Aim, y: float, t: float) -> float:
+        """As ``voltage`` of a drive without limit, the law itself as it is."""
+        wanted, self._x1, _ = self._wanted(aim, y)
+        self.sent(wanted)
+        return wanted
+
+    def _wanted(self, aim: Aim, y: float) -> tuple[float, float, float]:
+        """What the law wants [V], the integral x1 with this sample in it, and x2."""
+        theta, omega = self.sense(y)
+        x2, x3 = aim.theta - theta, aim.omega - omega
+        x1 = self._x1 + self.h * x2
+        return self.law(State(aim, theta, omega, x1, x2, x3)), x1, x2
 
     def sense(self, y: float) -> tuple[float, float]:
         """Angle and speed from the measured angle: y itself and its filtered difference. A law with an observer brings its own."""

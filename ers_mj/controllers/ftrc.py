@@ -15,7 +15,7 @@ class Ftrc(Controller):
 
     name = "ftrc"
     sentence = "finite-time law of the proof (30), with its whole feed-forward"
-    takes_gains = True
+    takes = "gains"
 
     def __init__(self, servo, rate_hz, u_max=24.0, *, gains: Gains = Gains(), **options):
         super().__init__(servo, rate_hz, u_max, **options)

@@ -11,7 +11,7 @@ class FtrcLiteral(Controller):
 
     name = "ftrc-literal"
     sentence = "finite-time law as printed in (31), without feed-forward"
-    takes_gains = True
+    takes = "gains"
 
     def __init__(self, servo, rate_hz, u_max=24.0, *, gains: Gains = Gains(), **options):
         super().__init__(servo, rate_hz, u_max, **options)
