@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ers_mj.figures import AFTER, BEFORE, INK, MEASURED, WIDE, both_widths, decimate
+from ers_mj.robustness import Spread
 from ers_mj.trial import Trial
 
 COLOURS = {"ftrc": AFTER, "ftrc-literal": "#7cc2bb", "pid": BEFORE, "pid-ff": "#a83a1e", "hinf": "#8a6bb8", "time-optimal": "#1d4f91"}
@@ -72,4 +73,33 @@ def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | N
     voltage.set_xlabel("time [s]")
     handles, labels = angle.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=7 if wide else 3, handlelength=1.6, columnspacing=1.2)
+    return figure
+
+
+def spreads(found: Sequence[Spread]) -> str:
+    """RMS error of every servo, a row a controller, a panel a case and plant."""
+    return both_widths(lambda width: _spreads(found, width), "RMS error on scattered servos")
+
+
+def _spreads(found: Sequence[Spread], width: float) -> Figure:
+    groups = list(dict.fromkeys((s.case, s.plant) for s in found))
+    rows = len(found) // len(groups)
+    columns = min(len(groups), 2 if width == WIDE else 1)
+    lines = -(-len(groups) // columns)
+    figure = Figure(figsize=(width, lines * (0.9 + 0.3 * rows)), layout="constrained")
+    axes = figure.subplots(lines, columns, squeeze=False).ravel()
+    for ax in axes[len(groups):]:
+        ax.set_visible(False)
+    for ax, (case, plant) in zip(axes, groups, strict=False):
+        group = [s for s in found if (s.case, s.plant) == (case, plant)]
+        for k, s in enumerate(group):
+            x = np.degrees(s.values("rmse_rad"))
+            ax.plot(x, np.full(x.size, k), "|", color=colour(s.controller, k), markersize=9, alpha=0.6)
+            if x.size:
+                ax.plot([np.median(x)], [k], "o", color=colour(s.controller, k), markersize=6)
+        ax.set_yticks(range(len(group)), [s.controller for s in group])
+        ax.set_ylim(len(group) - 0.4, -0.6)
+        ax.set_xscale("log")
+        ax.set_title(f"{case}, {plant} plant", color=INK)
+        ax.set_xlabel("RMS error [°]")
     return figure

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from ers_mj import figures, page, trial_figures
 from ers_mj.claims import claims, degrees
 from ers_mj.display import NONE, figure as digits
+from ers_mj.robustness import Spread
 from ers_mj.trial import Trial
 
 HEADS = ("controller", ">settles", ">overshoot", ">steady-state error", ">RMSE", ">peak", ">RMS", ">chatter", ">energy")
@@ -18,11 +19,11 @@ VERDICT = {True: "holds", False: "<b>does not hold</b>", None: NONE}
 TITLES = {"step": "Step", "square": "Square (Case 1)", "ramp": "Ramp (Case 2)", "chirp": "Chirp, 1 to 20 Hz (Case 3)"}
 
 
-def trial_page(document: Mapping, trials: Sequence[Trial]) -> str:
+def trial_page(document: Mapping, trials: Sequence[Trial], spreads: Sequence[Spread] = ()) -> str:
     """The page as HTML, of what `ers trial --json` prints and the runs behind it."""
     figures.restart_ids()
     groups = dict.fromkeys((t.case, t.plant) for t in trials)
-    sections = [_claims(trials), *(_group([t for t in trials if (t.case, t.plant) == key]) for key in groups), _laws(document)]
+    sections = [_claims(trials), *(_group([t for t in trials if (t.case, t.plant) == key]) for key in groups), _robustness(document, spreads), _laws(document)]
     body = "\n".join([_header(document, trials), *sections, _footer(document)])
     return page.frame("Controllers on trial", "consistent", body)
 
@@ -50,6 +51,22 @@ def _group(trials: Sequence[Trial]) -> str:
     rows = [(_cells(t), "chosen" if t.measures.stable and t.measures.rmse_rad == min(stable) else "") for t in trials]
     drawn = page.figure(trial_figures.curves(trials)) + page.figure(trial_figures.close_up(trials), "A short span, enlarged.")
     return page.section(page.text(f"{TITLES.get(first.case, first.case)}, {first.plant} plant"), "", page.table(HEADS, rows) + drawn)
+
+
+def _robustness(document: Mapping, spreads: Sequence[Spread]) -> str:
+    if not spreads:
+        return ""
+    rows = [((page.text(f"{s.controller}, {s.plant}, {s.case}"), _range(s, "rmse_rad", math.degrees(1.0), "°"), _range(s, "settling_time_s", 1e3, " ms"),
+              _range(s, "overshoot_pct", 1.0, " %"), _range(s, "chatter_V", 1.0, " V"), str(s.as_document()["never_settled"]), str(s.unstable)), "") for s in spreads]
+    lead = (f"{len(spreads[0].measures)} servos, every parameter and the size of every effect within a factor {document['scatter']:g} of the plant's, the controllers knowing only "
+            "their own. Median, and 5 to 95 % of the servos.")
+    heads = ("", ">RMSE", ">settles", ">overshoot", ">chatter", ">never settle", ">unstable")
+    return page.section("Scattered servos", lead, page.table(heads, rows) + page.figure(trial_figures.spreads(spreads), "RMS error: every servo, and the median."))
+
+
+def _range(spread: Spread, name: str, factor: float, unit: str) -> str:
+    q = spread.quantiles(name)
+    return NONE if q is None else f'{digits(factor * q[1])}{unit}<br><span class="why">{digits(factor * q[0])} … {digits(factor * q[2])}</span>'
 
 
 def _cells(trial: Trial) -> tuple[str, ...]:

@@ -8,12 +8,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_out, number, results_folder, several, whole
+from ers_mj.commands.options import add_common, add_out, number, results_folder, several, whole
 from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
     from ers_mj.datasheet import Datasheet
+    from ers_mj.robustness import Spread
     from ers_mj.trial import Conditions, Trial
 
 LINKAGES = ("constant", "rod")
@@ -30,6 +31,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Run controllers in a closed loop and measure them. Lists with commas run every combination.",
         epilog="examples:\n  ers trial\n  ers trial --controller ftrc,pid-ff,time-optimal --plant reduced,mujoco --case square,ramp,chirp --rate-hz 1000 --noise-deg 0.01\n"
                "  ers trial model.toml --design datasheet.toml --case my_reference.csv --umax-V 12 --delay-ms 1 --out mine\n"
+               "  ers trial --plants 50 --scatter 1.25 --case step,chirp --rate-hz 1000\n"
                "  ers trial --plant mujoco --gap 0.5 --inductance on --effect stribeck:dF_s=0.1,v_s=0.2 --json")
     parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="the plant: datasheet or model.toml with its effects (default table1)")
     parser.add_argument("--design", metavar="MODEL", help="what the controllers know of the plant (default the MODEL itself)")
@@ -52,9 +54,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--filter-ms", type=number(least=0), default=0.5, metavar="X", help="time constant of the speed's filter (default 0.5)")
     parser.add_argument("--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them")
     parser.add_argument("--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)")
-    parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of the noise (default 0)")
+    parser.add_argument("--plants", type=whole(0), default=0, metavar="N",
+                        help="try N more servos too, their parameters and effects scattered, unknown to the controllers (default 0)")
+    parser.add_argument("--scatter", type=number(least=1), default=1.2, metavar="X", help="largest factor, up or down, of that (default 1.2)")
     add_out(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
+    add_common(parser)
     parser.set_defaults(run=run)
 
 
@@ -74,12 +78,24 @@ def run(arguments: argparse.Namespace) -> int:
     conditions = _conditions(arguments)
     with Progress() as progress:
         trials = try_out(datasheet, controllers, arguments.plant, arguments.case, conditions, design=design, progress=progress)
+        spreads = _spreads(arguments, datasheet, controllers, conditions, design, progress)
         document = plain({"trials": [t.as_document() for t in trials], "sentence": headline(trials), "notes": _notes(trials, design, conditions),
+                          "robustness": [x.as_document() for x in spreads], "scatter": arguments.scatter,
                           "conditions": conditions.as_document(), "controllers": {name: CONTROLLERS[name].sentence for name in controllers},
                           "datasheet": datasheet.name or arguments.model, "design": design.name or arguments.design, "versions": versions()})
-        files = _write(folder, document, trials, progress) if folder is not None else []
+        files = _write(folder, document, trials, spreads, progress) if folder is not None else []
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
     return 0
+
+
+def _spreads(arguments: argparse.Namespace, datasheet: Datasheet, controllers: list[str], conditions: Conditions, design: Datasheet, progress: Progress) -> list[Spread]:
+    """The same on scattered servos, none where none are asked for."""
+    from ers_mj.robustness import scatter
+
+    if not arguments.plants:
+        return []
+    return scatter(datasheet, controllers, arguments.plant, arguments.case, conditions, count=arguments.plants, spread=arguments.scatter, design=design,
+                   jobs=arguments.jobs, progress=progress)
 
 
 def refuse_unknown(option: str, names: Iterable[str], known: Iterable[str]) -> None:
@@ -140,11 +156,11 @@ def versions() -> dict[str, str]:
     return {"ers-mj": __version__, "mujoco": mujoco.__version__}
 
 
-def _write(folder: Path, document: dict, trials: list[Trial], progress: Progress) -> list[Path]:
+def _write(folder: Path, document: dict, trials: list[Trial], spreads: list[Spread], progress: Progress) -> list[Path]:
     from ers_mj.trial_report import trial_page
 
     progress("drawing the report", 1.0)
-    page = trial_page(document, trials)
+    page = trial_page(document, trials, spreads)
     return write_results(folder, {
         "trials.json": lambda path: write_text(path, as_json(document) + "\n"),
         "report.html": lambda path: write_text(path, page),
@@ -164,8 +180,26 @@ def _told(document: dict, files: list[Path]) -> list[str]:
             if (t["case"], t["plant"]) == (case, plant):
                 cells = "".join(f"{cell(t, *column):>15}" for column in COLUMNS) if t["stable"] else f"{'unstable: it was given up':>30}"
                 lines.append(f"  {t['controller']:24}{cells}")
+    lines += _spread_lines(document)
     lines += ["", *document["notes"]] if document["notes"] else []
     return lines + (["", bold("written"), *(f"  {path}" for path in files)] if files else [])
+
+
+def _spread_lines(document: dict) -> list[str]:
+    """RMS error and settling of the scattered servos: 5 %, median, 95 %."""
+    lines, degree = [], math.degrees(1.0)
+    for case, plant in dict.fromkeys((s["case"], s["plant"]) for s in document["robustness"]):
+        group = [s for s in document["robustness"] if (s["case"], s["plant"]) == (case, plant)]
+        head = f"{case}, {plant}, {group[0]['plants']} servos"
+        lines += ["", bold(f"{head:26}{'RMSE [°] 5 / 50 / 95 %':>30}{'settles [ms] 5 / 50 / 95 %':>30}{'never':>8}{'unstable':>10}")]
+        for s in group:
+            cells = "".join(f"{_three(s['measures'][key], factor, form):>30}" for key, factor, form in (("rmse_rad", degree, ".4f"), ("settling_time_s", 1e3, ".1f")))
+            lines.append(f"  {s['controller']:24}{cells}{s['never_settled']:>8}{s['unstable']:>10}")
+    return lines
+
+
+def _three(quantiles: dict | None, factor: float, form: str) -> str:
+    return "-" if quantiles is None else " / ".join(f"{factor * quantiles[key]:{form}}" for key in ("q05", "median", "q95"))
 
 
 def cell(trial: dict, head: str, key: str, factor: float, form: str) -> str:
