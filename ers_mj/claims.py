@@ -13,7 +13,7 @@ from ers_mj.measures import Measures
 from ers_mj.trial import Trial
 
 LAW, FAIR, RIVALS = "ftrc", "pid-ff", ("pid", "hinf")
-SOON, LITTLE, BETTER = 0.1, 3.0, 0.7  # [s], [%], share: the paper's bars of settling, overshoot and accuracy
+SOON, LITTLE, BETTER, STEADIER = 0.1, 3.0, 0.7, 0.5  # [s], [%], shares: the paper's bars of settling, overshoot, accuracy, steady-state error
 
 
 @dataclass(frozen=True)
@@ -74,12 +74,16 @@ def _of(case: str, ran: Mapping[str, Measures]) -> Iterator[tuple[str, str, bool
     for name in RIVALS:
         if name in ran:
             yield f"error at least 70 % below that of {name}", _against(law, ran[name]), law.rmse_rad <= (1.0 - BETTER) * ran[name].rmse_rad
+            if case in ("square", "ramp"):
+                less = law.steady_state_error_rad <= (1.0 - STEADIER) * ran[name].steady_state_error_rad
+                yield f"steady-state error at least 50 % below that of {name}", _against(law, ran[name], "steady_state_error_rad"), less
             if case == "square" and law.energy_J is not None:
                 yield f"takes less energy than {name}", f"{law.energy_J:.1f} J against {ran[name].energy_J:.1f} J", law.energy_J < ran[name].energy_J
     if FAIR in ran:
         yield "not claimed: error beside PID with the same feed-forward", _against(law, ran[FAIR]), None
 
 
-def _against(law: Measures, other: Measures) -> str:
-    share = 1.0 - law.rmse_rad / other.rmse_rad
-    return f"{degrees(law.rmse_rad)} against {degrees(other.rmse_rad)}, {100 * abs(share):.0f} % {'less' if share >= 0 else 'more'}"
+def _against(law: Measures, other: Measures, key: str = "rmse_rad") -> str:
+    mine, theirs = getattr(law, key), getattr(other, key)
+    share = 1.0 - mine / theirs
+    return f"{degrees(mine)} against {degrees(theirs)}, {100 * abs(share):.0f} % {'less' if share >= 0 else 'more'}"
