@@ -22,7 +22,8 @@ CLOSED_DB = (6.0, 3.0, 1.0)  # contours of |T| in Nichols' plane
 
 def open_loops(loops: Sequence[Loop]) -> str:
     """Bode of the open loops: size and phase."""
-    return both_widths(lambda width: _bode(width, [(x.f_hz, x.L, _shade(x), _dash(x, loops), _label(x, loops)) for x in loops], "open loop", 0.0), "Bode plot of the open loops")
+    lines = [(x.f_hz, x.L, _shade(x), _dash(x, loops), _label(x, loops)) for x in loops]
+    return both_widths(lambda width: _bode(width, lines, "open loop", 0.0), "Bode plot of the open loops")
 
 
 def plants(views: Sequence[PlantView]) -> str:
@@ -184,7 +185,8 @@ def _cycles(found: Cycles, lasting, h: float, width: float) -> Figure:
         begin = int(up[0]) if up.size and up[0] + n <= part.size else 0
         ax.plot(1e3 * t[: part.size - begin], part[begin : begin + n], color=MODELS[k], label=f"{plant}, seen" if found.seen[plant] else f"{plant}, at rest")
     if lasting is not None:
-        ax.plot(1e3 * t, np.degrees(lasting.amplitude) * np.sin(2 * np.pi * lasting.f_hz * t), color=MEASURED, linewidth=2.6, zorder=1, label="predicted")
+        fine = np.linspace(t[0], t[-1], 300)
+        ax.plot(1e3 * fine, np.degrees(lasting.amplitude) * np.sin(2 * np.pi * lasting.f_hz * fine), color=MEASURED, linewidth=2.6, zorder=1, label="predicted")
     ax.set_xlabel("time [ms]")
     ax.set_ylabel("angle [°]")
     ax.margins(x=0)
@@ -205,7 +207,8 @@ def _recording(compared: Compared, width: float) -> Figure:
         size.semilogx(r.f_hz, decibels(model), color=MODELS[k % len(MODELS)], label=name)
         phase.semilogx(r.f_hz, np.degrees(np.unwrap(np.angle(model))), color=MODELS[k % len(MODELS)])
     marks = {"linestyle": "none", "marker": "o", "markersize": 4.5}
-    turned = np.degrees(np.angle(r.g / next(iter(compared.models.values())))) + np.degrees(np.unwrap(np.angle(next(iter(compared.models.values())))))
+    first = next(iter(compared.models.values()))
+    turned = np.degrees(np.angle(r.g / first) + np.unwrap(np.angle(first)))  # on the models' branch
     for part, shade, label in ((r.sure, INK, f"recorded, sure"), (~r.sure, "#b9c2cc", "recorded, unsure")):
         if part.any():
             size.semilogx(r.f_hz[part], decibels(r.g[part]), color=shade, label=label, **marks)

@@ -203,7 +203,7 @@ def gap(response: Response, model: np.ndarray) -> Gap | None:
     open_ = 1.0 / response.coherence[k] - 1.0  # variance of the response, relative, of one period
     linear = bool(off.mean() > 4.0 * open_.mean() / max(response.periods, 1) + EXACT[response.kind] ** 2)
     band = _band(response.f_hz[k], off)
-    what = "a linear part is missing (gain, phase or resonance)" if linear else "no more than noise and distortion leave open"
+    what = "more than noise and distortion leave open, its linear part is off" if linear else "no more than noise and distortion leave open"
     sentence = (f"{response.name}: the model is {_rms(db):.2g} dB and {_rms(deg):.2g} deg off (RMS over {k.sum()} lines), most of it at {band[0]:.3g} to "
                 f"{band[1]:.3g} Hz: {what}")
     return Gap(int(k.sum()), _rms(db), float(np.abs(db).max()), _rms(deg), float(np.abs(deg).max()), band, linear, sentence)
