@@ -63,6 +63,13 @@ def test_mujocos_own_derivatives_agree(effects, options):
     assert np.abs(loads - 1).max() < 0.02
 
 
+@pytest.mark.parametrize("effects", [(), ("presliding:x_s=0.001,zeta=0.5",)])
+def test_a_lumped_servo_that_turns_the_other_way_has_mujocos_derivatives_too(effects):
+    sheet = replace(SHEET, parameters={}, lumped={"a_1": 28.0, "a_2": 56.0, "b": -81.0, "c_1": 10.0, "c_2": 20.0, "theta_0": 0.1})
+    pair = [linearised(build_plant(sheet, plant=kind, effects=[parse_effect(text) for text in effects]), 1000.0, 0.3) for kind in ("reduced", "mujoco")]
+    np.testing.assert_allclose(pair[1].response(F_HZ) / pair[0].response(F_HZ), np.ones(F_HZ.size), atol=0.04)
+
+
 def test_effects_that_no_linear_plant_has_are_named():
     plant = build_plant(SHEET, plant="mujoco", effects=[parse_effect(text) for text in ("stribeck:dF_s=0.1,v_s=0.2", "voltage_saturation:u_max=9")])
     assert linearised(plant, 1000.0, HOME + 0.1).left_out == ("voltage_saturation", "stribeck")
@@ -186,6 +193,11 @@ def test_the_cycle_of_a_play_is_predicted(kind):
     assert cycles_of(SHEET, kind) == ([], None)
 
 
+def test_nothing_is_asked_beyond_half_the_sample_rate():
+    law = CONTROLLERS["pid"](Servo.of(FREE), 100.0)
+    assert all(c.f_hz < 50.0 for c in predicted(law, Coefficients(*build_plant(FREE)._lowered[0]), HOME))
+
+
 def test_only_what_goes_on_is_a_cycle():
     t = np.arange(4000) / 1000.0
     sine = 0.01 * np.sin(2 * np.pi * 23.4 * t)
@@ -233,7 +245,7 @@ def test_a_table_and_a_page_are_written(free, tmp_path, capsys):
 @pytest.mark.parametrize(("arguments", "says"), [
     (["--controller", "lqr"], "there is no 'lqr'; there are ftrc"), (["--plant", "adams"], "there are reduced, mujoco"), (["nothing.csv"], "no such file"),
     (["--pid", "Q=1"], "there is no gain 'Q'; there are P, I, D"), (["--pid", "P=x"], "a number was expected"), (["--pid", "P=-1"], "not between"),
-    (["--amplitude-deg", "0"], "not above 0"), (["--datasheet", "nothing.toml"], "no such file"), (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice")])
+    (["--amplitude-deg", "0"], "not above 0"), (["--rate-hz", "5"], "20 Hz or more was expected"), (["--datasheet", "nothing.toml"], "no such file"), (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice")])
 def test_bad_input_is_one_sentence_and_code_2(arguments, says, capsys):
     assert cli.main(["frequency", "--json", *arguments]) == 2
     error = capsys.readouterr().err

@@ -23,10 +23,10 @@ from scipy.optimize import root
 from ers_mj.closed_loop import Sampled, Sensor, close
 from ers_mj.controllers import Controller
 from ers_mj.effects.base import Coefficients
-from ers_mj.frequency.describing import contact, controller_response, coulomb, preload, saturation
+from ers_mj.frequency.describing import ROOM, contact, controller_response, coulomb, preload, saturation
 from ers_mj.references import Reference
 
-FROM_HZ, TO_HZ = 2.0, 500.0  # where cycles are looked for
+FROM_HZ, TO_HZ = 2.0, 500.0  # where cycles are looked for, below half the sample rate
 LEAST, MOST = math.radians(0.02), math.radians(20.0)  # [rad] amplitudes of the rudder
 ASKED_HZ, ASKED_E = 24, 7  # grid on which the controller is asked
 LOOKED_HZ, LOOKED_E = 120, 48  # grid on which the balance is looked at
@@ -57,14 +57,15 @@ def predicted(controller: Controller, c: Coefficients, centre: float) -> list[Cy
         c: the plant. What holds it at its centre is taken as constant.
         centre: where the reference stands.
     """
-    f_hz, E = np.geomspace(FROM_HZ, TO_HZ, ASKED_HZ), np.geomspace(LEAST, MOST, ASKED_E)
+    top = min(TO_HZ, ROOM / controller.h)
+    f_hz, E = np.geomspace(FROM_HZ, top, ASKED_HZ), np.geomspace(LEAST, MOST, ASKED_E)
     C = _surface(f_hz, E, np.array([controller_response(controller, centre, e, f_hz) for e in E]).T)
 
     def left(f: float, e: float) -> complex:
         asks = C(f, e)
         return residual(c, controller.h, centre, asks * saturation(controller.u_max, abs(asks) * e), f, e)
 
-    return balanced(left)
+    return balanced(left, top)
 
 
 def _surface(f_hz: np.ndarray, E: np.ndarray, values: np.ndarray) -> Callable[[float, float], complex]:
@@ -110,9 +111,9 @@ def _contacts(k: float, d: float, gap: float, w: float) -> tuple[np.ndarray, np.
     return np.abs(N) * twist, N
 
 
-def balanced(residual: Callable[[float, float], complex]) -> list[Cycle]:
-    """Where a residual of (frequency [Hz], amplitude [rad]) vanishes, those that last first."""
-    f_hz, E = np.geomspace(FROM_HZ, TO_HZ, LOOKED_HZ), np.geomspace(LEAST, MOST, LOOKED_E)
+def balanced(residual: Callable[[float, float], complex], to_hz: float = TO_HZ) -> list[Cycle]:
+    """Where a residual of (frequency [Hz], amplitude [rad]) vanishes up to to_hz, those that last first."""
+    f_hz, E = np.geomspace(FROM_HZ, to_hz, LOOKED_HZ), np.geomspace(LEAST, MOST, LOOKED_E)
     R = np.array([[residual(f, e) for e in E] for f in f_hz])
     ends = np.log([[f_hz[0], E[0]], [f_hz[-1], E[-1]]])
     at = lambda z: residual(*np.exp(np.clip(z, *ends)).tolist())  # noqa: E731

@@ -18,13 +18,15 @@ from scipy.linalg import expm
 
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Coefficients, Effect
+from ers_mj.errors import InputError
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.mjcf import unlogged
 from ers_mj.plants.reduced import ReducedModel
 
 SLIP = 1.0  # [rad/s] of the point
 NUDGE = 1e-5  # of the point, for slopes of laws
-EPSILON = 1e-7  # of MuJoCo's finite differences: less than what its rigid contacts give under their loads
+EPSILONS = (1e-7, 1e-8, 3e-9, 1e-9)  # of MuJoCo's finite differences: the first that its rigid contacts bear, which give little under their loads
+BURST = 1.01  # growth in one step beyond which a difference has opened a contact
 SETTLE_S = 0.1  # before them, so that contacts and couplings carry their loads
 Move = Callable[[float], tuple[np.ndarray, np.ndarray]]  # time [s] -> (transition, effect of held inputs)
 
@@ -147,16 +149,24 @@ def transitions(plant: MechanicalPlant, rate_hz: float, theta: float, omega: flo
     """A (n, n), B (n, 2) of voltage [V] and load [rad/s^2], C (1, n), from one step of MuJoCo to the next, and that step [s].
 
     By `mjd_transitionFD`, after SETTLE_S of motion under the voltage that holds the speed.
+
+    Raises:
+        InputError: no difference is small enough for the contacts at this point.
     """
     stepper, c, J = plant._stepper(), plant._lowered, plant._skeleton.inertia
     model, data = stepper.model, stepper.data
     v = (c.a_1 * (theta - c.theta_0) + (c.a_mech_plus + c.a_emf) * omega + c.c_1 * np.sign(theta - c.theta_0) + c.c_2_plus) / c.b
     stepper.reset(_pushing(plant, theta - SETTLE_S * omega, omega))
-    stepper.hold([(v, round(SETTLE_S / plant.timestep))], SETTLE_S)
+    stepper.hold([(v, stepper._divide(SETTLE_S)[1])], SETTLE_S)
     model.opt.timestep, _ = stepper._divide(1.0 / rate_hz)
     n = 2 * model.nv + model.na
     A, B = np.zeros((n, n)), np.zeros((n, model.nu))
-    mujoco.mjd_transitionFD(model, data, EPSILON, 1, A, B, None, None)
+    for epsilon in EPSILONS:
+        mujoco.mjd_transitionFD(model, data, epsilon, 1, A, B, None, None)
+        if np.isfinite(A).all() and np.abs(np.linalg.eigvals(A)).max() < BURST:
+            break
+    else:
+        raise InputError(f"MuJoCo's derivatives at {theta:.4g} rad and {omega:.3g} rad/s are those of no motion: its contacts carry too little load there")
     C = np.zeros((1, n))
     C[0, [stepper.rocker, *([stepper.gap] if stepper.gap is not None else [])]] = 1.0
     return A, B[:, [stepper.motor, stepper.load]] * [1.0, J], C, model.opt.timestep

@@ -29,6 +29,7 @@ Progress = Callable[[str, float], None]
 KICK = math.radians(2.0)  # from the centre, at which a loop is let go
 CYCLE_S = 3.0  # [s] for which it is watched
 COMPARED_HZ = 100.0  # up to which linear plants are compared in one number
+SLOWEST_HZ = 20.0  # sample rate of a loop that is analysed
 DRAWN = 300  # frequencies of a plant's own picture
 
 
@@ -86,8 +87,10 @@ def study(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[str
         progress: told (text, fraction).
 
     Raises:
-        InputError: the datasheet, an effect or a recording cannot be used.
+        InputError: the datasheet, an effect, a recording or the sample rate cannot be used.
     """
+    if conditions.rate_hz < SLOWEST_HZ:
+        raise InputError(f"the loop's sample rate is {conditions.rate_hz:g} Hz, {SLOWEST_HZ:g} Hz or more was expected")
     known = Servo.of(design or datasheet)
     responses = [_response(r, datasheet) for r in recordings]  # what cannot be used is refused before anything runs
     built = {name: _build(datasheet, name, conditions) for name in plants}
