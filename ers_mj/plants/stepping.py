@@ -90,6 +90,19 @@ class Stepper:
                 self._advance(v, known, count)
         return rows
 
+    def hold(self, inputs: Sequence[tuple[float, int]], sample: float) -> None:
+        """Go on over one sample [s] under (voltage, steps) one after the other, the circuit closed."""
+        self.model.opt.timestep, _ = self._divide(sample)
+        self._connect(True)
+        for v, steps in inputs:
+            if steps:
+                self._advance(v, 0.0, steps)
+
+    def drive_under(self, v: float) -> float:
+        """Drive acceleration at the present state with v [V] at the terminals."""
+        self._connect(True)
+        return self._drive(v)
+
     def _divide(self, sample: float) -> tuple[float, int]:
         """(step [s], steps) of a sample: the longest step that is no longer than the timestep and divides it."""
         steps = max(1, math.ceil(sample / self.timestep - 1e-6))
