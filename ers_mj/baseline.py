@@ -21,6 +21,7 @@ from ers_mj.traces import Trace
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
 OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
 STARTS = 6  # guesses that are refitted
+VALLEY = 10.0  # of C by which two fits differ that ended in different valleys
 SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
 
 
@@ -60,8 +61,8 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
     known = datasheet.to_lumped() if datasheet is not None else {}
     if {"a_2", "b"} <= known.keys():
         sheet = _from_datasheet(traces, known, is_angle)
-        refitted, traces = _refined(sheet, traces, jobs)
-        found = Start(refitted, traces, ({**sheet.values, "theta_0": refitted.model.values["theta_0"]},))
+        refitted, traces, others = _refined(sheet, traces, jobs)
+        found = Start(refitted, traces, ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others))
     else:
         found = _from_scratch(traces, known, is_angle, jobs)
     if not np.isfinite(found.fit.cost):
@@ -69,13 +70,17 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
     return found
 
 
-def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace]]:
-    """Fit, with the initial states fitted before and after."""
+def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace], list[Mapping[str, float]]]:
+    """Fit, with the initial states fitted before and after; the traces with these, and the values of another valley if it was met.
+
+    From afar tangents and finite differences may lead to different valleys. The lower one is the baseline, the other may be the less bent.
+    """
     traces = with_starts(model, traces)
-    first = fit(model, traces)
+    first, second = sorted((fit(model, traces, by_tangents=by_tangents) for by_tangents in (True, False)), key=lambda found: found.cost)
     traces = with_starts(first.model, without_spikes(first.model, traces))
     found = fit(first.model, traces, tau=tau_of(first.misfit))
-    return hopped(found, traces, tau_of(found.misfit), jobs, restart=True)
+    others = [dict(second.model.values)] if second.cost - found.cost > VALLEY else []
+    return *hopped(found, traces, tau_of(found.misfit), jobs, restart=True), others
 
 
 def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> Model:
@@ -136,8 +141,8 @@ def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle:
         if chosen.cost - best[kind].cost > price:
             chosen = best[kind]
     scales = scales_of(traces, chosen.model.values, is_angle, None)
-    found, traces = _refined(replace(chosen.model, effects=(), scales=scales), traces, jobs)
-    return Start(found, traces, (dict(chosen.model.values),) if chosen.model.effects else ())
+    found, traces, others = _refined(replace(chosen.model, effects=(), scales=scales), traces, jobs)
+    return Start(found, traces, (*((dict(chosen.model.values),) if chosen.model.effects else ()), *others))
 
 
 def _searched(traces, starts, scales, springs, least, scaffolds) -> Fit:

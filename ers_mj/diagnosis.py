@@ -52,7 +52,7 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     start = baseline(traces, datasheet, first.output_unit == "rad", jobs)
     sensors = _symptoms(start.traces, 2 * start.fit.model.scales.position)
     chosen = select(start.fit, start.traces, anchors=start.anchors, exclude=_ordinary(start.fit.model), jobs=jobs, progress=progress)
-    start = replace(start, fit=polished(start.fit, start.traces))
+    start = replace(start, fit=polished(chosen.base, start.traces))
     chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, [trace_of(r, inertia) for r in holdout])

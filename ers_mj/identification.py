@@ -70,12 +70,13 @@ def tau_of(misfit: np.ndarray) -> float:
 
 
 def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25,
-        ceiling: np.ndarray | None = None, known: Columns | None = None, renewals: float = math.inf) -> Fit:
+        ceiling: np.ndarray | None = None, known: Columns | None = None, renewals: float = math.inf, by_tangents: bool = True) -> Fit:
     """Minimise C over the model's free numbers, from the model's own values.
 
     ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
     given up, since its start was a bad one. ``known`` are columns of a Jacobian taken near by, with which the search begins; after
-    ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further.
+    ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further. Where their number is unlimited a search
+    ``by_tangents`` (see jacobian_of) does not end before finite differences lead no further either.
 
     Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
     mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
@@ -91,7 +92,8 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
         level = float(np.exp(np.mean(np.log(misfit + tau)))) if sound else 0.0
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
-        found, jacobian, renewals = _descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, jacobian, renewals)
+        found, jacobian, renewals = _descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, jacobian, renewals,
+                                               by_tangents)
         if last or (ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size):
             return found
         model = found.model
@@ -164,7 +166,7 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
 
 
 def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, jacobian: np.ndarray | None,
-             renewals: float) -> tuple[Fit, np.ndarray | None, float]:
+             renewals: float, by_tangents: bool = True) -> tuple[Fit, np.ndarray | None, float]:
     """See ``descend``: the fit, the Jacobian that it ended with, and how many it may still take.
 
     Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised.
@@ -172,6 +174,7 @@ def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, ste
     layout, blocks = model.layout(), Blocks.of(traces)
     z = model.vector(layout)
     damping, calls, fresh = 1e-3, 1, False
+    final = not by_tangents or math.isfinite(renewals) or not _has_tangents(model, traces)
 
     def evaluate(z):
         e = residuals(model.at(layout, z), traces, rate)
@@ -188,7 +191,7 @@ def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, ste
         if jacobian is None:
             if renewals <= 0:
                 break
-            jacobian, fresh = jacobian_of(model, layout, z, e, traces, rate), True
+            jacobian, fresh = jacobian_of(model, layout, z, e, traces, rate, by_tangents=by_tangents), True
             calls, renewals = calls + z.size, renewals - 1
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
         weighted = jacobian * weight[:, None]
@@ -206,8 +209,10 @@ def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, ste
             damping = max(damping * 8, 1e-6)
             step = None
         if step is None:
-            if fresh:
+            if fresh and final:
                 break
+            if fresh:
+                by_tangents, final, damping = False, True, 1e-3
             jacobian = None
             continue
         moved, gain, was_fresh = goal - z, cost - trial[2], fresh
@@ -219,23 +224,30 @@ def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, ste
         z, (e, m, cost) = goal, trial
         damping = max(damping / 8, 1e-9)
         if gain < tolerance:
-            if was_fresh or renewals <= 0:
+            if (was_fresh and final) or renewals <= 0:
                 break
+            if was_fresh:
+                by_tangents, final = False, True
             jacobian = None
     return Fit(model.at(layout, z), cost, m, hessian, calls), jacobian, renewals
 
 
-def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None):
+def _has_tangents(model: Model, traces: Sequence[Trace]) -> bool:
+    return model.has_tangents and all(t.is_uniform for t in traces)
+
+
+def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None, by_tangents: bool = True):
     """Slopes of the residuals e (N,) by the fitted numbers, but for the ``known`` ones: (N, k).
 
-    By tangents of the motion where the model has them, else by finite differences of simulations.
+    By tangents of the motion where the model has them, else by finite differences of simulations. Where stick and slip fork
+    the two lead elsewhere, and either may be the better.
     """
     jacobian = np.empty((e.size, z.size))
     wanted = [k for k in range(z.size) if not (known and layout[k].key in known)]
     for k in set(range(z.size)) - set(wanted):
         jacobian[:, k] = known[layout[k].key]
     others = [model.at(layout, z + DIFFERENCE * (np.arange(z.size) == k)) for k in wanted]
-    if model.has_tangents and all(t.is_uniform for t in traces):
+    if by_tangents and _has_tangents(model, traces):
         jacobian[:, wanted] = -model.at(layout, z).changes(traces, rate, others, 1.0 / DIFFERENCE)
     else:
         for k, other in zip(wanted, others):

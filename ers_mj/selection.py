@@ -20,6 +20,7 @@ from ers_mj.model import OBSERVER_RATE, STATES, Columns, Model
 from ers_mj.traces import BLOCK, Blocks, Trace
 
 LEAST_GAIN = 5.0  # decrease of C that an effect must buy
+BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
 QUIET, LEAST_PROMISE = 0.04, 2.5  # C per block up to which a round goes on only for a candidate whose secant promises so much of C
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
@@ -39,6 +40,7 @@ NEAR_TIE = 0.02  # share of the best one's gain within which candidates are riva
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
+MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
 
@@ -274,7 +276,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     states = [(s, [[Begin(base.model.with_state(s, len(traces)), {})]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
-        quiet, bent = reference <= QUIET * base.misfit.size, not near_noise(base)
+        quiet, bent = reference <= QUIET * base.misfit.size, not near_noise(base) or reference > BENT * base.misfit.size
         screened = screen(places, traces, tau, exclude, bent, quiet)
         if quiet and not screened:
             return []
@@ -346,12 +348,17 @@ class Selection:
 def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str, float]] = (), exclude: Sequence[str] = (),
            jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless."""
-    current, rounds = base, []
+    current, rounds, mended = base, [], 0
     tau = tau_of(base.misfit)
     while len(rounds) < (MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS):
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
+        if ranked and least <= ranked[0].gain <= MODEST and mended < MOST_MENDED:
+            again = _less(ranked[0], traces, tau)
+            if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT:
+                base, current, mended = base if current.model.names else again, again, mended + 1
+                continue
         rounds.append(tuple(ranked))
         if not ranked or ranked[0].gain < least or not _sure(ranked[0]):
             break
@@ -363,6 +370,14 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         if near_noise(current):
             current = _exchanged(current, rounds[:-1], traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau)
+
+
+def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
+    """The model that a candidate extends, refitted from where the candidate stands: the way out of a dent is no gain of an effect's."""
+    model = candidate.fit.model
+    if candidate.name in BY_NAME:
+        return fit(model.without_effect(candidate.name), traces, tau=tau, steps=12)
+    return fit(replace(model, states={k: v for k, v in model.states.items() if k != candidate.name} or None), traces, tau=tau, steps=12)
 
 
 def _sure(candidate: Candidate) -> bool:

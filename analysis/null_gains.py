@@ -1,0 +1,47 @@
+"""How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
+
+Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits every effect whose secant
+promises anything at all, with the gate LEAST_PROMISE of selection.py open. Prints the largest gain in C of each servo and the mean, which is the scale of
+the exponential tail that evaluation.paired_p assumes.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from concealed_cases import main as make_cases  # noqa: E402
+from ers_mj import selection  # noqa: E402
+from ers_mj.baseline import baseline  # noqa: E402
+from ers_mj.datasheet import read_datasheet  # noqa: E402
+from ers_mj.effects import BY_NAME  # noqa: E402
+from ers_mj.recording import read_recording  # noqa: E402
+from ers_mj.traces import trace_of  # noqa: E402
+
+
+def largest_gain(folder):
+    """(gain in C, name) of the best effect on the recordings of a folder."""
+    sheet = read_datasheet(str(folder / "datasheet.toml"))
+    traces = [trace_of(read_recording(str(path)), sheet.parameters["J"]) for path in sorted(folder.glob("rec*.csv"))]
+    start = baseline(traces, sheet, True)
+    found = selection.select(start.fit, start.traces, anchors=start.anchors, exclude=("inductance",))
+    return max(((c.gain, c.name) for c in found.rounds[0] if c.name in BY_NAME), default=(0.0, "nothing"))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=24)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    selection.LEAST_PROMISE, selection.MOST_ROUNDS = 0.0, 1
+    gains = []
+    with tempfile.TemporaryDirectory() as folder:
+        make_cases(["--out", folder, "--seed", str(options.seed), "--cases", str(options.cases), "--kind", "none", "--coloured", "0.5", "--no-refit"])
+        for case in sorted(Path(folder).glob("case-*")):
+            gain, name = largest_gain(case)
+            gains.append(max(gain, 0.0))
+            print(f"{case.name}  {gain:6.2f}  {name}", flush=True)
+    print(f"{len(gains)} servos: mean {np.mean(gains):.2f}, 90 % {np.quantile(gains, 0.9):.2f}, largest {np.max(gains):.2f}")
