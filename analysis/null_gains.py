@@ -1,8 +1,8 @@
 """How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
 
 Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits every effect whose secant
-promises anything at all, with the gate LEAST_PROMISE of selection.py open. Prints the largest gain in C of each servo and the mean, which is the scale of
-the exponential tail that evaluation.paired_p assumes.
+promises anything at all, with the gate LEAST_PROMISE of selection.py open. Prints the largest gain in C of each servo, from whose tail comes the scale of
+the exponential that evaluation.paired_p assumes.
 """
 
 import argparse
