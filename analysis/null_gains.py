@@ -1,7 +1,7 @@
 """How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
 
 Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits every effect whose secant
-promises anything at all, with the gate LEAST_PROMISE of selection.py open. Prints the largest gain in C of each servo, from whose tail comes the scale of
+promises anything at all, with the gate LEAST_PROMISE of screening.py open. Prints the largest gain in C of each servo, from whose tail comes the scale of
 the exponential that evaluation.paired_p assumes.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from concealed_cases import main as make_cases  # noqa: E402
-from ers_mj import selection  # noqa: E402
+from ers_mj import screening, selection  # noqa: E402
 from ers_mj.baseline import baseline  # noqa: E402
 from ers_mj.datasheet import read_datasheet  # noqa: E402
 from ers_mj.effects import BY_NAME  # noqa: E402
@@ -36,7 +36,7 @@ if __name__ == "__main__":
     parser.add_argument("--cases", type=int, default=24)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    selection.LEAST_PROMISE, selection.MOST_ROUNDS = 0.0, 1
+    screening.LEAST_PROMISE, selection.MOST_ROUNDS = 0.0, 1
     gains = []
     with tempfile.TemporaryDirectory() as folder:
         make_cases(["--out", folder, "--seed", str(options.seed), "--cases", str(options.cases), "--kind", "none", "--coloured", "0.5", "--no-refit"])

@@ -14,26 +14,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.effects import BY_NAME, Effect
-from ers_mj.identification import Fit, converged, fit, hopped, jacobian_of, near_noise, residuals, score, tau_of
-from ers_mj.model import OBSERVER_RATE, STATES, Columns, Model
-from ers_mj.traces import BLOCK, Blocks, Trace
+from ers_mj.effects import BY_NAME
+from ers_mj.identification import Fit, converged, fit, hopped, near_noise, score, tau_of
+from ers_mj.model import STATES
+from ers_mj.screening import Begin, screen
+from ers_mj.traces import Trace
 
 LEAST_GAIN = 5.0  # decrease of C that an effect must buy
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
-QUIET, LEAST_PROMISE = 0.04, 2.5  # C per block up to which a round goes on only for a candidate whose secant promises so much of C
+QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 8.0  # of C that suffices where an effect acts once
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
-MOST_SENT, LATER = 10, 5  # candidates of the screening that are refitted at most, in the first round and beside an effect
-PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
 RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
 LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
-LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
@@ -42,15 +40,6 @@ MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself 
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
-HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
-
-
-@dataclass(frozen=True)
-class Begin:
-    """Where a refit begins: the model, and the Jacobian's columns at the place that it extends."""
-
-    model: Model
-    known: Columns
 
 
 @dataclass(frozen=True)
@@ -77,164 +66,6 @@ def paired_z(better: np.ndarray, worse: np.ndarray, tau: float) -> float:
     d = score(worse, tau) - score(better, tau)
     spread = float(np.std(d, ddof=1)) if d.size > 1 else math.inf
     return float(np.mean(d)) * math.sqrt(d.size) / spread if spread > 0 else 0.0
-
-
-def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str],
-           bent: bool, quiet: bool) -> list[tuple[str, list[list[Begin]]]]:
-    """The promising effects, each with the models to refit: for every place, those of its best starts.
-
-    From each place (the refitted baseline first, and where else a fit may start from) the secant e(with effect) - e(without) is taken
-    at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
-    largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
-    a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
-    the first place, or from all of them where it is far from the noise, ``bent`` by what is missing: MOST_SENT at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth
-    LEAST_PROMISE. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
-    """
-    names, floor = [name for name in BY_NAME if name not in exclude], 0.0
-    promises, begins = {}, {}
-    for place in places:
-        e = residuals(place, traces, OBSERVER_RATE)
-        if not np.all(np.isfinite(e)):
-            continue
-        (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
-        for effect in (BY_NAME[name] for name in names):
-            starts = _hopeful(place, effect, effect.starts(scales), targets, traces)
-            found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
-            if found:
-                found.sort(key=lambda p: -p[0])
-                promises[effect.name] = max(promises.get(effect.name, 0.0), found[0][0])
-                begins.setdefault(effect.name, []).append([Begin(model, known) for _, model in found[:effect.tries]])
-        if quiet and not floor:
-            floor = 2.0 * LEAST_PROMISE / float(targets[0][2] @ targets[0][2])
-        if not bent:
-            names = _promising(promises, floor, LATER if place.names else MOST_SENT)
-    return [(name, begins[name]) for name in _promising(promises, floor, LATER if places[0].names else MOST_SENT)]
-
-
-def _promising(promises: Mapping[str, float], floor: float, most: int) -> list[str]:
-    """The effects that are refitted, the most promising first."""
-    best = sorted(promises, key=promises.get, reverse=True)[:most]
-    return [name for name in best if promises[name] >= max(floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * promises[best[0]])]
-
-
-def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
-    """Of many starts of a law, those that promise most to first order along the place's own motion."""
-    if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or not place.has_tangents:
-        return starts
-    groups = _groups(effect, traces)
-    waves = 2 if effect.wave else 1
-    every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
-    changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0).T
-    shares = [max(_mixed(_split(changes[i:i + waves], groups), target)[0] if effect.signed else _explained(changes[i], target, False)[0]
-                  for target in targets) for i in range(0, len(every), waves)]
-    best = sorted(np.argsort(shares)[::-1][:effect.tries])
-    return [starts[i] for i in best]
-
-
-def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
-    """The Jacobian's columns at the place, and at either weighting (weights (N,), orthonormal basis (N, k) of the place's own
-    parameters, weighted residual (N,) beside it)."""
-    blocks, layout = Blocks.of(traces), place.layout()
-    m = blocks.misfit(e)
-    jacobian = jacobian_of(place, layout, place.vector(layout), e, traces, OBSERVER_RATE)
-    out = []
-    for level in (tau, max(tau, float(np.mean(m)))):
-        root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
-        basis, _ = np.linalg.qr(jacobian * root[:, None])
-        out.append((root, basis, root * e - basis @ (basis.T @ (root * e))))
-    return {f.key: column for f, column in zip(layout, jacobian.T)}, out
-
-
-def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
-    """Share of the residual that the start's secant explains, and the model with the start as large as the secant asks for.
-
-    A secant across a large step bends; where the effect is proportional to its leading parameters it is taken again at that size.
-    """
-    if effect.wave and np.isfinite(start[effect.wave[1]]):
-        return _promise_of_wave(place, effect, start, e, targets, traces)
-    best = None
-    for _ in range(2 if effect.sized else 1):
-        secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
-        if not np.all(np.isfinite(secant)):
-            break
-        share, factor = max(_explained(secant, target, effect.signed) for target in targets)
-        start = _resized(start, effect.sized, factor)
-        if best is None or share > best[0]:
-            best = share, place.with_effect(effect.name, start)
-    return best
-
-
-def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
-    """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local."""
-    amplitude, phase = effect.wave
-    secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
-    if not np.all(np.isfinite(secants)):
-        return None
-    columns = _split(secants, _groups(effect, traces))
-    share, mixture = max((_mixed(columns, target) for target in targets), key=lambda found: found[0])
-    mixture = mixture.reshape(-1, 2)
-    sizes, turns = np.hypot(*mixture.T), np.arctan2(mixture[:, 1], mixture[:, 0])
-    found = start.copy()
-    found[amplitude] *= min(max(math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
-    found[phase] += turns[0]
-    model = place.with_effect(effect.name, found)
-    if effect.local:
-        model.local[effect.name][:, effect.local_columns.index(phase)] = start[phase] + turns
-    return share, model
-
-
-def _mixed(columns: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[float, np.ndarray]:
-    """Share of a target that the columns (N, 2 g) explain together, and the multiples (2 g,) of them that do."""
-    root, basis, residual = target
-    weighted = root[:, None] * columns
-    known = basis.T @ weighted
-    pull = -(weighted.T @ residual)
-    multiples = np.linalg.lstsq(weighted.T @ weighted - known.T @ known, pull, rcond=1e-12)[0]
-    return float(pull @ multiples) / float(residual @ residual), multiples
-
-
-def _quarter(effect: Effect, start: np.ndarray) -> np.ndarray:
-    """The start of a wave a quarter period on."""
-    turned = start.copy()
-    turned[effect.wave[1]] += 0.5 * math.pi
-    return turned
-
-
-def _groups(effect: Effect, traces: Sequence[Trace]) -> np.ndarray:
-    """For each sample (N,) the number of what may have a phase of its own: its recording, or 0 for all."""
-    return np.repeat(np.arange(len(traces)) if effect.local and effect.wave else np.zeros(len(traces), int), [t.rows for t in traces])
-
-
-def _split(changes, groups: np.ndarray) -> np.ndarray:
-    """Columns (N, groups x changes): each change (N,) within each group."""
-    return np.column_stack([np.where(groups == g, s, 0.0) for g in range(groups[-1] + 1) for s in changes])
-
-
-def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int, float, float], ...]:
-    """Spans (recording, begin [s], length [s]) around the blocks of largest misfit: where something may have knocked."""
-    blocks = Blocks.of(traces)
-    record = np.repeat(np.arange(len(traces)), [t.counts.size * (1 + len(t.channels)) for t in traces])
-    within = np.concatenate([np.tile(np.arange(t.counts.size), 1 + len(t.channels)) for t in traces])
-    worst = np.argsort(-score(blocks.misfit(e), tau), kind="stable")[:HOTTEST]
-    return tuple((int(record[b]), float(traces[record[b]].t[0] + within[b] * BLOCK), length) for b in worst for length in KNOCKS)
-
-
-def _explained(secant: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray], signed: bool) -> tuple[float, float]:
-    """Share of a target that a secant (N,) explains, and the multiple of the secant that does."""
-    root, basis, residual = target
-    weighted = root * secant
-    known = basis.T @ weighted
-    size, pull = float(weighted @ weighted) - float(known @ known), -float(weighted @ residual)
-    if size <= 1e-12 or (pull <= 0 and not signed):
-        return 0.0, LEAST_SIZE
-    return pull**2 / size / float(residual @ residual), pull / size
-
-
-def _resized(start: np.ndarray, sized: int, factor: float) -> np.ndarray:
-    """The start with the effect as large as its secant asks for, so that the refit begins near the model it extends."""
-    start = start.copy()
-    start[:sized] *= math.copysign(min(max(abs(factor), LEAST_SIZE), MOST_SIZE), factor)
-    return start
 
 
 def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str],
