@@ -1,5 +1,7 @@
 """What to record next: within the limits, the same every time, and telling what it promises."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,8 +12,8 @@ from ers_mj.datasheet import Datasheet
 from ers_mj.design import SETTLED
 from ers_mj.excitation import SHARES, WAVES, Limits, excitations, signal
 from ers_mj.identification import fit
-from ers_mj.starts import with_starts
 from ers_mj.isolability import isolability, probabilities
+from ers_mj.starts import with_starts
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
@@ -33,11 +35,12 @@ def traces_of(effects, names=("ramp", "steps")):
 
 
 def explained(traces, *starts):
-    """The traces with their initial states, and a fit for each effect begun at a start."""
+    """The traces, at rest when they begin, and a fit for each effect begun at a start."""
     sheet = Datasheet(lumped={k: TRUTH[k] for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")},
                       baseline={k: TRUTH[k] for k in ("tau_e", "emf_share")})
     start = baseline(traces, sheet, True, 1)
-    return start.traces, {name: fit(start.fit.model.with_effect(name, np.array(at)), start.traces, steps=15) for name, *at in starts}
+    traces = [replace(t, start=(TRUTH["theta_0"], 0.0)) for t in start.traces]
+    return traces, {name: fit(start.fit.model.with_effect(name, np.array(at)), traces, steps=40) for name, *at in starts}
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +78,7 @@ def test_distances_are_nothing_to_oneself_and_small_between_what_these_recording
     traces, fits = pushed
     same, other = isolability(fits["bias_torque"], [fits["bias_torque"], fits["asymmetric_friction"]], traces)
     assert same.sigmas == 0.0 and same.cost == 0.0 and same.probability == pytest.approx(0.5)
-    assert other.sigmas < 0.5 and 0.2 < other.probability < 0.6
+    assert other.sigmas < 1.0 and 0.2 < other.probability < 0.6
 
 
 # -- excitations -----------------------------------------------------------------------------------------------------
