@@ -17,6 +17,7 @@ from ers_mj.traces import Trace
 
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
 CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
+WORSE = 1.3  # times the raw error that an effect which only recalibration confirms may make of it
 HALF = 0.5  # share of the squared error that must go
 
 
@@ -52,7 +53,8 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
             without[name] = pooled(_scores(lesser_models[name], parts))
             p[name] = paired_p(pooled(after).misfit, without[name].misfit)
         failed = [n for n in model.names if (p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse)
-                  and not _halves(pooled(after), without[n], parts) and not _helps_recalibrated(after_models, lesser_models[n], parts)]
+                  and not _halves(pooled(after), without[n], parts)
+                  and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))]
         if not failed:
             return selection, Confirmed(_scores(base_models, parts), after, without, p, after_models, base_models, parts, sentence)
         worst = max(failed, key=lambda n: p[n])
