@@ -209,7 +209,7 @@ def _recording(compared: Compared, width: float) -> Figure:
     marks = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     first = next(iter(compared.models.values()))
     turned = np.degrees(np.angle(r.g / first) + np.unwrap(np.angle(first)))  # on the models' branch
-    for part, shade, label in ((r.sure, INK, f"recorded, sure"), (~r.sure, "#b9c2cc", "recorded, unsure")):
+    for part, shade, label in ((r.sure, INK, "recorded, sure"), (~r.sure, "#b9c2cc", "recorded, unsure")):
         if part.any():
             size.semilogx(r.f_hz[part], decibels(r.g[part]), color=shade, label=label, **marks)
             phase.semilogx(r.f_hz[part], turned[part], color=shade, **marks)

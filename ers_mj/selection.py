@@ -21,12 +21,12 @@ from ers_mj.screening import Begin, screen
 from ers_mj.traces import Trace
 
 LEAST_GAIN = 5.0  # decrease of C that an effect must buy
-BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
-QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 8.0  # of C that suffices where an effect acts once
+BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
+QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
 LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect

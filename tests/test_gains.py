@@ -30,7 +30,7 @@ def test_the_bound_is_finite_and_useless():
 @pytest.mark.parametrize("x", [(0.1, 0.0, 0.0), (0.0, -0.1, 0.0), (0.0, 0.0, 0.2), (0.01, -0.02, 0.3)])
 def test_the_lyapunov_function_is_positive_and_within_its_bound(x):
     gains = Gains()
-    q, (x1, x2, x3) = float(gains.q), x
+    q, (x1, x2, _) = float(gains.q), x
     from ers_mj.controllers import FiniteTime
     from ers_mj.controllers.finite_time import sig
 

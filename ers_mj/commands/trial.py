@@ -54,7 +54,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--filter-ms", type=number(least=0), default=0.5, metavar="X", help="time constant of the speed's filter (default 0.5)")
     parser.add_argument("--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them")
     parser.add_argument("--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)")
-    parser.add_argument("--plants", type=whole(0), default=0, metavar="N",
+    parser.add_argument("--plants", type=whole(1), default=0, metavar="N",
                         help="try N more servos too, their parameters and effects scattered, unknown to the controllers (default 0)")
     parser.add_argument("--scatter", type=number(least=1), default=1.2, metavar="X", help="largest factor, up or down, of that (default 1.2)")
     add_out(parser)
