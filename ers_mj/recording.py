@@ -145,7 +145,7 @@ def read_recording(path_or_spec: str | os.PathLike, mapping: Mapping[str, str] |
     name = path.name if run is None else f"{path.name}#run={run}"
     content = read_content(path)
     table = select_run(parse_table(content, path.suffix.lower(), name), run, name)
-    chosen = _choose(table.column_names, dict(mapping or {}), name)
+    chosen = choose_columns(table.column_names, dict(mapping or {}), name)
     raw = {contract: numbers(table[column], column, name) for contract, column in chosen.items()}
     roles = {COLUMNS[contract].field: COLUMNS[contract] for contract in chosen}
     labels = {COLUMNS[contract].field: column for contract, column in chosen.items()}
@@ -251,7 +251,7 @@ def read_input(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
 # -- from a table's columns to roles -------------------------------------------------------------------------
 
 
-def _choose(columns: list[str], mapping: dict[str, str], name: str) -> dict[str, str]:
+def choose_columns(columns: list[str], mapping: dict[str, str], name: str) -> dict[str, str]:
     """Contract name -> column of the file: what the mapping says, then what is called by its name."""
     _refuse_mistyped(columns, mapping, name)
     settled = {COLUMNS[contract].field for contract in mapping}

@@ -35,6 +35,7 @@ OPENING, UNKNOWN_OPENING = 2.0, 5.0  # [s] of a stream from which a model is mad
 HOP, PATIENT_HOP = 0.1, 0.25  # [s] between estimates, and while the flag is up
 SHORTEST, LONGEST = 0.5, 2.0  # [s] of the window
 PATIENCE = 1.0  # [s] without an explanation, of which SHORTEST may hold a change of parameters
+MOVING = 30.0  # times its noise that an output must travel for a model to begin
 FEWEST = 200  # samples of a window: a slower stream has all three longer
 KEPT = 5.0  # [s] of the stream that the noise level is taken from
 BLOCK, BLOCK_SAMPLES = 0.025, 10  # [s] and samples, whichever is longer, of a block
@@ -54,10 +55,10 @@ class Estimate:
     """What is believed at time t [s].
 
     Attributes:
-        values: Eq. (6)'s parameters.
-        spread: standard deviations of the fitted ones: relative, but of theta_0 in the output's unit.
-        window: [s] that they explain, or were tried on.
-        misfit: [sigma^2] what they leave of it, 1 is the noise.
+        values: those of Eq. (6)'s parameters that are followed, as they last explained the stream.
+        spread: their standard deviations: relative, but of theta_0 in the output's unit.
+        window: [s] that was fitted.
+        misfit: [sigma^2] what the best parameters leave of it, 1 is the noise.
         sigma: the noise [output unit].
         changed: {name: (before, after)} of a change that was found just now.
         unexplained: [s] for which nothing has explained the stream.
@@ -75,11 +76,17 @@ class Estimate:
     flag: bool
 
 
+def is_moving(u: np.ndarray, y: np.ndarray) -> bool:
+    """Whether the output (N,) moves beyond its noise under an input (N,) that changes."""
+    known = y[np.isfinite(y)]
+    return known.size > FEWEST // 2 and np.ptp(u) > 0 and float(np.ptp(known)) > MOVING * noise_sigma(known, converter_step(known))
+
+
 def opening(t: np.ndarray, u: np.ndarray, y: np.ndarray, datasheet: Datasheet | None, is_angle: bool) -> Model:
     """A model to begin with: the datasheet's with its effects, or without one the best of a fit from scratch.
 
     Args:
-        t, u, y: the first OPENING or UNKNOWN_OPENING seconds (N,) of the stream.
+        t, u, y: the first OPENING or UNKNOWN_OPENING seconds (N,) of the stream, in which it ``is_moving``.
         datasheet: what is known of the servo.
         is_angle: whether the output is an angle in rad.
 
@@ -87,8 +94,6 @@ def opening(t: np.ndarray, u: np.ndarray, y: np.ndarray, datasheet: Datasheet | 
         InputError: the datasheet does not tell b, or nothing resembles the stream.
     """
     valid = np.isfinite(y)
-    if valid.mean() < 0.5 or np.ptp(y[valid]) == 0 or np.ptp(u) == 0:
-        raise InputError(f"the stream's first {t[-1] - t[0]:.3g} s show no motion under a changing input, from which a model could begin")
     quantum = converter_step(y[valid])
     trace = make_trace("stream", t, u, y, valid, None, None, noise_sigma(y[valid], quantum), quantum)
     if datasheet is None:
@@ -113,6 +118,7 @@ class Tracker:
     def __init__(self, model: Model):
         """Start from a model (see ``opening``) whose free numbers are to be followed; its effects stay as they are."""
         self._model = model
+        self._spread = {f.name: DRIFT * (1.0 if f.positive else f.scale) for f in model.layout()}
         slower = max(1.0, FEWEST * model.scales.sample_time / SHORTEST)
         self._shortest, self._longest, self._patience = (slower * x for x in (SHORTEST, LONGEST, PATIENCE))
         self._restart()
@@ -158,13 +164,15 @@ class Tracker:
         changed: dict[str, tuple[float, float]] = {}
         if window.misfit <= EXPLAINED:
             changed = self._changes(window)
-            self._model, self._begin, self._unexplained, self._fine = window.model, float(window.trace.t[0]), 0.0, now
+            self._model, self._spread = window.model, window.spreads()
+            self._begin, self._unexplained, self._fine = float(window.trace.t[0]), 0.0, now
         else:
             if self._before is None and self._last is not None and self._last.misfit <= EXPLAINED:
                 self._before, self._told = self._last, set()
             self._begin, self._unexplained = now + HOP - self._shortest, now - self._fine
         self._last = window
-        return Estimate(now, dict(window.model.values), window.spreads(), window.length, window.misfit, sigma, changed, self._unexplained,
+        values = {f.name: self._model.values[f.name] for f in window.layout}
+        return Estimate(now, values, dict(self._spread), window.length, window.misfit, sigma, changed, self._unexplained,
                         self._unexplained > self._patience)
 
     def _changes(self, window: _Window) -> dict[str, tuple[float, float]]:
