@@ -23,11 +23,11 @@ import numpy as np
 from ers_mj.baseline import baseline, scales_of
 from ers_mj.datasheet import LUMPED, Datasheet
 from ers_mj.errors import InputError
-from ers_mj.identification import jacobian_of
+from ers_mj.identification import fit, jacobian_of
 from ers_mj.model import OBSERVER_RATE, Free, Model
 from ers_mj.recording import GAP
 from ers_mj.simulation import inertia_of, kernel_effects
-from ers_mj.starts import fitted_start
+from ers_mj.starts import fitted_start, with_starts
 from ers_mj.symptoms import converter_step
 from ers_mj.traces import Blocks, Trace, make_trace, noise_sigma
 
@@ -40,7 +40,7 @@ FEWEST = 200  # samples of a window: a slower stream has all three longer
 KEPT = 5.0  # [s] of the stream that the noise level is taken from
 BLOCK, BLOCK_SAMPLES = 0.025, 10  # [s] and samples, whichever is longer, of a block
 TAU = 4.0  # misfit of a block at which its cost turns from squares to a logarithm
-EXPLAINED = 1.6  # misfit [sigma^2] of a window up to which the model explains it
+EXPLAINED = 2.0  # misfit [sigma^2] of a window up to which the model explains it
 DRIFT = 0.3  # standard deviation of ln p within one window; of theta_0, over half the travel
 SPEED = 0.3  # standard deviation of the window's first speed about what was believed, over the largest speed
 NUDGE = 1e-3  # of the scales of the first state: step of its differences
@@ -83,7 +83,7 @@ def is_moving(u: np.ndarray, y: np.ndarray) -> bool:
 
 
 def opening(t: np.ndarray, u: np.ndarray, y: np.ndarray, datasheet: Datasheet | None, is_angle: bool) -> Model:
-    """A model to begin with: the datasheet's with its effects, or without one the best of a fit from scratch.
+    """A model to begin with, fitted to the stream's first seconds: the datasheet's with its effects, or without one the best of a search from scratch.
 
     Args:
         t, u, y: the first OPENING or UNKNOWN_OPENING seconds (N,) of the stream, in which it ``is_moving``.
@@ -109,7 +109,10 @@ def opening(t: np.ndarray, u: np.ndarray, y: np.ndarray, datasheet: Datasheet | 
     width = scales.high - scales.low
     scales = replace(scales, low=scales.low - width, high=scales.high + width)
     held = {"theta_0"} if values["a_1"] == values["c_1"] == 0 else set()
-    return Model(values, tuple(n for n in LUMPED if values[n] != 0 and n not in held), effects, scales=scales, frozen=tuple(n for n, _ in effects))
+    model = Model(values, tuple(n for n in LUMPED if values[n] != 0 and n not in held), effects, scales=scales, frozen=tuple(n for n, _ in effects))
+    for _ in range(2):
+        model = fit(model, with_starts(model, [trace])).model
+    return model
 
 
 class Tracker:
