@@ -159,7 +159,7 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
     weakest = leader.layout[wanted[int(np.argmin(best[1] / before))]]
     chosen, checked = {**best[0], **units}, {"interval_ratio": ratios, "tried": tried, "simulations": bench.simulations}
     whose = f"{weakest.name} of the {_plain(weakest.owner)}" if weakest.owner != "base" else weakest.name
-    sentence = f"No other explanation is left to tell apart. {_asked(chosen)} It would narrow the interval of {whose} to {ratios[weakest.name]:.0%} of today's."
+    sentence = f"No other explanation is left to tell apart. {asked(chosen)} It would narrow the interval of {whose} to {ratios[weakest.name]:.0%} of today's."
     if ratios[weakest.name] > WORTH:
         sentence, chosen = (f"No other explanation is left to tell apart, and none of {tried} inputs within the limits of these recordings would narrow "
                             "an interval by much: another recording of the same kind would confirm this one."), {}
@@ -178,7 +178,7 @@ def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitat
     """What to record, what it would settle, and what it would not, in sentences."""
     hopeful = [n for n, c in told.items() if c["recordings_needed"]]
     never = [n for n in told if n not in hopeful]
-    words = [_asked(excitation)] if hopeful else []
+    words = [asked(excitation)] if hopeful else []
     for n in hopeful:
         c = told[n]
         then = (f"one of them would keep less than 5 %, with a chance of {min(c['chance_of_settling'], 0.99):.0%}" if c["recordings_needed"] == 1
@@ -194,7 +194,7 @@ def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitat
                      f"the output alone: after a refit {left:.1g} times {unit} is left.")
     if channel:
         sigmas = min(c["channels_sigmas"][channel] for c in told.values() if c["cost"] < SETTLED)
-        words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas." + ("" if hopeful else f" {_asked(excitation)}"))
+        words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas." + ("" if hopeful else f" {asked(excitation)}"))
     elif never:
         most = max(max(told[n]["channels_sigmas"].values()) for n in never)
         words.append(f"Nor would {_listed(CALLED.values(), 'or')}, {most:.1g} sigmas at most.")
@@ -207,7 +207,7 @@ def _widened(leader: str, hopeless: Sequence[str], wide: Mapping[str, Design], l
     low, high = (_in_degrees(x, units["output_unit"]) for x in (limits.low - more, limits.high + more))
     words = []
     for name, found in wide.items():
-        asked = _asked({**found.excitation, **units})
+        asked = asked({**found.excitation, **units})
         words.append(f"If the rig bears a travel from {low} to {high}: {asked[0].lower()}{asked[1:-1]}, which would tell {_plain(leader)} and "
                      f"{_plain(name)} apart at {math.sqrt(2 * found.cost):.2g} sigmas.")
     if stuck := [name for name in hopeless if name not in wide]:
@@ -221,7 +221,7 @@ def _in_degrees(x: float, unit: str) -> str:
     return f"{math.degrees(x):.3g} deg" if unit == "rad" else f"{x:.3g} {unit}"
 
 
-def _asked(excitation: Mapping) -> str:
+def asked(excitation: Mapping) -> str:
     """The excitation as an order."""
     e, unit = excitation, excitation["input_unit"]
     about = f" about {e['offset']:.3g} {unit}" if e["offset"] else ""

@@ -20,13 +20,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.baseline import baseline, scales_of
+from ers_mj.baseline import baseline
 from ers_mj.datasheet import LUMPED, Datasheet
-from ers_mj.errors import InputError
 from ers_mj.identification import fit, jacobian_of
+from ers_mj.known import model_of
 from ers_mj.model import OBSERVER_RATE, Free, Model
 from ers_mj.recording import GAP
-from ers_mj.simulation import inertia_of, kernel_effects
 from ers_mj.starts import fitted_start, with_starts
 from ers_mj.symptoms import converter_step
 from ers_mj.traces import Blocks, Trace, make_trace, noise_sigma
@@ -97,19 +96,12 @@ def opening(t: np.ndarray, u: np.ndarray, y: np.ndarray, datasheet: Datasheet | 
     quantum = converter_step(y[valid])
     trace = make_trace("stream", t, u, y, valid, None, None, noise_sigma(y[valid], quantum), quantum)
     if datasheet is None:
-        found = baseline([trace], None, is_angle).fit.model
-        values, effects = dict(found.values), ()
+        model = baseline([trace], None, is_angle).fit.model
     else:
-        values = {"a_1": 0.0, "a_2": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "emf_share": 0.0, **datasheet.to_lumped(), **datasheet.baseline}
-        if "b" not in values:
-            raise InputError(f"{datasheet.name or 'the datasheet'}: cannot be followed, it needs b, or J, K_t and R from which b follows")
-        values = {"ampere": values["b"], **values, "tau_e": datasheet.baseline.get("tau_e", 0.0)}
-        effects = kernel_effects(datasheet.effects, inertia_of(datasheet))
-    scales = scales_of([trace], values, is_angle, None)
-    width = scales.high - scales.low
-    scales = replace(scales, low=scales.low - width, high=scales.high + width)
-    held = {"theta_0"} if values["a_1"] == values["c_1"] == 0 else set()
-    model = Model(values, tuple(n for n in LUMPED if values[n] != 0 and n not in held), effects, scales=scales, frozen=tuple(n for n, _ in effects))
+        model = model_of(datasheet, [trace], is_angle, inductance="tau_e" in datasheet.baseline)
+        model = replace(model, free=tuple(n for n in model.free if n in LUMPED))
+    width = model.scales.high - model.scales.low
+    model = replace(model, scales=replace(model.scales, low=model.scales.low - width, high=model.scales.high + width))
     for _ in range(2):
         model = fit(model, with_starts(model, [trace])).model
     return model

@@ -46,7 +46,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write; 0."""
-    out = _checked_out(arguments)
+    out = checked_out(arguments)
     from ers_mj.datasheet import read_datasheet
     from ers_mj.recording import write_recording
     from ers_mj.simulation import parse_effect, simulate_recording
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _checked_out(arguments: argparse.Namespace) -> Path:
+def checked_out(arguments: argparse.Namespace) -> Path:
     """The file to write, checked before any work starts."""
     out = Path(arguments.out)
     if not arguments.out or out.is_dir():
