@@ -36,28 +36,49 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
     largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
     a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
-    the first place, or from all of them where it is far from the noise, ``bent`` by what is missing: MOST_SENT at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth
-    LEAST_PROMISE. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
+    the first place, or from all of them where it is far from the noise, ``bent`` by what is missing: MOST_SENT at most, those with
+    PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth LEAST_PROMISE. (How far C
+    lies above zero is no such sign: it hangs on the noise, which is an estimate.)
+
+    What is dear to simulate is refitted from its most promising place only, and beside it secants are taken along the motion without it.
     """
     names, floor = [name for name in BY_NAME if name not in exclude], 0.0
     promises, begins = {}, {}
     for place in places:
-        e = residuals(place, traces, OBSERVER_RATE)
-        if not np.all(np.isfinite(e)):
+        left, light = residuals(place, traces, OBSERVER_RATE), _light(place)
+        e = left if light is place else residuals(light, traces, OBSERVER_RATE)
+        if not np.all(np.isfinite((left, e))):
             continue
-        (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
+        (known, targets), scales = _targets(light, e, left, traces, tau), replace(place.scales, hot=_hot(left, traces, tau))
         for effect in (BY_NAME[name] for name in names):
-            starts = _hopeful(place, effect, effect.starts(scales), targets, traces)
-            found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
+            starts = _hopeful(light, effect, effect.starts(scales), targets, traces)
+            found = [p for start in starts if (p := _promise(light, effect, start, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
+                begun = [Begin(_onto(place, model, effect), known) for _, model in found[:effect.tries]]
+                if not effect.dear:
+                    begins.setdefault(effect.name, []).append(begun)
+                elif found[0][0] > promises.get(effect.name, 0.0):
+                    begins[effect.name] = [begun]
                 promises[effect.name] = max(promises.get(effect.name, 0.0), found[0][0])
-                begins.setdefault(effect.name, []).append([Begin(model, known) for _, model in found[:effect.tries]])
         if quiet and not floor:
             floor = 2.0 * LEAST_PROMISE / float(targets[0][2] @ targets[0][2])
         if not bent:
             names = _promising(promises, floor, LATER if place.names else MOST_SENT)
     return [(name, begins[name]) for name in _promising(promises, floor, LATER if places[0].names else MOST_SENT)]
+
+
+def _light(place: Model) -> Model:
+    """The model without the effects that are dear to simulate."""
+    for name in (n for n in place.names if BY_NAME[n].dear):
+        place = place.without_effect(name)
+    return place
+
+
+def _onto(place: Model, found: Model, effect: Effect) -> Model:
+    """The place with the effect as it was found beside fewer others."""
+    model = place.with_effect(effect.name, dict(found.effects)[effect.name])
+    return replace(model, local={**model.local, effect.name: found.local[effect.name]}) if effect.local else model
 
 
 def _promising(promises: Mapping[str, float], floor: float, most: int) -> list[str]:
@@ -80,17 +101,17 @@ def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, tr
     return [starts[i] for i in best]
 
 
-def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
-    """The Jacobian's columns at the place, and at either weighting (weights (N,), orthonormal basis (N, k) of the place's own
-    parameters, weighted residual (N,) beside it)."""
+def _targets(place: Model, e: np.ndarray, left: np.ndarray, traces: Sequence[Trace], tau: float):
+    """The Jacobian's columns at the place, where it leaves e (N,), and at either weighting (weights (N,), orthonormal basis (N, k) of the
+    place's own parameters, weighted residual (N,) of ``left`` beside it)."""
     blocks, layout = Blocks.of(traces), place.layout()
-    m = blocks.misfit(e)
+    m = blocks.misfit(left)
     jacobian = jacobian_of(place, layout, place.vector(layout), e, traces, OBSERVER_RATE)
     out = []
     for level in (tau, max(tau, float(np.mean(m)))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
         basis, _ = np.linalg.qr(jacobian * root[:, None])
-        out.append((root, basis, root * e - basis @ (basis.T @ (root * e))))
+        out.append((root, basis, root * left - basis @ (basis.T @ (root * left))))
     return {f.key: column for f, column in zip(layout, jacobian.T)}, out
 
 

@@ -39,7 +39,8 @@ def with_starts(model: Model, traces: Sequence[Trace]) -> list[Trace]:
 def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, float]:
     """(output, speed) at the first sample by least squares of a free run on the first 50 ms or 10 samples.
 
-    The search begins at rest and at a parabola's speed; rest is kept unless a speed buys more than 9 sigma^2.
+    The search begins at rest and at a parabola's speed; rest is kept unless a speed buys more than 9 sigma^2, where the recording itself
+    shows none (parabola_start) 9 times the mean square that is missed even so: a speed is a poor excuse for a wrong model.
     """
     n = start_samples(trace.t)
     head = trace.part(0, n)
@@ -62,7 +63,8 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
         return float(e @ e), x
 
     first = float(np.mean(head.y[head.valid][:3])) if head.valid.any() else trace.start[0]
-    at_rest = settle(np.array([first, 0.0]), 0)
-    moving = min((settle(np.array(s, float), 1) for s in (trace.start, parabola_start(head.t, head.y))), key=lambda f: f[0])
-    cost, x = at_rest if at_rest[0] <= moving[0] + 9.0 else moving
+    at_rest, seen = settle(np.array([first, 0.0]), 0), parabola_start(head.t, head.y)
+    moving = min((settle(np.array(s, float), 1) for s in (trace.start, seen)), key=lambda f: f[0])
+    missed = max(moving[0] / n, 1.0) if seen[1] == 0 else 1.0
+    cost, x = at_rest if at_rest[0] <= moving[0] + 9.0 * missed else moving
     return float(x[0]), float(x[1])

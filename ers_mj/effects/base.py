@@ -27,7 +27,8 @@ class Coefficients(NamedTuple):
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
     spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``. With rho = 0 it
-    is the foot of a bristle instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder.
+    is the foot of a bristle instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder, and
+    the bristle's damping is d_twist exp(-(w / fade)^2).
     """
 
     a_1: float = 0.0
@@ -53,6 +54,7 @@ class Coefficients(NamedTuple):
     k_twist: float = 0.0
     d_twist: float = 0.0
     gap: float = 0.0
+    fade: float = np.inf
 
     @property
     def has_motor_side(self) -> bool:

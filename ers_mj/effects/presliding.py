@@ -7,13 +7,15 @@ import numpy as np
 from ers_mj.effects.base import Friction, Parameter
 
 RIGID_HZ = 2000.0  # natural frequency of the bristle (against J) above which friction is rigid: 4e-5 deg of displacement in Table 1
+FADING = 0.1  # share of the recordings' speed at which the search begins
 
 
 class Presliding(Friction):
-    """LuGre's bristle z without its Stribeck: friction k z + d z', z' = w - |w| k z / F, tends to the level F after a few x_s of motion.
+    """LuGre's bristle z without its Stribeck: friction k z + d(w) z', z' = w - |w| k z / F, tends to the level F after a few x_s of motion.
 
-    k = F_c / x_s (LuGre's sigma_0) and zeta = d / (2 sqrt(k J)); small zeta is Dahl's friction. The level F is what the other laws make
-    of F_c. Beside a play or a shaft, whose second body takes the bristle's place in the plant, the effect is not there.
+    k = F_c / x_s (LuGre's sigma_0), d = 2 zeta sqrt(k J) exp(-(w / w_d)^2): damping that fades with speed (Olsson, Astrom, Canudas de Wit, Gafvert
+    and Lischinsky 1998), without which the bristle resists the slip it should let go of. Small zeta is Dahl's friction. The level F is what
+    the other laws make of F_c. Beside a play or a shaft, whose second body takes the bristle's place in the plant, the effect is not there.
     """
 
     name = "presliding"
@@ -22,16 +24,17 @@ class Presliding(Friction):
     parameters = (
         Parameter("x_s", "position", "level of friction over its stiffness at rest"),
         Parameter("zeta", "ratio", "damping ratio of that spring against the inertia", lower=0.005, upper=2.0, absent=0.2),
+        Parameter("w_d", "speed", "speed at which the damping has fallen to 1/e (infinite: it does not)", absent=math.inf),
     )
     tries, dear = 2, True
 
     def starts(self, scales):
         least, most = 2 * scales.noise, 0.02 * scales.position
-        return [np.array([x_s, 0.5]) for x_s in np.geomspace(most, least, 4)]
+        return [np.array([x_s, 0.5, w_d]) for x_s in np.geomspace(most, least, 4) for w_d in (FADING * scales.speed, math.inf)]
 
     def coefficients(self, p, c):
         level = 0.5 * (c.c_2_plus + c.c_2_minus)
         if c.two_body > 0 or p[0] <= 0 or level <= 0 or level > (2 * np.pi * RIGID_HZ) ** 2 * p[0]:
             return c
         k = level / p[0]
-        return c._replace(two_body=1.0, rho=0.0, beta=0.0, phi=1.0, k_twist=k, d_twist=2 * p[1] * math.sqrt(k), gap=0.0)
+        return c._replace(two_body=1.0, rho=0.0, beta=0.0, phi=1.0, k_twist=k, d_twist=2 * p[1] * math.sqrt(k), gap=0.0, fade=p[2])

@@ -7,7 +7,7 @@ motor slip, contact of the play (of two bodies without play: 1 throughout, a spr
 ends where the mode's inequality fails; the instant is found on the flow itself.
 
 A second body without inertia (rho = 0) is the foot of LuGre's bristle z = theta - theta_m: z' = w - |w| k z / F, and the friction is
-k z + d z'. It has no speed of its own (w_m stays 0 in x), and the drive acts on the rudder, whose slip s is then 1 wherever the
+k z + d exp(-(w / w_d)^2) z'. It has no speed of its own (w_m stays 0 in x), and the drive acts on the rudder, whose slip s is then 1 wherever the
 preload's corner does not hold it. Its slip s_m is 0 while the bristle bends, which is stepped as a law is, and the direction of motion
 once the bristle is bent to the full: from there to the next reversal friction is Coulomb's and the flow linear. Where a law moves
 the level F, the bristle lags behind it and s_m stays 0.
@@ -30,7 +30,7 @@ from ers_mj.plants.compiled import compiled_cache
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
- BETA, PHI, K_TWIST, D_TWIST, GAP) = range(len(Coefficients._fields))
+ BETA, PHI, K_TWIST, D_TWIST, GAP, FADE) = range(len(Coefficients._fields))
 N_PARAMETERS = max(4, max(len(effect.parameters) for effect in EFFECTS))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
@@ -165,7 +165,7 @@ def _bristle(c, on, p, lawful, x, s_m):
     pull, speed = c[K_TWIST] * (x[0] - x[3]), 0.0
     if x[1] != 0.0:
         speed = abs(x[1]) * pull / _level(c, on, p, lawful, x, 1.0 if x[1] > 0 else -1.0)
-    return -pull - c[D_TWIST] * (x[1] - speed), speed
+    return -pull - c[D_TWIST] * math.exp(-(x[1] / c[FADE]) ** 2) * (x[1] - speed), speed
 
 
 @njit(nogil=True, inline="always")

@@ -15,6 +15,7 @@ from ers_mj.effects.base import Coefficients
 from ers_mj.plants.mjcf import unlogged
 
 MOTOR_GROUP = 1  # actuator group that an open circuit disables
+LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dynprm
 
 
 @dataclass(frozen=True)
@@ -159,6 +160,7 @@ class Stepper:
                 force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
             else:
                 self.model.actuator_biasprm[self.bristle, 3:5] = self.inertia * (up if w > 0 else down)
+                self.model.actuator_dynprm[self.bristle, LUGRE_DAMPING] = self.inertia * c.d_twist * math.exp(-(w / c.fade) ** 2)
         self.data.ctrl[self.load] = self.inertia * force
 
 
