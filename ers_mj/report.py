@@ -127,7 +127,15 @@ def _frame(frame: Frame, when: str, simulated: float, picture: bytes) -> str:
 
 def _where(document: Mapping, evidence: Evidence) -> str:
     places = "\n".join(page.place(place) for place in document.get("where") or [])
-    return page.section("Where it fails", "Where the error of the refitted model lives, before any physics is added.", places)
+    return page.section("Where it fails", "Where the error of the refitted model lives, before any physics is added.", places and places + _spectrum(evidence))
+
+
+def _spectrum(evidence: Evidence) -> str:
+    """The error over frequency, where it is beyond the noise."""
+    if evidence.spectrum is None or evidence.spectrum.region is None:
+        return ""
+    return page.figure(figures.spectrum(evidence.spectrum, evidence), "The error of an observer that forgets within 33 ms. Linear is what a linear filter of input and "
+                       "motion explains of it; no such filter explains a distortion. On the right only lines at which both motions cohere.")
 
 
 def _missing(document: Mapping, evidence: Evidence) -> str:

@@ -192,7 +192,7 @@ def _of_segments(recording: Recording, u: np.ndarray, y: np.ndarray) -> Response
 def gap(response: Response, model: np.ndarray) -> Gap | None:
     """How far a model's response (F,) is from a recording's; None where the recording is nowhere sure.
 
-    This is what a localisation over frequency can be told: the band, and whether a linear change or a distortion is missing.
+    It tells the band, and whether a linear change or a distortion is missing.
     """
     k = response.sure
     if not k.any():
@@ -202,19 +202,19 @@ def gap(response: Response, model: np.ndarray) -> Gap | None:
     off = np.abs(ratio - 1.0) ** 2
     open_ = 1.0 / response.coherence[k] - 1.0  # variance of the response, relative, of one period
     linear = bool(off.mean() > 4.0 * open_.mean() / max(response.periods, 1) + EXACT[response.kind] ** 2)
-    band = _band(response.f_hz[k], off)
+    band = shortest_band(response.f_hz[k], off)
     what = "more than noise and distortion leave open, its linear part is off" if linear else "no more than noise and distortion leave open"
     sentence = (f"{response.name}: the model is {_rms(db):.2g} dB and {_rms(deg):.2g} deg off (RMS over {k.sum()} lines), most of it at {band[0]:.3g} to "
                 f"{band[1]:.3g} Hz: {what}")
     return Gap(int(k.sum()), _rms(db), float(np.abs(db).max()), _rms(deg), float(np.abs(deg).max()), band, linear, sentence)
 
 
-def _band(f_hz: np.ndarray, off: np.ndarray) -> tuple[float, float]:
-    """The shortest run of lines, in log frequency, that holds half of ``off`` (F,)."""
+def shortest_band(f_hz: np.ndarray, off: np.ndarray, share: float = 0.5) -> tuple[float, float]:
+    """The shortest run of lines [Hz], in log frequency, that holds this share of ``off`` (F,)."""
     total = np.concatenate([[0.0], np.cumsum(off)])
     best = (math.inf, float(f_hz[0]), float(f_hz[-1]))
     for i in range(f_hz.size):
-        j = int(np.searchsorted(total, total[i] + 0.5 * total[-1] * (1.0 - 1e-9)))
+        j = int(np.searchsorted(total, total[i] + share * total[-1] * (1.0 - 1e-9)))
         if j <= f_hz.size:
             best = min(best, (math.log(f_hz[j - 1] / f_hz[i]), float(f_hz[i]), float(f_hz[j - 1])))
     return best[1], best[2]
