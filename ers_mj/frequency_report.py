@@ -69,7 +69,7 @@ def _cycles(document: Mapping, found: Study) -> str:
 
 def _recording(compared: Compared) -> str:
     r = compared.response
-    how = f"the last {r.periods} period{'s' if r.periods > 1 else ''} of its input" if r.kind == "periodic" else f"{r.periods} segments (Welch)"
+    how = f"the last {r.periods} period{'s' if r.periods > 1 else ''} of its input" if r.kind == "periodic" else "parabolas through neighbouring lines"
     said = page.listed(f"{name}: {gap.sentence}" if gap else f"{name}: nowhere coherent enough to be compared" for name, gap in compared.gaps.items())
     lead = ("Best linear approximation from " + how + ". Sure: coherence above 0.95. <i>Friction described</i>: the friction and the preload that a motion of this size meets, its speed and "
             "angle taken as normal.")

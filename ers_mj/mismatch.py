@@ -18,9 +18,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ers_mj.model import OBSERVER_STEP
-from ers_mj.spectra import SEGMENTS, Response, gap, shortest_band
+from ers_mj.spectra import Response, gap, shortest_band
 from ers_mj.traces import Trace
 
+FRAMES = 8  # lengths of a frame in the median recording
 FIRST = 2  # line from which the window's leakage leaves something to read
 TOP = 0.4  # of the rate at which the observer corrects itself: its steps are no motion
 FEWEST_FRAMES, LEAST_SAMPLES, FEWEST_LINES = 6, 32, 3  # of a recording's analysis; of a frame; off beyond the noise, or coherent, before anything is told of them
@@ -74,7 +75,7 @@ def mismatch(traces: Sequence[Trace], errors: Sequence[np.ndarray], rate: float)
     Returns:
         None where the recordings are too short.
     """
-    length = float(np.median([t.t[-1] - t.t[0] for t in traces])) / SEGMENTS  # [s] of a frame
+    length = float(np.median([t.t[-1] - t.t[0] for t in traces])) / FRAMES  # [s] of a frame
     parts = [_framed(t, e, length, rate) for t, e in zip(traces, errors, strict=True) if round(length / t.sample_time) >= LEAST_SAMPLES]
     if sum(part[0].shape[0] for part in parts) < FEWEST_FRAMES:
         return None
@@ -134,8 +135,8 @@ def _response(f_hz: np.ndarray, X: np.ndarray, E: np.ndarray, rate: float) -> Re
     S_xx, S_yy, S_xy = np.mean(np.abs(X) ** 2, axis=0), np.mean(np.abs(Y) ** 2, axis=0), np.mean(X.conj() * Y, axis=0)
     coherence = np.abs(S_xy) ** 2 / np.maximum(S_xx * S_yy, 1e-300)
     size = np.sqrt(S_yy * f_hz[0] / FIRST)
-    return Response("measured over simulated", "welch", X.shape[0], f_hz, S_xy / np.maximum(S_xx, 1e-300), coherence,
-                    size * np.sqrt(np.maximum(1.0 - coherence, 0.0)), np.full(f_hz.size, np.nan), size)
+    return Response("measured over simulated", "frames", X.shape[0], f_hz, S_xy / np.maximum(S_xx, 1e-300), coherence,
+                    np.sqrt((1.0 / np.maximum(coherence, 1e-12) - 1.0) / X.shape[0]), size * np.sqrt(np.maximum(1.0 - coherence, 0.0)), np.full(f_hz.size, np.nan), size)
 
 
 def _told(f_hz, motion, error, linear, distortion, noise, beyond, response) -> Mismatch:
