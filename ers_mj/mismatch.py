@@ -24,7 +24,8 @@ from ers_mj.traces import Trace
 FRAMES = 8  # lengths of a frame in the median recording
 FIRST = 2  # line from which the window's leakage leaves something to read
 TOP = 0.4  # of the rate at which the observer corrects itself: its steps are no motion
-FEWEST_FRAMES, LEAST_SAMPLES, FEWEST_LINES = 6, 32, 3  # of a recording's analysis; of a frame; off beyond the noise, or coherent, before anything is told of them
+FEWEST_FRAMES, LEAST_SAMPLES = 6, 32  # of an analysis; of a frame
+FEWEST_LINES = 3  # off beyond the noise, or coherent, before anything is told of them
 BEYOND = 7.0  # over the root of the number of frames: excess over the noise, five deviations, from which a line is off
 REGION = 2 / 3  # of the error beyond the noise that the region holds
 LINEAR, DISTORTED = 0.6, 0.4  # share of the error there that is linear, from which and up to which it is called so
@@ -85,7 +86,10 @@ def mismatch(traces: Sequence[Trace], errors: Sequence[np.ndarray], rate: float)
 
 
 def _framed(trace: Trace, error: np.ndarray, length: float, rate: float) -> tuple[np.ndarray, ...]:
-    """Spectra (K, F) of simulated output, input and error in Hann windows that overlap by half, and the noise's power density in each; holes are filled straight."""
+    """Spectra (K, F) of simulated output, input and error in Hann windows that overlap by half, and the noise's power density in each.
+
+    Holes are filled straight.
+    """
     h, v = trace.sample_time, trace.valid
     size = round(length / h)
     t = trace.t[0] + h * np.arange(int((trace.t[-1] - trace.t[0]) / h + 1.5))
@@ -105,7 +109,7 @@ def _frames(x: np.ndarray, size: int, lines: int) -> np.ndarray:
 
 
 def observed_noise(f_hz: np.ndarray, h: float, every: int, sigma: float, rate: float) -> np.ndarray:
-    """Power density (F,) of e = n - a, n white of deviation sigma, where the observer's state takes over some of it every T seconds and holds it: a += g (n - a)."""
+    """Power density (F,) of e = n - a, n white of deviation sigma: the observer's state takes some of it over every T seconds, a += g (n - a)."""
     T = every * h
     g, z = 1.0 - math.exp(-rate * T), np.exp(-2j * np.pi * f_hz * T)
     held = np.exp(-2j * np.pi * h * np.multiply.outer(f_hz, np.arange(1, every + 1))).mean(axis=1)
@@ -136,7 +140,8 @@ def _response(f_hz: np.ndarray, X: np.ndarray, E: np.ndarray, rate: float) -> Re
     coherence = np.abs(S_xy) ** 2 / np.maximum(S_xx * S_yy, 1e-300)
     size = np.sqrt(S_yy * f_hz[0] / FIRST)
     return Response("measured over simulated", "frames", X.shape[0], f_hz, S_xy / np.maximum(S_xx, 1e-300), coherence,
-                    np.sqrt((1.0 / np.maximum(coherence, 1e-12) - 1.0) / X.shape[0]), size * np.sqrt(np.maximum(1.0 - coherence, 0.0)), np.full(f_hz.size, np.nan), size)
+                    np.sqrt((1.0 / np.maximum(coherence, 1e-12) - 1.0) / X.shape[0]),
+                    size * np.sqrt(np.maximum(1.0 - coherence, 0.0)), np.full(f_hz.size, np.nan), size)
 
 
 def _told(f_hz, motion, error, linear, distortion, noise, beyond, response) -> Mismatch:
@@ -159,7 +164,7 @@ def _told(f_hz, motion, error, linear, distortion, noise, beyond, response) -> M
 
 
 def _shape(response: Response, beyond: np.ndarray) -> str:
-    """What the linear part looks like, from the lines where measured and simulated motion cohere: a phase, a resonance, or sizes; nothing where they are few."""
+    """What the linear part looks like from the lines where measured and simulated motion cohere: a phase, a resonance, sizes; nothing where they are few."""
     sure = response.sure & beyond
     found = gap(response, np.ones_like(response.g))
     if sure.sum() < FEWEST_LINES or found is None:
