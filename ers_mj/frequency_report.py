@@ -46,7 +46,8 @@ def _loops(document: Mapping, found: Study) -> str:
     c = document["conditions"]
     lead = (f"The rudder swings by ±{math.degrees(c['amplitude_rad']):.3g}° about {math.degrees(c['start_rad']):.3g}°: plant and controller each stand for the "
             "first harmonic of what they do then, friction and its compensation included; the voltage's limit is left out. "
-            "The disk margin is that of gain and phase changing at once. Bandwidth: |T| of the feedback 3 dB below its low end; a feed-forward follows further.")
+            "The disk margin is that of gain and phase changing at once. Bandwidth: |T| of the feedback 3 dB below its low end; "
+            "a feed-forward follows further.")
     drawn = (page.figure(frequency_figures.open_loops(found.loops), "Open loops (Bode).")
              + page.figure(frequency_figures.planes(found.loops),
                            "Nyquist with the disk that the least robust loop keeps out of; Nichols with contours of |T|.")

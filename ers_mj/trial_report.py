@@ -89,7 +89,8 @@ def _laws(document: Mapping) -> str:
     rows = [((page.text(name), page.text(sentence)), "") for name, sentence in document["controllers"].items()]
     lead = ("Settling: within 2 % of a jump's height, the longest of all jumps, or of the amplitude where nothing jumps. Steady-state error: mean absolute "
             "error over the last 20 % of the time. Chatter: mean change of the voltage from sample to sample. "
-            "Energy: the integral of u i, mostly holding current; with Table 1's K_t and K_e, which differ by 1.69, 41 % of the back-EMF's power has nowhere to go.")
+            "Energy: the integral of u i, mostly holding current; with Table 1's K_t and K_e, which differ by 1.69, 41 % of the "
+            "back-EMF's power has nowhere to go.")
     return page.section("Laws and measures", lead, page.table(["law", ""], rows) + page.listed(document["notes"]))
 
 
