@@ -5,7 +5,7 @@
 The error e of the observer is split at each frequency by its coherence with the simulated motion x and the input u together,
     E = A X + B U + rest,    S_ee = (linear) + (rest),    S_rest = (distortion) + (noise).
 Where friction is known, x and u tell every linear change of the dynamics beside it (a lag, a delay, a resonance), and no stick or slip that comes at another
-time. Both parts are freed of what chance gives A and B. The noise is that of the sensor, and what the observer makes of it.
+time. The noise is that of the sensor, and what the observer makes of it.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ BEYOND = 7.0  # over the root of the number of frames: excess over the noise, fi
 REGION = 2 / 3  # of the error beyond the noise that the region holds
 LINEAR, DISTORTED = 0.6, 0.4  # share of the error there that is linear, from which and up to which it is called so
 PHASE, DELAY = 2.0, 0.7  # times the size's gap that a phase's must be; share of it that a delay explains, to be told alone
+NEIGHBOURS = 1  # lines on either side over which a linear part is straight
 RESONANT = 0.1  # ln of a peak of measured over simulated motion, from which it is called a resonance (0.9 dB)
 
 
@@ -119,17 +120,28 @@ def observed_noise(f_hz: np.ndarray, h: float, every: int, sigma: float, rate: f
 
 def _split(f_hz: np.ndarray, X: np.ndarray, U: np.ndarray, E: np.ndarray, noise: np.ndarray, rate: float):
     """Power densities, the lines beyond noise, and the response, from frames (K, F)."""
-    K, tiny = X.shape[0], 1e-300
-    mean = lambda a, b: np.mean(a.conj() * b, axis=0)  # noqa: E731
-    S_xx, S_ee = np.maximum(mean(X, X).real, tiny), mean(E, E).real
-    V = U - X * (mean(X, U) / S_xx)  # of the input what the motion does not tell
-    S_vv = mean(V, V).real
-    known = S_vv > 1e-9 * np.maximum(mean(U, U).real, tiny)
-    explained = np.abs(mean(X, E)) ** 2 / S_xx + np.where(known, np.abs(mean(V, E)) ** 2 / np.maximum(S_vv, tiny), 0.0)
-    rest, level = (S_ee - explained) * K / (K - 2.0), noise.mean(axis=0)
-    linear, distortion = np.maximum(explained - 2.0 * rest / K, 0.0), np.maximum(rest - level, 0.0)
+    K, S_ee, level = X.shape[0], np.mean(np.abs(E) ** 2, axis=0), noise.mean(axis=0)
+    share = np.array([_linear_share(X, U, E, k) for k in range(f_hz.size)])
+    linear, distortion = share * S_ee, np.maximum((1.0 - share) * S_ee - level, 0.0)
     beyond = np.median(np.abs(E) ** 2 / noise, axis=0) / math.log(2.0) > 1.0 + BEYOND / math.sqrt(K)
-    return f_hz, mean(X + E, X + E).real, S_ee, linear, distortion, level, beyond, _response(f_hz, X, E, rate)
+    return f_hz, np.mean(np.abs(X + E) ** 2, axis=0), S_ee, linear, distortion, level, beyond, _response(f_hz, X, E, rate)
+
+
+def _linear_share(X: np.ndarray, U: np.ndarray, E: np.ndarray, k: int) -> float:
+    """Share of the error's power about line k that A X + B U explains, A and B straight over the neighbouring lines, freed of what chance gives them.
+
+    A sweep passes a line in a frame or two, which one complex number explains whatever the reason; over the neighbours it takes more.
+    The number of independent terms is told by how evenly the error's power is spread over them.
+    """
+    near = slice(max(k - NEIGHBOURS, 0), k + NEIGHBOURS + 1)
+    x, u, e = X[:, near], U[:, near], E[:, near].ravel()
+    r = np.arange(E.shape[1])[near] - k
+    columns = [(z / math.sqrt(max(np.mean(np.abs(z) ** 2), 1e-300)) * w).ravel() for z in (x, u) for w in (1.0, r)]
+    A, power = np.stack(columns, axis=1), np.abs(e) ** 2
+    rest = np.abs(e - A @ np.linalg.lstsq(A, e, rcond=1e-6)[0]) ** 2
+    terms = power.sum() ** 2 / max(np.sum(power**2), 1e-300)
+    chance = terms / max(terms - len(columns), 1.0)
+    return max(1.0 - chance * float(rest.sum()) / max(float(power.sum()), 1e-300), 0.0)
 
 
 def _response(f_hz: np.ndarray, X: np.ndarray, E: np.ndarray, rate: float) -> Response:

@@ -63,6 +63,16 @@ def test_the_band_is_where_the_error_was_put():
     assert found.region[0] < 17.0 < found.region[1] < 1.2 * 17.0 and found.share_of_error > 0.6 and found.share_of_motion < 0.1
 
 
+def test_a_sweep_that_passes_a_line_once_is_not_called_linear_for_that():
+    """A gain that changes at random every 0.1 s: one frame alone is always explained, its neighbours are not."""
+    t = H * np.arange(8000)
+    x = np.sin(2 * np.pi * (2.0 * t + 3.0 * t**2))
+    gain = np.repeat(np.random.default_rng(5).standard_normal(80), 100)
+    for error, kind in ((0.1 * gain * x, "distortion"), (late(x), "linear")):
+        error = error + SIGMA * np.random.default_rng(6).standard_normal(t.size)
+        assert mismatch([make_trace("sweep", t, x, x + error, np.ones(t.size, bool), None, None, SIGMA, 0.0)], [error], 1e-9).kind == kind
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_alone_says_nothing(seed):
     found = mismatch(*zip(*(made(np.zeros_like, 10 * seed + k) for k in range(3))), 1e-9)
