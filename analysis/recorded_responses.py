@@ -1,7 +1,7 @@
 """How near a recording's frequency response is to the linear model: `python analysis/recorded_responses.py --plants 8 --seed 90051`.
 
-Each servo is Table 1 without Coulomb friction and preload, its J, B, K_t, K_e, k_s and R scaled at random within --spread, log-uniform; 1 kHz, noise 0.01 deg. Printed by input and
-plant: the lines of coherence above 0.95, and the largest deviation at them over all servos (bar: 0.5 dB, 3 deg for the multisine).
+Each servo is Table 1 without Coulomb friction and preload, its J, B, K_t, K_e, k_s and R scaled at random within --spread,
+log-uniform; 1 kHz, noise 0.01 deg. Printed by input and plant: the lines of coherence above 0.95, and the largest deviation at them over all servos (bar: 0.5 dB, 3 deg for the multisine).
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ def main() -> None:
         for plant in ("reduced", "mujoco"):
             found = [compared(x, plant, u, duration, arguments.seed + k) for k, x in enumerate(sheets)]
             print(f"{name:10} {duration:3g} s {plant:8} sure {sum(g.lines for g, _ in found)} of {sum(n for _, n in found)} lines, at most "
-                  f"{max(g.max_db for g, _ in found):.2f} dB {max(g.max_deg for g, _ in found):.2f} deg, a gap told of {sum(g.linear for g, _ in found)} servos",
+                  f"{max(g.max_db for g, _ in found):.2f} dB {max(g.max_deg for g, _ in found):.2f} deg, "
+                  f"a gap told of {sum(g.linear for g, _ in found)} servos",
                   flush=True)
 
 
