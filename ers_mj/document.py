@@ -22,7 +22,7 @@ from ers_mj.model import BASE, STATES, Model
 from ers_mj.starts import with_starts
 from ers_mj.intervals import half_widths
 from ers_mj.isolability import isolability, probabilities
-from ers_mj.localisation import Place, gather, places, residual_map, shaded
+from ers_mj.localisation import Place, gather, over_frequency, places, residual_map, shaded
 from ers_mj.multibody import Rig
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.recording import Recording
@@ -93,8 +93,9 @@ class Case:
         explained = self._explained(fits)
         verdict = self._verdict(explained)
         missing = self._missing() if verdict == "missing_physics" else []
+        spectrum = over_frequency(samples, traces)
         found = places(samples, traces, self.selection.rounds, self.start.fit.cost, [m["effect"] for m in missing], self.output_unit,
-                       self.input_unit)
+                       self.input_unit, spectrum)
         document = {
             "version": 1, "verdict": verdict, "sentence": self._sentence(verdict, missing, fits, found, explained),
             "where": [] if verdict == "consistent" else [self._place(p) for p in found],
@@ -107,7 +108,7 @@ class Case:
                                     for c in (self.selection.rounds[0] if self.selection.rounds else ())[:3] if c.name in BY_NAME]
         views = self._views(samples, verdict)
         evidence = Evidence(tuple(views), tuple(self._ladder()), residual_map(samples), self.noise, self.output_unit,
-                            self.recordings[0].input_unit)
+                            self.recordings[0].input_unit, spectrum)
         plant = self.rig.plant(model if verdict == "missing_physics" else base)
         return Diagnosis(document, evidence, self._improved(verdict), plant)
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ers_mj.mismatch import Mismatch
+
 
 @dataclass(frozen=True, eq=False)
 class RecordView:
@@ -49,7 +51,7 @@ class ResidualMap:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Everything a report draws. ``noise`` is the noise floor in output units."""
+    """Everything a report draws. ``noise`` is the noise floor in output units, ``spectrum`` what the model before leaves over frequency."""
 
     records: tuple[RecordView, ...]
     ladder: tuple[Rung, ...]
@@ -57,3 +59,4 @@ class Evidence:
     noise: float
     output_unit: str
     input_unit: str
+    spectrum: Mismatch | None = None

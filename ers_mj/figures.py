@@ -15,9 +15,10 @@ from matplotlib.figure import Figure
 
 from ers_mj.display import Unit, shown
 from ers_mj.evidence import Evidence, RecordView, ResidualMap, Rung
+from ers_mj.mismatch import Mismatch
 
 MEASURED, BEFORE, AFTER = "#a3afbc", "#d9762b", "#0b7a75"
-SHADE, GRID, INK, FAINT = "#f3c64e", "#e6e9ee", "#3b4654", "#8b95a3"
+SHADE, GRID, INK, FAINT, DISTORTION = "#f3c64e", "#e6e9ee", "#3b4654", "#8b95a3", "#a83a1e"
 HEAT = LinearSegmentedColormap.from_list("heat", ["#f4f6f8", "#f6d9a8", "#e2893a", "#a83a1e", "#4c1512"], N=32)
 WIDE, NARROW = 9.8, 4.5  # [in]
 STYLE = {
@@ -200,6 +201,43 @@ def _map(residuals: ResidualMap, evidence: Evidence, width: float) -> Figure:
     bar = figure.colorbar(mesh, ax=axes, location="right" if wide else "bottom", fraction=0.05, aspect=22, extend="max")
     bar.set_label(f"rms residual [{size.label}]", color=INK)
     bar.outline.set_visible(False)
+    return figure
+
+
+# -- the error over frequency --------------------------------------------------------------------------------------
+
+
+def spectrum(found: Mismatch, evidence: Evidence) -> str:
+    """The error's amplitude over frequency with what is linear in it and what is not, and the gap between measured and simulated motion."""
+    return both_widths(lambda width: _spectrum(found, evidence, width), "the error over frequency, and measured over simulated motion")
+
+
+def _spectrum(found: Mismatch, evidence: Evidence, width: float) -> Figure:
+    wide = width == WIDE
+    figure = Figure(figsize=(width, 3.5 if wide else 6.6), layout="constrained")
+    left, right = figure.subfigures(1, 2) if wide else figure.subfigures(2, 1)
+    levels, (size, phase) = left.subplots(), right.subplots(2, 1, sharex=True)
+    f, step = found.f_hz, found.f_hz[1] - found.f_hz[0]
+    unit = shown(evidence.output_unit, float(np.sqrt(found.error.max() * step)))
+    for x, colour, label, line in ((found.motion, MEASURED, "motion", 2.6), (found.error, BEFORE, "error", 1.6), (found.linear, AFTER, "linear in it", 1.2),
+                                   (found.distortion, DISTORTION, "distortion in it", 1.2), (found.noise, FAINT, "noise", 1.0)):
+        levels.loglog(f, unit.factor * np.sqrt(np.where(x > 0, x, np.nan) * step), color=colour, label=label, linewidth=line)
+    bottom = float(np.sqrt(found.noise.min() * step)) * unit.factor
+    levels.set_ylim(bottom=0.2 * bottom)
+    levels.set_ylabel(f"rms in {step:.2g} Hz [{unit.label}]")
+    levels.set_xlabel("frequency [Hz]")
+    sure = found.response.sure & found.beyond
+    size.semilogx(f[sure], 20 * np.log10(np.abs(found.response.g[sure])), ".-", color=INK, linewidth=0.8)
+    phase.semilogx(f[sure], np.degrees(np.unwrap(np.angle(found.response.g[sure]))), ".-", color=INK, linewidth=0.8)
+    for ax, label in ((size, "size [dB]"), (phase, "phase [°]")):
+        ax.axhline(0, color=FAINT, linewidth=0.8)
+        ax.set_ylabel(label)
+    size.set_title("measured over simulated motion", color=INK)
+    phase.set_xlabel("frequency [Hz]")
+    phase.set_xlim(f[0], f[-1])
+    for ax in (levels, size, phase):
+        ax.axvspan(*found.region, color=SHADE, alpha=0.28, linewidth=0, zorder=0)
+    left.legend(*levels.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.6, columnspacing=1.2)
     return figure
 
 

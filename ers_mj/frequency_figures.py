@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ers_mj.figures import AFTER, BEFORE, FAINT, GRID, INK, MEASURED, SHADE, WIDE, both_widths
+from ers_mj.figures import AFTER, BEFORE, DISTORTION, FAINT, GRID, INK, MEASURED, SHADE, WIDE, both_widths
 from ers_mj.frequency.loop import Loop
 from ers_mj.frequency.study import Compared, Cycles, PlantView
 from ers_mj.spectra import SURE
@@ -218,10 +218,9 @@ def _recording(compared: Compared, width: float) -> Figure:
     trust.set_ylim(0, 1.05)
     unit = math.degrees(1.0)
     levels.loglog(r.f_hz, unit * r.output, color=INK, marker=".", label="output")
-    one = r.kind == "welch" or r.periods == 1
-    levels.loglog(r.f_hz, unit * r.noise, color=MEASURED, marker=".", label="noise and distortion" if one else "noise")
+    levels.loglog(r.f_hz, unit * r.noise, color=MEASURED, marker=".", label="noise and distortion" if r.periods == 1 else "noise")
     if np.isfinite(r.distortion).any():
-        levels.loglog(r.f_hz, unit * np.where(r.distortion > 0, r.distortion, np.nan), color="#a83a1e", marker=".", label="distortion")
+        levels.loglog(r.f_hz, unit * np.where(r.distortion > 0, r.distortion, np.nan), color=DISTORTION, marker=".", label="distortion")
     for ax, label in ((size, "size [dB rad/V]"), (phase, "phase [°]"), (trust, "coherence"), (levels, "amplitude [°]")):
         ax.set_ylabel(label)
     levels.set_xlabel("frequency [Hz]")

@@ -27,7 +27,8 @@ def _header(document: Mapping) -> str:
     first = document["loops"][0]
     name = page.text(f"{first['controller']}, {first['plant']}")
     tiles = [(f"{name}: {label}", f'<span class="a">{_with(document[key], unit)}</span>') for label, key, unit in (
-        ("gain margin", "gain_margin_db", "dB"), ("phase margin", "phase_margin_deg", "°"), ("peak |S|", "sensitivity_peak", ""), ("bandwidth", "bandwidth_hz", "Hz"))]
+        ("gain margin", "gain_margin_db", "dB"), ("phase margin", "phase_margin_deg", "°"), ("peak |S|", "sensitivity_peak", ""),
+        ("bandwidth", "bandwidth_hz", "Hz"))]
     return page.header("consistent", "Loops over frequency", "ers frequency", document["sentence"], tiles)
 
 
@@ -43,11 +44,13 @@ def _loops(document: Mapping, found: Study) -> str:
                       _with(loop["gain_crossover_hz"], "Hz"), digits(loop["disk_margin"], 3), once, digits(loop["sensitivity_peak"], 3),
                       _with(loop["bandwidth_hz"], "Hz"), "" if loop["stable"] else "<b>unstable</b>"), ""))
     c = document["conditions"]
-    lead = (f"The rudder swings by ±{math.degrees(c['amplitude_rad']):.3g}° about {math.degrees(c['start_rad']):.3g}°: plant and controller each stand for the first "
-            "harmonic of what they do then, friction and its compensation included; the voltage's limit is left out. The disk margin is that of gain and phase "
-            "changing at once. Bandwidth: |T| of the feedback 3 dB below its low end; a feed-forward follows further.")
+    lead = (f"The rudder swings by ±{math.degrees(c['amplitude_rad']):.3g}° about {math.degrees(c['start_rad']):.3g}°: plant and controller each stand for the "
+            "first harmonic of what they do then, friction and its compensation included; the voltage's limit is left out. "
+            "The disk margin is that of gain and phase changing at once. Bandwidth: |T| of the feedback 3 dB below its low end; "
+            "a feed-forward follows further.")
     drawn = (page.figure(frequency_figures.open_loops(found.loops), "Open loops (Bode).")
-             + page.figure(frequency_figures.planes(found.loops), "Nyquist with the disk that the least robust loop keeps out of; Nichols with contours of |T|.")
+             + page.figure(frequency_figures.planes(found.loops),
+                           "Nyquist with the disk that the least robust loop keeps out of; Nichols with contours of |T|.")
              + page.figure(frequency_figures.sensitivities(found.loops), "Sensitivity and complementary sensitivity."))
     return page.section("Loops", lead, page.table(HEADS, rows) + drawn)
 
@@ -69,16 +72,17 @@ def _cycles(document: Mapping, found: Study) -> str:
 
 def _recording(compared: Compared) -> str:
     r = compared.response
-    how = f"the last {r.periods} period{'s' if r.periods > 1 else ''} of its input" if r.kind == "periodic" else f"{r.periods} segments (Welch)"
+    how = f"the last {r.periods} period{'s' if r.periods > 1 else ''} of its input" if r.kind == "periodic" else "parabolas through neighbouring lines"
     said = page.listed(f"{name}: {gap.sentence}" if gap else f"{name}: nowhere coherent enough to be compared" for name, gap in compared.gaps.items())
-    lead = ("Best linear approximation from " + how + ". Sure: coherence above 0.95. <i>Friction described</i>: the friction and the preload that a motion of this size meets, its speed and "
-            "angle taken as normal.")
+    lead = ("Best linear approximation from " + how + ". Sure: coherence above 0.95. <i>Friction described</i>: the friction and the preload that "
+            "a motion of this size meets, its speed and angle taken as normal.")
     return page.section(f"Recording {page.text(r.name)}", lead, said + page.figure(frequency_figures.recording(compared)))
 
 
 def _footer(document: Mapping) -> str:
     c = document["conditions"]
-    told = [f"{c['rate_hz']:g} Hz", f"±{c['u_max_V']:g} V", f"speed filter {1e3 * c['filter_s']:g} ms", f"play ±{math.degrees(c['gap_rad']):.3g}°", f"{c['linkage']} linkage",
+    told = [f"{c['rate_hz']:g} Hz", f"±{c['u_max_V']:g} V", f"speed filter {1e3 * c['filter_s']:g} ms", f"play ±{math.degrees(c['gap_rad']):.3g}°",
+            f"{c['linkage']} linkage",
             f"inductance {'on' if c['inductance'] else 'off'}", *(f"effect {_effect(effect)}" for effect in c["effects"]), f"plant {document['datasheet']}",
             f"controllers know {document['design']}", *(f"{name} {value}" for name, value in document["versions"].items())]
     return f"<footer><p>{' · '.join(page.text(x) for x in told)}</p></footer>"

@@ -134,7 +134,9 @@ def search(settling: float, settle: Settle, gains: Gains = Gains(), seed: int = 
             break
         low = k_2
     else:
-        raise InputError(f"no gains up to k_2 = {FASTEST:g} settle within {1e3 * settling:.3g} ms, the quickest take {1e3 * min(time for time, _ in tried):.3g} ms")
+        quickest = min(time for time, _ in tried)
+        what = f"the quickest take {1e3 * quickest:.3g} ms" if math.isfinite(quickest) else "none settles at all"
+        raise InputError(f"no gains up to k_2 = {FASTEST:g} settle within {1e3 * settling:.3g} ms, {what}")
     best, high = tried[-1], k_2
     for _ in range(FINE if low is not None else 0):
         middle = math.sqrt(low * high)

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import welch
 
 from ers_mj.evidence import ResidualMap
+from ers_mj.mismatch import Mismatch, mismatch
 from ers_mj.model import Model
 from ers_mj.selection import Candidate
 from ers_mj.effects import BY_NAME
@@ -27,7 +27,7 @@ LEAST_EXCESS = 0.2  # share of error minus share of time from which a region is 
 
 @dataclass(frozen=True)
 class Samples:
-    """All valid samples of several recordings, each (N,): record, t, angle, speed, input, and two squared local errors."""
+    """All valid samples of several recordings, each (N,): record, t, angle, speed, input, two squared local errors, and the first with its sign."""
 
     record: np.ndarray
     t: np.ndarray
@@ -36,11 +36,12 @@ class Samples:
     input: np.ndarray
     before: np.ndarray
     after: np.ndarray
+    error: np.ndarray
 
 
 @dataclass(frozen=True)
 class Place:
-    """A region in which more of the squared error lives than its share of time."""
+    """A region in which more of the squared error lives than its share of time (of the motion's power, on the axis of frequency)."""
 
     axis: str
     region: tuple[float, float] | None
@@ -64,9 +65,14 @@ def gather(before: Model, after: Model, traces: Sequence[Trace]) -> Samples:
     parts = []
     for k, trace in enumerate(traces):
         v = trace.valid
-        error = [np.nan_to_num((trace.y - model.predict(trace, k, LOCAL_RATE))[v]) ** 2 for model in (before, after)]
-        parts.append((np.full(v.sum(), k), trace.t[v], trace.y[v], smooth_speed(trace)[v], trace.u[v], *error))
+        first, second = (np.nan_to_num((trace.y - model.predict(trace, k, LOCAL_RATE))[v]) for model in (before, after))
+        parts.append((np.full(v.sum(), k), trace.t[v], trace.y[v], smooth_speed(trace)[v], trace.u[v], first**2, second**2, first))
     return Samples(*(np.concatenate(column) for column in zip(*parts)))
+
+
+def over_frequency(samples: Samples, traces: Sequence[Trace]) -> Mismatch | None:
+    """What the model before leaves over frequency; None where the recordings are too short."""
+    return mismatch(traces, [samples.error[samples.record == k] for k in range(len(traces))], LOCAL_RATE)
 
 
 def _best_interval(values: np.ndarray, squares: np.ndarray, edges: np.ndarray):
@@ -81,11 +87,12 @@ def _best_interval(values: np.ndarray, squares: np.ndarray, edges: np.ndarray):
 
 
 def places(samples: Samples, traces: Sequence[Trace], rounds: Sequence[Sequence[Candidate]], base_cost: float, named: Sequence[str],
-           output_unit: str, input_unit: str) -> list[Place]:
+           output_unit: str, input_unit: str, spectrum: Mismatch | None = None) -> list[Place]:
     """Regions worth telling, subsystem first (of the ``named`` effects before others), then by how much more error than time they hold."""
-    found = [*_by_value(samples, output_unit, input_unit), *_by_direction(samples), *_by_time(samples, traces),
-             *_by_frequency(samples, traces)]
+    found = [*_by_value(samples, output_unit, input_unit), *_by_direction(samples), *_by_time(samples, traces)]
     found = [p for p in found if p.share_of_error - p.share_of_time >= LEAST_EXCESS]
+    if spectrum is not None and spectrum.region is not None:
+        found.append(Place("frequency", spectrum.region, "Hz", spectrum.kind, spectrum.share_of_error, spectrum.share_of_motion, spectrum.sentence))
     found.sort(key=lambda p: p.share_of_time - p.share_of_error)
     return [*_by_subsystem(rounds, base_cost, named), *found]
 
@@ -134,34 +141,6 @@ def _by_time(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
                          f"{part * error:.0%} of the squared error lies between {a:.2f} s and {b:.2f} s of {trace.name}, "
                          f"{whole * time:.0%} of the time"))
     return sorted(out, key=lambda p: p.share_of_time - p.share_of_error)[:2]
-
-
-def _by_frequency(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
-    """The band that holds most of the error's power, against the band that holds the motion's."""
-    power = {}
-    for k, trace in enumerate(traces):
-        mask = samples.record == k
-        if mask.sum() < 64:
-            continue
-        size = int(min(mask.sum(), 2 ** int(math.log2(max(2.0 / trace.sample_time, 64)))))
-        for name, x in (("error", np.sqrt(samples.before[mask])), ("motion", samples.angle[mask])):
-            f, p = welch(x - x.mean(), 1.0 / trace.sample_time, nperseg=size)
-            power.setdefault(name, []).append((f, p * mask.sum()))
-    if not power:
-        return []
-    grid = power["error"][0][0][1:]
-    spectrum = {name: np.sum([np.interp(grid, f, p) for f, p in parts], axis=0) for name, parts in power.items()}
-    share = {name: np.cumsum(p) / max(p.sum(), 1e-300) for name, p in spectrum.items()}
-    total = np.concatenate([[0.0], share["error"] - share["motion"]])
-    excess = total[None, :] - total[:, None]
-    i, j = np.unravel_index(np.argmax(np.triu(excess)), excess.shape)
-    if j <= i:
-        return []
-    cumulated = {name: np.concatenate([[0.0], s]) for name, s in share.items()}
-    error, motion = (float(cumulated[n][j] - cumulated[n][i]) for n in ("error", "motion"))
-    low, high = float(grid[i]), float(grid[j - 1])
-    return [Place("frequency", (low, high), "Hz", None, error, motion,
-                  f"{error:.0%} of the error's size varies at {low:.3g} to {high:.3g} Hz, where {motion:.0%} of the motion's power is")]
 
 
 def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named: Sequence[str]) -> list[Place]:

@@ -76,7 +76,8 @@ def share(x: float | None) -> str:
 def place(found: Mapping) -> str:
     """Where an error lives: axis, sentence, and its shares of error and time as bars."""
     sentence = text(found.get("sentence") or _region(found))
-    bars = _bar("of error", found.get("share_of_error"), "error") + _bar("of time", found.get("share_of_time"), "")
+    against = "of motion" if found.get("axis") == "frequency" else "of time"
+    bars = _bar("of error", found.get("share_of_error"), "error") + _bar(against, found.get("share_of_time"), "")
     return (f'<div class="place"><span class="axis">{text(found.get("axis"))}</span><p>{sentence}</p>'
             f'<div class="bars">{bars}</div></div>')
 

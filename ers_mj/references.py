@@ -23,6 +23,7 @@ SQUARE_HZ, RAMP_HZ = 1.0, 0.5
 CHIRP_FROM_HZ, CHIRP_TO_HZ = 1.0, 20.0
 ANGLES = {"theta_ref_rad": 1.0, "theta_ref_deg": math.radians(1.0)}
 MOST_SAMPLES = 2_000_000
+FASTEST_HZ, FURTHEST = 1e6, 1000.0  # sample rate and angle [rad] up to which a file is taken for a reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,3 +133,7 @@ def _refuse_holes(t: np.ndarray, theta: np.ndarray, name: str) -> None:
     h = np.diff(t)
     if h.min() <= 0 or np.ptp(h) > 0.01 * h.mean():
         raise InputError(f"{name}: its times are not evenly spaced, a loop runs at one sample rate")
+    if h.mean() < 1.0 / FASTEST_HZ:
+        raise InputError(f"{name}: its samples are {h.mean():.3g} s apart, {1.0 / FASTEST_HZ:g} s or more was expected")
+    if np.abs(theta).max() > FURTHEST:
+        raise InputError(f"{name}: its reference reaches {np.abs(theta).max():.3g} rad, {FURTHEST:g} rad at most was expected")

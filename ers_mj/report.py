@@ -127,7 +127,16 @@ def _frame(frame: Frame, when: str, simulated: float, picture: bytes) -> str:
 
 def _where(document: Mapping, evidence: Evidence) -> str:
     places = "\n".join(page.place(place) for place in document.get("where") or [])
-    return page.section("Where it fails", "Where the error of the refitted model lives, before any physics is added.", places)
+    return page.section("Where it fails", "Where the error of the refitted model lives, before any physics is added.", places and places + _spectrum(evidence))
+
+
+def _spectrum(evidence: Evidence) -> str:
+    """The error over frequency, where it is beyond the noise."""
+    if evidence.spectrum is None or evidence.spectrum.region is None:
+        return ""
+    return page.figure(figures.spectrum(evidence.spectrum, evidence),
+                       "The error of an observer that forgets within 33 ms. Linear is what a linear filter of input and motion explains of it; "
+                       "no such filter explains a distortion. On the right only lines at which both motions cohere.")
 
 
 def _missing(document: Mapping, evidence: Evidence) -> str:
@@ -222,7 +231,8 @@ def _ladder(document: Mapping, evidence: Evidence) -> str:
     table = page.table([head.replace("held-out error", f"held-out error [{page.text(unit.label)}]") for head in heads], rows)
     if len(evidence.ladder) > figures.MOST_RUNGS:
         table = f"<details><summary>All {len(evidence.ladder)} candidates as a table</summary>{table}</details>"
-    lead = "Every candidate was fitted in simulation; gain is what it takes off the training cost, z how surely, paired by blocks of time, numbers how many it adds."
+    lead = ("Every candidate was fitted in simulation; gain is what it takes off the training cost, z how surely, paired by blocks of time, "
+            "numbers how many it adds.")
     return page.section("The candidates", lead, drawn + table)
 
 
@@ -316,6 +326,7 @@ def _footer(document: Mapping) -> str:
     rows = [((page.text(name), f"<code>{page.text((hashes[k] if k < len(hashes) else '') or '')[:SHORT_HASH]}</code>"), "")
             for k, name in enumerate(names)]
     versions = ", ".join(f"{page.text(name)} {page.text(version)}" for name, version in (document.get("versions") or {}).items())
-    told = [f"seed {page.text(document.get('seed'))}", f"output [{page.text(pretty(data.get('output_unit')))}], input [{page.text(pretty(data.get('input_unit')))}]",
+    told = [f"seed {page.text(document.get('seed'))}", f"output [{page.text(pretty(data.get('output_unit')))}], "
+            f"input [{page.text(pretty(data.get('input_unit')))}]",
             versions]
     return f'<footer>{page.table(["file", "sha256"], rows)}<p>{" · ".join(filter(None, told))}</p></footer>'

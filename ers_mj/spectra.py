@@ -1,11 +1,14 @@
 """The frequency response of a recording, with what noise and distortion leave of it, and how far a model is from it.
 
-    recording -> period of the input -> lines (periodic, as a multisine) or averaged segments (any other) -> Response;  Response, model -> Gap
+    recording -> period of the input -> lines (periodic, as a multisine) or local polynomials (any other) -> Response;  Response, model -> Gap
 
 A periodic input excites some lines of the recording's spectrum and no others. At an excited line stands the best linear approximation; lines between
 the harmonics of the period hold noise and the decay of the first state; harmonics that are not excited hold the distortion besides. The
 decay is smooth over the lines, so that a parabola through the quiet neighbours takes it off (Pintelon and Schoukens, System Identification,
 2nd ed., chapters 4 and 7). Of one period alone noise and distortion are told together.
+
+Any other input excites neighbouring lines alike. About a line k the response and the decay are both taken as parabolas over r = -n..n (local polynomial method,
+ibid., chapter 7), fitted to Y[k + r] = (G + G_1 r + G_2 r^2) U[k + r] + T + T_1 r + T_2 r^2, which neither leaks nor smears a sweep as averaged segments do.
 """
 
 from __future__ import annotations
@@ -15,7 +18,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import csd, welch
 
 from ers_mj.errors import InputError
 from ers_mj.recording import Recording
@@ -25,9 +27,9 @@ QUIET, EXCITED = 1e-6, 1e-4  # share of the strongest line's power: most of an u
 FEW = 0.25  # share of all lines up to the highest excited one that a single period may excite and still be a multisine
 LEAST_PERIOD = 50  # samples
 NEIGHBOURS = 10  # quiet lines from which decay and noise are taken
-SEGMENTS = 8  # of a recording that is averaged
-FIRST = 4  # line of a segment from which the window's leakage leaves something to read
-EXACT = {"periodic": 0.03, "welch": 0.08}  # relative gap up to which nothing is missing: what leakage leaves of an exact response
+FIRST, LEAST_HALF, MOST_HALF, WIDTH = 2, 8, 60, 1 / 6  # lowest line; lines on either side of a local fit, at least, at most, and in shares of the frequency
+LEVERAGE = 6.0  # times what even excitation would leave of a line's uncertainty (2.25 of a parabola), beyond which a local fit only extrapolates
+EXACT = 0.03  # relative gap up to which nothing is missing: what leakage leaves of an exact response
 SURE = 0.95  # coherence from which a line counts
 
 
@@ -37,12 +39,13 @@ class Response:
 
     Attributes:
         name: of the recording.
-        kind: "periodic" or "welch".
-        periods: how many were averaged, or how many segments.
+        kind: "periodic", or "local" (polynomials).
+        periods: how many were averaged; 1 of any other input.
         f_hz: frequencies [Hz].
         g: output over input, complex [output unit / input unit].
         coherence: share of the output's power that the input explains linearly.
-        noise: standard deviation, in one period, of the output's amplitude that does not repeat [output unit]; of a single period or of segments, which
+        error: standard deviation of g, relative.
+        noise: standard deviation, in one period, of the output's amplitude that does not repeat [output unit]; of a single period or any other input, which
             cannot tell them apart, with the distortion in it.
         distortion: the same of what repeats and is not linear; NaN where it cannot be told apart.
         output: the output's amplitude [output unit].
@@ -54,6 +57,7 @@ class Response:
     f_hz: np.ndarray
     g: np.ndarray
     coherence: np.ndarray
+    error: np.ndarray
     noise: np.ndarray
     distortion: np.ndarray
     output: np.ndarray
@@ -85,7 +89,7 @@ def frequency_response(recording: Recording) -> Response:
     """The response of one recording.
 
     Raises:
-        InputError: its input does not vary, or its samples are not evenly spaced.
+        InputError: its input does not vary or excites no band, or its samples are not evenly spaced.
     """
     u, y = _even(recording)
     period = find_period(u)
@@ -94,7 +98,7 @@ def frequency_response(recording: Recording) -> Response:
         used = (count - 1 if count > 2 else count) * period  # the first of three or more holds most of the decay
         return _of_lines(recording, u[-used:], y[-used:], used // period)
     whole = u.size if period is None else period
-    return _of_lines(recording, u[-whole:], y[-whole:], 1) if _is_sparse(u[-whole:]) else _of_segments(recording, u, y)
+    return _of_lines(recording, u[-whole:], y[-whole:], 1) if _is_sparse(u[-whole:]) else _of_neighbours(recording, u, y)
 
 
 def _even(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
@@ -149,7 +153,7 @@ def _of_lines(recording: Recording, u: np.ndarray, y: np.ndarray, periods: int) 
     total = spread + np.nan_to_num(distorted)
     size = np.abs(true) ** 2
     return Response(recording.name, "periodic", periods, lines / (n * recording.sample_time), true / U[lines], size / (size + total),
-                    np.sqrt(spread), np.sqrt(distorted), np.abs(true))
+                    np.sqrt(total / (periods * size)), np.sqrt(spread), np.sqrt(distorted), np.abs(true))
 
 
 def _cleaned(Y: np.ndarray, lines: np.ndarray, quiet: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -171,19 +175,38 @@ def _nearest(lines: np.ndarray, k: int) -> slice:
     return slice(begin, begin + NEIGHBOURS)
 
 
-def _of_segments(recording: Recording, u: np.ndarray, y: np.ndarray) -> Response:
-    """Welch's averages, Hann windows that overlap by half, of differences from sample to sample: a servo's slow motion leaks less."""
-    size, h = max(u.size // SEGMENTS, 64), recording.sample_time
-    options = {"fs": 1.0 / h, "nperseg": size, "detrend": "constant"}
-    u, y = np.diff(u), np.diff(y)
-    f, uu = welch(u, **options)
-    yy, uy = welch(y, **options)[1], csd(u, y, **options)[1]
-    used = (uu > EXCITED * uu.max()) & (f >= FIRST / (h * size))
-    f, uu, yy, uy = f[used], uu[used], yy[used], uy[used]
-    coherence = np.abs(uy) ** 2 / np.maximum(uu * yy, 1e-300)
-    amplitude = np.sqrt(2.0 * yy / (h * size)) / (2.0 * np.sin(np.pi * f * h))
-    return Response(recording.name, "welch", 2 * (u.size // size) - 1, f, uy / uu, coherence, amplitude * np.sqrt(np.maximum(1.0 - coherence, 0.0)),
-                    np.full(f.size, np.nan), amplitude)
+def _of_neighbours(recording: Recording, u: np.ndarray, y: np.ndarray) -> Response:
+    """By local polynomials, of the output's differences from sample to sample: a servo's speed follows its input more evenly than its angle."""
+    h, u, y = recording.sample_time, u[:-1], np.diff(y)
+    U, Y = 2.0 * np.fft.rfft(u) / u.size, 2.0 * np.fft.rfft(y) / u.size
+    least, found, k = EXCITED * np.max(np.abs(U) ** 2), [], FIRST
+    while k < U.size - LEAST_HALF:
+        half = round(min(max(LEAST_HALF, WIDTH * k), MOST_HALF))
+        begin = min(max(k - half, 1), max(U.size - 2 * half - 1, 1))
+        near = np.arange(begin, min(begin + 2 * half + 1, U.size))
+        power = float(np.mean(np.abs(U[near]) ** 2))
+        if power > least and near.size > 6:
+            g, variance, rest = _local(U[near], Y[near], (near - k) / half, math.sqrt(power))
+            if variance * power * near.size <= LEVERAGE:
+                found.append((k, g, variance * rest, rest, power))
+        k += half // 2
+    if not found:
+        raise InputError(f"{recording.name}: its input excites no band of frequencies evenly, a frequency response needs a multisine, a sweep, steps or noise")
+    k, g, variance, rest, power = (np.array(column) for column in zip(*found))
+    f_hz = k / (u.size * h)
+    differing = np.exp(2j * np.pi * f_hz * h) - 1.0
+    size, rest = np.abs(g / differing) ** 2 * power, rest / np.abs(differing) ** 2
+    return Response(recording.name, "local", 1, f_hz, g / differing, size / (size + rest), np.sqrt(variance) / np.abs(g), np.sqrt(rest),
+                    np.full(f_hz.size, np.nan), np.sqrt(size + rest))
+
+
+def _local(U: np.ndarray, Y: np.ndarray, r: np.ndarray, scale: float) -> tuple[complex, float, float]:
+    """(g, its variance over that of the rest, variance of the rest) at r = 0 of lines (K,), from parabolas of the response and of the decay."""
+    powers = np.vander(r, 3, increasing=True)
+    A = np.concatenate([U[:, None] * powers, scale * powers], axis=1)
+    inverse = np.linalg.pinv(A.conj().T @ A, hermitian=True)
+    c = inverse @ (A.conj().T @ Y)
+    return complex(c[0]), float(inverse[0, 0].real), float(np.sum(np.abs(Y - A @ c) ** 2) / (r.size - 6))
 
 
 # -- against a model ------------------------------------------------------------------------------------------------------
@@ -192,7 +215,7 @@ def _of_segments(recording: Recording, u: np.ndarray, y: np.ndarray) -> Response
 def gap(response: Response, model: np.ndarray) -> Gap | None:
     """How far a model's response (F,) is from a recording's; None where the recording is nowhere sure.
 
-    This is what a localisation over frequency can be told: the band, and whether a linear change or a distortion is missing.
+    It tells the band, and whether a linear change or a distortion is missing.
     """
     k = response.sure
     if not k.any():
@@ -200,21 +223,20 @@ def gap(response: Response, model: np.ndarray) -> Gap | None:
     ratio = model[k] / response.g[k]
     db, deg = 20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))
     off = np.abs(ratio - 1.0) ** 2
-    open_ = 1.0 / response.coherence[k] - 1.0  # variance of the response, relative, of one period
-    linear = bool(off.mean() > 4.0 * open_.mean() / max(response.periods, 1) + EXACT[response.kind] ** 2)
-    band = _band(response.f_hz[k], off)
+    linear = bool(off.mean() > 4.0 * np.mean(response.error[k] ** 2) + EXACT**2)
+    band = shortest_band(response.f_hz[k], off)
     what = "more than noise and distortion leave open, its linear part is off" if linear else "no more than noise and distortion leave open"
     sentence = (f"{response.name}: the model is {_rms(db):.2g} dB and {_rms(deg):.2g} deg off (RMS over {k.sum()} lines), most of it at {band[0]:.3g} to "
                 f"{band[1]:.3g} Hz: {what}")
     return Gap(int(k.sum()), _rms(db), float(np.abs(db).max()), _rms(deg), float(np.abs(deg).max()), band, linear, sentence)
 
 
-def _band(f_hz: np.ndarray, off: np.ndarray) -> tuple[float, float]:
-    """The shortest run of lines, in log frequency, that holds half of ``off`` (F,)."""
+def shortest_band(f_hz: np.ndarray, off: np.ndarray, share: float = 0.5) -> tuple[float, float]:
+    """The shortest run of lines [Hz], in log frequency, that holds this share of ``off`` (F,)."""
     total = np.concatenate([[0.0], np.cumsum(off)])
     best = (math.inf, float(f_hz[0]), float(f_hz[-1]))
     for i in range(f_hz.size):
-        j = int(np.searchsorted(total, total[i] + 0.5 * total[-1] * (1.0 - 1e-9)))
+        j = int(np.searchsorted(total, total[i] + share * total[-1] * (1.0 - 1e-9)))
         if j <= f_hz.size:
             best = min(best, (math.log(f_hz[j - 1] / f_hz[i]), float(f_hz[i]), float(f_hz[j - 1])))
     return best[1], best[2]

@@ -23,6 +23,7 @@ from ers_mj.simulation import EffectSettings, Plant, build_plant
 
 Progress = Callable[[str, float], None]
 PLANTS = ("reduced", "mujoco")
+MOST_LATE = 1_000_000  # samples of dead time that a loop keeps
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,12 @@ class Trial:
 
 
 def sampled(plant: Plant, rate_hz: float, start: tuple[float, float]) -> Sampled:
-    """A plant that is given its voltage sample by sample."""
+    """A plant that is given its voltage sample by sample.
+
+    Raises:
+        InputError: its command is late by too many samples.
+    """
+    refuse_late(plant, rate_hz, MOST_LATE)
     if isinstance(plant, ReducedModel):
         from ers_mj.plants.sampled_reduced import SampledReduced
 
@@ -75,6 +81,13 @@ def sampled(plant: Plant, rate_hz: float, start: tuple[float, float]) -> Sampled
     from ers_mj.plants.sampled_mujoco import SampledMuJoCo
 
     return SampledMuJoCo(plant, rate_hz, start)
+
+
+def refuse_late(plant: Plant, rate_hz: float, most: int) -> None:
+    """Raise InputError where the plant's dead time is more than ``most`` samples."""
+    late = sum(float(values[0]) for name, values in plant.effects if name == "input_delay")
+    if late * rate_hz > most:
+        raise InputError(f"a dead time of {late:g} s is {late * rate_hz:.3g} samples at {rate_hz:g} Hz, {most} at most were expected")
 
 
 def references(cases: Sequence[str], servo: Servo, conditions: Conditions) -> list[Reference]:

@@ -57,11 +57,13 @@ def _robustness(document: Mapping, spreads: Sequence[Spread]) -> str:
     if not spreads:
         return ""
     rows = [((page.text(f"{s.controller}, {s.plant}, {s.case}"), _range(s, "rmse_rad", math.degrees(1.0), "°"), _range(s, "settling_time_s", 1e3, " ms"),
-              _range(s, "overshoot_pct", 1.0, " %"), _range(s, "chatter_V", 1.0, " V"), str(s.as_document()["never_settled"]), str(s.unstable)), "") for s in spreads]
-    lead = (f"{len(spreads[0].measures)} servos, every parameter and the size of every effect within a factor {document['scatter']:g} of the plant's, the controllers knowing only "
-            "their own. Median, and 5 to 95 % of the servos.")
+              _range(s, "overshoot_pct", 1.0, " %"), _range(s, "chatter_V", 1.0, " V"),
+              str(s.as_document()["never_settled"]), str(s.unstable)), "") for s in spreads]
+    lead = (f"{len(spreads[0].measures)} servos, every parameter and the size of every effect within a factor {document['scatter']:g} of the plant's, "
+            "the controllers knowing only their own. Median, and 5 to 95 % of the servos.")
     heads = ("", ">RMSE", ">settles", ">overshoot", ">chatter", ">never settle", ">unstable")
-    return page.section("Scattered servos", lead, page.table(heads, rows) + page.figure(trial_figures.spreads(spreads), "RMS error: every servo, and the median."))
+    return page.section("Scattered servos", lead, page.table(heads, rows)
+                        + page.figure(trial_figures.spreads(spreads), "RMS error: every servo, and the median."))
 
 
 def _range(spread: Spread, name: str, factor: float, unit: str) -> str:
@@ -74,7 +76,8 @@ def _cells(trial: Trial) -> tuple[str, ...]:
     if not m.stable:
         return (page.text(trial.controller), "unstable", *[NONE] * (len(HEADS) - 2))
     settles = "never" if m.settling_time_s is None else f"{1e3 * m.settling_time_s:.1f} ms"
-    return (page.text(trial.controller), settles, NONE if m.overshoot_pct is None else f"{m.overshoot_pct:.2f} %", degrees(m.steady_state_error_rad), degrees(m.rmse_rad), _with(m.peak_u_V, "V"),
+    return (page.text(trial.controller), settles, NONE if m.overshoot_pct is None else f"{m.overshoot_pct:.2f} %",
+            degrees(m.steady_state_error_rad), degrees(m.rmse_rad), _with(m.peak_u_V, "V"),
             _with(m.rms_u_V, "V"), _with(m.chatter_V, "V"), _with(m.energy_J, "J"))
 
 
@@ -84,15 +87,17 @@ def _with(x: float | None, unit: str) -> str:
 
 def _laws(document: Mapping) -> str:
     rows = [((page.text(name), page.text(sentence)), "") for name, sentence in document["controllers"].items()]
-    lead = ("Settling: within 2 % of a jump's height, the longest of all jumps, or of the amplitude where nothing jumps. Steady-state error: mean absolute error "
-            "over the last 20 % of the time. Chatter: mean change of the voltage from sample to sample. Energy: the integral of u i, mostly holding current; "
-            "with Table 1's K_t and K_e, which differ by 1.69, 41 % of the back-EMF's power has nowhere to go.")
+    lead = ("Settling: within 2 % of a jump's height, the longest of all jumps, or of the amplitude where nothing jumps. Steady-state error: mean absolute "
+            "error over the last 20 % of the time. Chatter: mean change of the voltage from sample to sample. "
+            "Energy: the integral of u i, mostly holding current; with Table 1's K_t and K_e, which differ by 1.69, 41 % of the "
+            "back-EMF's power has nowhere to go.")
     return page.section("Laws and measures", lead, page.table(["law", ""], rows) + page.listed(document["notes"]))
 
 
 def _footer(document: Mapping) -> str:
     c = document["conditions"]
-    told = [f"amplitude {math.degrees(c['amplitude_rad']):.4g}° from rest at {math.degrees(c['start_rad']):.4g}°", f"{c['rate_hz']:g} Hz", f"±{c['u_max_V']:g} V",
+    told = [f"amplitude {math.degrees(c['amplitude_rad']):.4g}° from rest at {math.degrees(c['start_rad']):.4g}°", f"{c['rate_hz']:g} Hz",
+            f"±{c['u_max_V']:g} V",
             f"noise {math.degrees(c['noise_rad']):.3g}°", f"play ±{math.degrees(c['gap_rad']):.3g}°", f"{c['linkage']} linkage",
             f"inductance {'on' if c['inductance'] else 'off'}", *(f"effect {effect['name']}" for effect in c["effects"]),
             f"plant {document['datasheet']}", f"controllers know {document['design']}", *(f"{name} {value}" for name, value in document["versions"].items())]

@@ -42,8 +42,8 @@ def _table(validation: Validation) -> str:
     for condition in dict.fromkeys(case.condition for case in validation.cases):
         cases = {case.input: case for case in validation.cases if case.condition == condition}
         rows.append(((page.text(spoken(condition)), *(_cell(cases[name]) for name in inputs)), ""))
-    lead = (f"RMS deviation of the angle [°] under the same voltages, and what that is of the motion; <b>bold</b> above {100 * VALID:.0f} %. The reduced model is "
-            "Eq. (6), or Eq. (1) where the inductance is on; it never has the play or the rod.")
+    lead = (f"RMS deviation of the angle [°] under the same voltages, and what that is of the motion; <b>bold</b> above {100 * VALID:.0f} %. The reduced model "
+            "is Eq. (6), or Eq. (1) where the inductance is on; it never has the play or the rod.")
     return page.section("Reduced model against MuJoCo", lead, page.table(["MuJoCo has", *(f">{name}" for name in inputs)], rows))
 
 

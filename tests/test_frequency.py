@@ -245,7 +245,9 @@ def test_a_table_and_a_page_are_written(free, tmp_path, capsys):
 @pytest.mark.parametrize(("arguments", "says"), [
     (["--controller", "lqr"], "there is no 'lqr'; there are ftrc"), (["--plant", "adams"], "there are reduced, mujoco"), (["nothing.csv"], "no such file"),
     (["--pid", "Q=1"], "there is no gain 'Q'; there are P, I, D"), (["--pid", "P=x"], "a number was expected"), (["--pid", "P=-1"], "not between"),
-    (["--amplitude-deg", "0"], "not above 0"), (["--rate-hz", "5"], "20 Hz or more was expected"), (["--datasheet", "nothing.toml"], "no such file"), (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice")])
+    (["--amplitude-deg", "0"], "not above 0"), (["--rate-hz", "5"], "20 Hz to 100000 Hz was expected"), 
+    (["--delay-ms", "1e6"], "1000 at most"), (["--rate-hz", "1e12"], "20 Hz to"),
+    (["--datasheet", "nothing.toml"], "no such file"), (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice")])
 def test_bad_input_is_one_sentence_and_code_2(arguments, says, capsys):
     assert cli.main(["frequency", "--json", *arguments]) == 2
     error = capsys.readouterr().err

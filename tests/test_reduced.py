@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 from ers_mj.datasheet import read_datasheet
 from ers_mj.effects import EFFECTS
-from ers_mj.effects.base import Scales
+from ers_mj.effects.base import Coefficients, Scales
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.proving import quick
@@ -109,3 +110,37 @@ def test_a_rigid_play_of_no_width_is_no_play():
            for gap in (4e-3, 1e-3)]
     size = [np.sqrt(np.mean((x - one) ** 2)) for x in two]
     assert size[1] < 0.5 * size[0]
+
+
+def linear_motion(c, u):
+    """theta - theta_0 (N,) from rest by the matrix exponential: (theta, w), (theta_m, w_m) of a shaft, and j of a winding."""
+    if c.two_body:
+        k, d, mine, its = c.k_twist, c.d_twist, (1.0 - c.rho), c.rho
+        A = np.array([[0, 1, 0, 0], [-(c.a_1 + k) / mine, -((1.0 - c.beta) * c.a_mech_plus + d) / mine, k / mine, d / mine],
+                      [0, 0, 0, 1], [k / its, d / its, -k / its, -(c.beta * c.a_mech_plus + d) / its]])
+    else:
+        its, A = 1.0, np.array([[0.0, 1.0], [-c.a_1, -c.a_mech_plus]])
+    n, driven = A.shape[0], A.shape[0] - 1
+    B = np.zeros((n, 1))
+    if c.tau_e > 0:
+        A, B = np.pad(A, (0, 1)), np.zeros((n + 1, 1))
+        A[driven, n], A[n, driven], A[n, n], B[n, 0] = 1.0 / its, -c.a_emf / c.tau_e, -1.0 / c.tau_e, c.b / c.tau_e
+    else:
+        A[driven, driven] -= c.a_emf / its
+        B[driven, 0] = c.b / its
+    F, G = cont2discrete((A, B, np.eye(A.shape[0]), np.zeros((A.shape[0], 1))), T[1], "zoh")[:2]
+    x, out = np.zeros(A.shape[0]), []
+    for v in u:
+        out.append(x[0])
+        x = F @ x + G[:, 0] * v
+    return np.array(out)
+
+
+@pytest.mark.parametrize("name", ["steps", "multisine"])
+@pytest.mark.parametrize("tau", [0.0, 9.4e-4])
+@pytest.mark.parametrize("effects", [(), [("shaft_compliance", np.array([20.0, 0.1, 0.55, 0.15]))]], ids=["rigid", "shaft"])
+def test_without_dry_friction_it_is_the_linear_system_from_rest_on(name, tau, effects):
+    """From rest at theta_0, where no force says which way it will go."""
+    model = ReducedModel(table_1(c_1=0.0, c_2=0.0, tau_e=tau).coefficients, effects)
+    c, u = Coefficients(*model._lowered[0]), INPUTS[name](T)
+    assert np.degrees(np.max(np.abs(model.simulate(T, u).theta - c.theta_0 - linear_motion(c, u)))) < 1e-7

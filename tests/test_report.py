@@ -1,6 +1,7 @@
 """The report is one page that stands alone, says what is known, and invents nothing."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 from ers_mj import figures
 from ers_mj.display import figure, interval, pretty, shown, spoken
 from ers_mj.evidence import Evidence, RecordView, ResidualMap, Rung
+from ers_mj.mismatch import mismatch
 from ers_mj.report import VERDICTS, report_page
+from ers_mj.traces import make_trace
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
 NASTY = '<script>alert("1 & 2")</script>'
@@ -205,3 +208,15 @@ def test_units_read_well():
     assert pretty("kg m^2") == "kg m²" and pretty("rad/s^2/V") == "rad/s²/V" and pretty("-") == ""
     assert spoken(np.pi / 2, "rad") == "90.0°" and spoken(0.004, "m") == "4.00 mm" and spoken(None, "m") == "—"
     assert interval([0.1, None], shown("V")) == "0.100 …" and interval(None, shown("V")) == "—"
+
+
+def test_an_error_beyond_the_noise_is_drawn_over_frequency():
+    random = np.random.default_rng(1)
+    t, u = np.arange(6000) * 1e-3, random.standard_normal(6000)
+    x = np.cumsum(u) * 1e-3
+    traces = [make_trace("made", t, u, x * gain, np.ones(6000, bool), None, None, 1e-5, 0.0) for gain in (1.0, 1.1)]
+    told = [replace(evidence(), spectrum=mismatch(traces, [e, e], 1e-9)) for e in (0.1 * x + 1e-5 * random.standard_normal(6000), 1e-5 * random.standard_normal(6000))]
+    drawn, silent = (report_page(document(), found) for found in told)
+    assert "measured over simulated motion" in drawn and "measured over simulated motion" not in silent
+    assert "measured over simulated motion" not in report_page(document(where=[]), told[0])
+    read(drawn)

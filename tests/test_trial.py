@@ -230,7 +230,9 @@ def test_a_model_with_its_effects_is_a_plant_and_a_design(tmp_path, capsys):
     (["--case", "sine"], "there is no 'sine'; there are step, square, ramp, chirp"), (["--case", "missing.csv"], "there is no such file"),
     (["--controller", "pid,pid"], "twice"), (["--umax-V", "0"], "not above 0"), (["--rate-hz", "20"], "100 to"), (["--effect", "magic:x=1"], "no effect"),
     (["--linkage", "wheel"], "wheel"), (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice"), (["--gains", "q=2"], "outside"),
-    (["--delay-ms", "1", "--effect", "input_delay:T_d=0.001"], "twice"), (["nothing.toml"], "no such file"), (["--amplitude-deg", "nan"], "finite")])
+    (["--delay-ms", "1", "--effect", "input_delay:T_d=0.001"], "twice"), (["nothing.toml"], "no such file"), (["--amplitude-deg", "nan"], "finite"),
+    (["--amplitude-deg", "1e9"], "beyond 360"), (["--delay-ms", "1e9"], "samples at 10000 Hz"), (["--pid", "P=1,P=2"], "gives P twice"),
+    (["--gains", "k_1=1,k_1=2"], "gives k_1 twice"), (["--gains", "k_1=1e400"], "beyond 1e+09")])
 def test_bad_input_is_one_sentence_and_code_2(arguments, says, capsys):
     assert cli.main(["trial", "--json", *arguments]) == 2
     error = capsys.readouterr().err
@@ -239,7 +241,9 @@ def test_bad_input_is_one_sentence_and_code_2(arguments, says, capsys):
 
 @pytest.mark.parametrize(("text", "says"), [("t_s,x\n0,1\n", "the columns are t_s, x"), ("t_s,theta_ref_deg\n0,1\n1,2\n", "100 to"),
                                             ("t_s,theta_ref_deg\n" + "".join(f"{k},{'nan' if k == 7 else k}\n" for k in range(200)), "data row 8"),
-                                            ("t_s,theta_ref_deg\n" + "".join(f"{k * k},1\n" for k in range(200)), "not evenly spaced")])
+                                            ("t_s,theta_ref_deg\n" + "".join(f"{k * k},1\n" for k in range(200)), "not evenly spaced"),
+                                            ("t_s,theta_ref_deg\n" + "".join(f"{k}e-9,1\n" for k in range(200)), "1e-06 s or more"),
+                                            ("t_s,theta_ref_rad\n" + "".join(f"{k},1e9\n" for k in range(200)), "1000 rad at most")])
 def test_a_bad_reference_is_refused(text, says, tmp_path, capsys):
     file = tmp_path / "bad.csv"
     file.write_text(text)

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_out, number, one_of, pair, mapping, results_folder, several
+from ers_mj.commands.options import QUARTER, TURN, add_out, number, one_of, pair, mapping, results_folder, several
 from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
 
 if TYPE_CHECKING:
@@ -33,11 +33,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--design", metavar="TOML", help="what the controllers know of the plant (default the datasheet itself)")
     parser.add_argument("--controller", type=several(str, "controller"), metavar="NAME,...", help="as of ers trial (default all)")
     parser.add_argument("--plant", type=several(one_of(("reduced", "mujoco")), "plant"), default=["reduced"], metavar="reduced,mujoco", help="default reduced")
-    parser.add_argument("--amplitude-deg", type=number(above=0), default=1.0, metavar="X", help="of the rudder's sine at which what is not linear is described (default 1)")
-    parser.add_argument("--at-deg", type=number(), metavar="X", help="angle about which the loops are linearised (default 10 beyond theta_0)")
+    parser.add_argument("--amplitude-deg", type=number(above=0, most=TURN), default=1.0, metavar="X",
+                        help="of the rudder's sine at which what is not linear is described (default 1)")
+    parser.add_argument("--at-deg", type=number(least=-TURN, most=TURN), metavar="X",
+                        help="angle about which the loops are linearised (default 10 beyond theta_0)")
     parser.add_argument("--rate-hz", type=number(above=0), default=10_000.0, metavar="N", help="sample rate of the loop (default 10000)")
     parser.add_argument("--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage, for limit cycles (default 24)")
-    parser.add_argument("--gap", type=number(least=0), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
+    parser.add_argument("--gap", type=number(least=0, most=QUARTER), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
     parser.add_argument("--linkage", choices=("constant", "rod"), default="constant", help="of MuJoCo's rudder (default constant)")
     parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
     parser.add_argument("--effect", action="append", default=[], metavar="NAME:key=value,...", help="physics to add to the plant, SI; repeatable")

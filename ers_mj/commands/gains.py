@@ -6,7 +6,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import number, whole
+from ers_mj.commands.options import TURN, number, whole
 from ers_mj.commands.output import Progress, as_json, bold
 
 if TYPE_CHECKING:
@@ -26,8 +26,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)")
     parser.add_argument("--gains", default="", metavar="NAME=X,...", help="q k_1 k_2 k_3 l gamma_1..gamma_7 (default Eq. (40) with q=97/99)")
     parser.add_argument("--settling-ms", type=number(above=0), metavar="T", help="search k_2, k_3, l and gamma that settle within T, others kept")
-    parser.add_argument("--amplitude-deg", type=number(above=0), default=10.0, metavar="X", help="step that settling and bound belong to (default 10)")
-    parser.add_argument("--start-deg", type=number(), default=15.0, metavar="X", help="where it starts (default 15)")
+    parser.add_argument("--amplitude-deg", type=number(above=0, most=TURN), default=10.0, metavar="X",
+                        help="step that settling and bound belong to (default 10)")
+    parser.add_argument("--start-deg", type=number(least=-TURN, most=TURN), default=15.0, metavar="X", help="where it starts (default 15)")
     parser.add_argument("--rate-hz", type=number(above=0), default=10_000.0, metavar="N", help="sample rate (default 10000)")
     parser.add_argument("--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage (default 24)")
     parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of the search's starts (default 0)")
@@ -80,7 +81,8 @@ def _told(document: dict, arguments: argparse.Namespace) -> list[str]:
     gains = document["gains"]
     gamma = ", ".join(f"{gains[f'gamma_{k}']:.4g}" for k in range(1, 8))
     settles = "it does not settle" if document["settling_time_s"] is None else f"settles in {1e3 * document['settling_time_s']:.1f} ms"
-    lines = ["", bold("the conditions (33)-(35) hold" if document["feasible"] else "the conditions (33)-(35) do not hold: the proof says nothing of these gains"),
+    lines = ["", bold("the conditions (33)-(35) hold" if document["feasible"] else
+                      "the conditions (33)-(35) do not hold: the proof says nothing of these gains"),
              "", f"  q = {gains['q']}, k_1 = {gains['k_1']:.4g}, k_2 = {gains['k_2']:.4g}, k_3 = {gains['k_3']:.4g}, l = {gains['l']:.4g}",
              f"  gamma = {gamma}",
              *(f"  m_{k} = {x:.6g}{'' if x > 0 else '   not above zero'}" for k, x in enumerate(document["m"], start=1)),

@@ -10,10 +10,11 @@ from pathlib import Path
 from ers_mj.errors import InputError
 
 DEFAULT_OUT = "ers-out"
+TURN, QUARTER = 360.0, 90.0  # [deg] that no rudder's step or angle goes beyond, and no play, noise or count of its sensor
 
 
-def number(least: float | None = None, above: float | None = None):
-    """A type for argparse: a finite number, not below `least`, above `above`."""
+def number(least: float | None = None, above: float | None = None, most: float | None = None):
+    """A type for argparse: a finite number, not below `least`, above `above`, not beyond `most`."""
 
     def parse(text: str) -> float:
         try:
@@ -26,6 +27,8 @@ def number(least: float | None = None, above: float | None = None):
             raise argparse.ArgumentTypeError(f"{text} is below {least:g}")
         if above is not None and x <= above:
             raise argparse.ArgumentTypeError(f"{text} is not above {above:g}")
+        if most is not None and x > most:
+            raise argparse.ArgumentTypeError(f"{text} is beyond {most:g}")
         return x
 
     return parse

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_common, add_out, number, results_folder, several, whole
+from ers_mj.commands.options import QUARTER, TURN, add_common, add_out, number, results_folder, several, whole
 from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
 from ers_mj.errors import InputError
 
@@ -29,7 +29,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "trial", help="controllers in a closed loop, on either plant",
         description="Run controllers in a closed loop and measure them. Lists with commas run every combination.",
-        epilog="examples:\n  ers trial\n  ers trial --controller ftrc,pid-ff,time-optimal --plant reduced,mujoco --case square,ramp,chirp --rate-hz 1000 --noise-deg 0.01\n"
+        epilog="examples:\n  ers trial\n"
+               "  ers trial --controller ftrc,pid-ff,time-optimal --plant reduced,mujoco --case square,ramp,chirp --rate-hz 1000 --noise-deg 0.01\n"
                "  ers trial model.toml --design datasheet.toml --case my_reference.csv --umax-V 12 --delay-ms 1 --out mine\n"
                "  ers trial --plants 50 --scatter 1.25 --case step,chirp --rate-hz 1000\n"
                "  ers trial --plant mujoco --gap 0.5 --inductance on --effect stribeck:dF_s=0.1,v_s=0.2 --json")
@@ -40,16 +41,16 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--plant", type=several(str, "plant"), default=["reduced"], metavar="reduced,mujoco", help="default reduced")
     parser.add_argument("--case", type=several(str, "case"), default=["step"], metavar="NAME|CSV,...",
                         help="step, square, ramp, chirp, or a file with t_s and theta_ref_rad or theta_ref_deg (default step)")
-    parser.add_argument("--amplitude-deg", type=number(above=0), default=10.0, metavar="X", help="of the cases (default 10)")
-    parser.add_argument("--start-deg", type=number(), default=15.0, metavar="X", help="where the rudder rests at first (default 15)")
+    parser.add_argument("--amplitude-deg", type=number(above=0, most=TURN), default=10.0, metavar="X", help="of the cases (default 10)")
+    parser.add_argument("--start-deg", type=number(least=-TURN, most=TURN), default=15.0, metavar="X", help="where the rudder rests at first (default 15)")
     parser.add_argument("--rate-hz", type=number(above=0), metavar="N", help="sample rate of the loop (default 10000); a file brings its own")
     parser.add_argument("--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage (default 24)")
-    parser.add_argument("--gap", type=number(least=0), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
+    parser.add_argument("--gap", type=number(least=0, most=QUARTER), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
     parser.add_argument("--linkage", choices=LINKAGES, default="constant", help="of MuJoCo's rudder (default constant)")
     parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
     parser.add_argument("--effect", action="append", default=[], metavar="NAME:key=value,...", help="physics to add to the plant, SI; repeatable")
-    parser.add_argument("--noise-deg", type=number(least=0), default=0.0, metavar="X", help="sensor noise, standard deviation (default 0)")
-    parser.add_argument("--quantum-deg", type=number(least=0), default=0.0, metavar="X", help="one count of the sensor (default 0)")
+    parser.add_argument("--noise-deg", type=number(least=0, most=QUARTER), default=0.0, metavar="X", help="sensor noise, standard deviation (default 0)")
+    parser.add_argument("--quantum-deg", type=number(least=0, most=QUARTER), default=0.0, metavar="X", help="one count of the sensor (default 0)")
     parser.add_argument("--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)")
     parser.add_argument("--filter-ms", type=number(least=0), default=0.5, metavar="X", help="time constant of the speed's filter (default 0.5)")
     parser.add_argument("--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them")
@@ -88,7 +89,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _spreads(arguments: argparse.Namespace, datasheet: Datasheet, controllers: list[str], conditions: Conditions, design: Datasheet, progress: Progress) -> list[Spread]:
+def _spreads(arguments: argparse.Namespace, datasheet: Datasheet, controllers: list[str], conditions: Conditions, design: Datasheet,
+             progress: Progress) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
     from ers_mj.robustness import scatter
 
@@ -193,7 +195,8 @@ def _spread_lines(document: dict) -> list[str]:
         head = f"{case}, {plant}, {group[0]['plants']} servos"
         lines += ["", bold(f"{head:26}{'RMSE [°] 5 / 50 / 95 %':>30}{'settles [ms] 5 / 50 / 95 %':>30}{'never':>8}{'unstable':>10}")]
         for s in group:
-            cells = "".join(f"{_three(s['measures'][key], factor, form):>30}" for key, factor, form in (("rmse_rad", degree, ".4f"), ("settling_time_s", 1e3, ".1f")))
+            shown = (("rmse_rad", degree, ".4f"), ("settling_time_s", 1e3, ".1f"))
+            cells = "".join(f"{_three(s['measures'][key], factor, form):>30}" for key, factor, form in shown)
             lines.append(f"  {s['controller']:24}{cells}{s['never_settled']:>8}{s['unstable']:>10}")
     return lines
 

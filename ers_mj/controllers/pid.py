@@ -32,6 +32,8 @@ def parse_pid(text: str) -> PidGains:
         key, _, value = (part.strip() for part in pair.partition("="))
         if key not in PidGains.__dataclass_fields__:
             raise InputError(f"--pid: there is no gain {key[:40]!r}; there are {', '.join(PidGains.__dataclass_fields__)}")
+        if key in given:
+            raise InputError(f"--pid gives {key} twice, once was expected")
         try:
             given[key] = float(value)
         except ValueError:

@@ -23,13 +23,14 @@ from ers_mj.localisation import smooth_speed
 from ers_mj.recording import Recording
 from ers_mj.simulation import Plant, build_plant
 from ers_mj.spectra import Gap, Response, frequency_response, gap
-from ers_mj.trial import Conditions, make_controller, sampled
+from ers_mj.trial import Conditions, make_controller, refuse_late, sampled
 
 Progress = Callable[[str, float], None]
 KICK = math.radians(2.0)  # from the centre, at which a loop is let go
 CYCLE_S = 3.0  # [s] for which it is watched
 COMPARED_HZ = 100.0  # up to which linear plants are compared in one number
-SLOWEST_HZ = 20.0  # sample rate of a loop that is analysed
+SLOWEST_HZ, FASTEST_HZ = 20.0, 1e5  # sample rates of a loop that is analysed
+MOST_LATE = 1000  # samples of dead time, each of which is a state of the linear plant
 DRAWN = 300  # frequencies of a plant's own picture
 
 
@@ -89,11 +90,13 @@ def study(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[str
     Raises:
         InputError: the datasheet, an effect, a recording or the sample rate cannot be used.
     """
-    if conditions.rate_hz < SLOWEST_HZ:
-        raise InputError(f"the loop's sample rate is {conditions.rate_hz:g} Hz, {SLOWEST_HZ:g} Hz or more was expected")
+    if not SLOWEST_HZ <= conditions.rate_hz <= FASTEST_HZ:
+        raise InputError(f"the loop's sample rate is {conditions.rate_hz:g} Hz, {SLOWEST_HZ:g} Hz to {FASTEST_HZ:g} Hz was expected")
     known = Servo.of(design or datasheet)
     responses = [_response(r, datasheet) for r in recordings]  # what cannot be used is refused before anything runs
     built = {name: _build(datasheet, name, conditions) for name in plants}
+    for plant in built.values():
+        refuse_late(plant, conditions.rate_hz, MOST_LATE)
     reduced = built.get("reduced") or _build(datasheet, "reduced", replace(conditions, linkage="constant"))
     c = Coefficients(*reduced._lowered[0])
     linear = {name: linearised(plant, conditions.rate_hz, conditions.start) for name, plant in built.items()}

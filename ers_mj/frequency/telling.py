@@ -72,7 +72,8 @@ def as_document(found: Study) -> dict:
 def _recording(compared: Compared) -> dict:
     r = compared.response
     return {"name": r.name, "kind": r.kind, "periods": r.periods, "f_hz": r.f_hz, "gain_db": 20.0 * np.log10(np.abs(r.g)),
-            "phase_deg": np.degrees(np.angle(r.g)), "coherence": r.coherence, "output_rad": r.output, "noise_rad": r.noise, "distortion_rad": r.distortion,
+            "phase_deg": np.degrees(np.angle(r.g)), "coherence": r.coherence, "relative_error": r.error, "output_rad": r.output,
+            "noise_rad": r.noise, "distortion_rad": r.distortion,
             "models": {name: {"gain_db": 20.0 * np.log10(np.abs(m)), "phase_deg": np.degrees(np.angle(m))} for name, m in compared.models.items()},
             "gaps": {name: gap and {"lines": gap.lines, "rms_db": gap.rms_db, "max_db": gap.max_db, "rms_deg": gap.rms_deg, "max_deg": gap.max_deg,
                                     "band_hz": gap.band_hz, "linear": gap.linear} for name, gap in compared.gaps.items()},

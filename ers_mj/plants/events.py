@@ -2,7 +2,7 @@
 
 State x = (theta, w, j, theta_m, w_m): rudder angle and speed, drive acceleration j (the motor torque over J; current in
 disguise), and the motor's side where a second body exists. Mode m = (s, side, stop, s_m, twist): the values that the set-valued
-terms take until the next event: direction of slip (0 = stuck), side of theta_0 (0 = held in the corner), stop touched,
+terms take until the next event: direction of slip (0 = stuck; 1 throughout without dry friction), side of theta_0 (0 = held in the corner), stop touched,
 motor slip, contact of the play (of two bodies without play: 1 throughout, a spring that pushes and pulls). A flow
 ends where the mode's inequality fails; the instant is found on the flow itself.
 
@@ -140,6 +140,12 @@ def _twist_force(c, twist, theta, w, theta_m, w_m):
 def _has_bristle(c):
     """Whether the second body is the foot of a bristle, which has no inertia."""
     return c[TWO] > 0 and c[RHO] <= 0
+
+
+@njit(nogil=True, inline="always")
+def _never_sticks(c, on):
+    """Whether the rudder has no dry friction, and the same damping both ways: its slip s then stays 1, whichever way it moves."""
+    return c[C_PLUS] <= 0 and c[C_MINUS] <= 0 and c[C_1] <= 0 and on[1, 0] == 0 and c[A_PLUS] == c[A_MINUS] and not _has_bristle(c)
 
 
 @njit(nogil=True, inline="always")
@@ -371,7 +377,7 @@ def _violation(e, c, on, p, lawful, t, x, m):
     """Event function e: positive where the mode's inequality fails."""
     theta, w, j, theta_m, w_m = x
     if e == 0:
-        return -m[0] * w if m[0] != 0 and not _has_bristle(c) else -1.0
+        return -m[0] * w if m[0] != 0 and not _has_bristle(c) and not _never_sticks(c, on) else -1.0
     if e == 1:
         return -m[1] * (theta - c[THETA_0]) if m[0] != 0 else -1.0
     if e == 2:
@@ -582,7 +588,7 @@ def _start_mode(c, on, p, lawful, t, x):
     if c[C_1] > 0 and side == 0 and w != 0:
         side = 1 if w > 0 else -1
     stop = 1 if theta > c[UPPER] else (-1 if theta < c[LOWER] else 0)
-    s = 1 if w > 0 else (-1 if w < 0 else 0)
+    s = 1 if w > 0 or _never_sticks(c, on) else (-1 if w < 0 else 0)
     if _has_bristle(c):
         return 0 if c[C_1] > 0 and side == 0 else 1, side, stop, 0, 1
     s_m = 1 if x[4] > 0 or (c[TWO] > 0 and _motor_friction(c) <= 0) else (-1 if x[4] < 0 else 0)
@@ -730,7 +736,7 @@ def _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
     """True where a slipping body may have stopped and gone on within the step from x to z: it brakes first, speeds up last."""
     if _has_bristle(c):
         return _grazes(c, x, z, m, h)
-    if m[0] == 0:
+    if m[0] == 0 or _never_sticks(c, on):
         return False
     d0 = _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1] * m[0]
     return (d0 < 0.0 and abs(z[1]) < -d0 * h
@@ -799,7 +805,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
     """
     n = t.size
-    lawful, two, bristle = on[0, 0] + on[1, 0] > 0, c[TWO] > 0, _has_bristle(c)
+    lawful, two, bristle, slips = on[0, 0] + on[1, 0] > 0, c[TWO] > 0, _has_bristle(c), _never_sticks(c, on)
     h0 = t[1] - t[0]
     tau, a_emf, bias = c[TAU], c[A_EMF], c[BIAS]
     ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
@@ -869,7 +875,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
                     z, extra = _segment(e, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, extra if tau > 0 else np.nan)
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * z[1], z[3], z[4])
-                    if (z[1] * m[0] > 0 and (z[0] - c[THETA_0]) * m[1] >= 0 and z[0] <= c[UPPER] and z[0] >= c[LOWER]
+                    if ((slips or z[1] * m[0] > 0) and (z[0] - c[THETA_0]) * m[1] >= 0 and z[0] <= c[UPPER] and z[0] >= c[LOWER]
                             and not (abs(z[1]) < 0.2 * abs(x[1])
                                      and _turns(c, on, p, lawful, now, x, z, m, drive, tau, a_emf, h))):
                         x = z
