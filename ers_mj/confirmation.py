@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.baseline import Start
+from ers_mj.effects import BY_NAME
 from ers_mj.evaluation import Fold, Score, folds, paired_p, pooled, recalibrated, refits, scored
 from ers_mj.identification import Fit, fit, polished, score
 from ers_mj.model import Model
@@ -51,7 +52,7 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
             else:
                 lesser_models[name] = base_models
             without[name] = pooled(_scores(lesser_models[name], parts))
-            p[name] = paired_p(pooled(after).misfit, without[name].misfit)
+            p[name] = paired_p(pooled(after).misfit, without[name].misfit, BY_NAME[name].once)
         failed = [n for n in model.names if (p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse)
                   and not _halves(pooled(after), without[n], parts)
                   and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))]

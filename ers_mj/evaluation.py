@@ -18,7 +18,7 @@ from ers_mj.traces import Blocks, Trace
 
 TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
 LEAST_LOSS = 0.02  # of the score, which one block's noise makes of two equal models
-NULL_GAIN = 1.5  # of C: decay of the tail of the largest gain that effect-free servos offer (3.4 in 2 of 24: analysis/null_gains.py)
+NULL_GAIN, NULL_GAIN_ONCE = 0.8, 1.5  # of C: decay of the tails of the largest gains that effect-free servos offer to laws, and to what acts once
 RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
 LAST_PART = 0.7  # where the only recording is cut into training and held out
 
@@ -142,7 +142,7 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     return scored(found.model, trace, 1, cut), {name: (float(v[1]), *ends[name]) for name, v in found.model.states.items()}
 
 
-def paired_p(better: np.ndarray, worse: np.ndarray) -> float:
+def paired_p(better: np.ndarray, worse: np.ndarray, once: bool = False) -> float:
     """One-sided p-value that ``better`` predicts held-out blocks no better than ``worse``: wins against losses over blocks.
 
     If neither is better the differences d of the scores lie alike on both sides of zero, so that the losses alone tell their scatter:
@@ -150,9 +150,10 @@ def paired_p(better: np.ndarray, worse: np.ndarray) -> float:
     for being rare, as it is by the scatter of all. A loss of LEAST_LOSS a block is taken for granted.
 
     Blocks are not independent, and the best of many effects was taken: the p-value is never below the share of servos without missing
-    physics in which as large a gain is offered, by an exponential tail (NULL_GAIN).
+    physics in which as large a gain is offered, by an exponential tail (analysis/null_gains.py: of 48 the largest gain of a law is 1.8; stick
+    and slip that fork offer what acts ``once`` 2.2 to 3.6 in four of them).
     """
     d = score(worse, 1.0) - score(better, 1.0)
     losses = float(np.sum(np.minimum(d, 0.0) ** 2)) + d.size * LEAST_LOSS**2
-    chance = math.exp(-max(float(np.sum(d)), 0.0) / NULL_GAIN)
+    chance = math.exp(-max(float(np.sum(d)), 0.0) / (NULL_GAIN_ONCE if once else NULL_GAIN))
     return max(chance, 0.5 * math.erfc(float(np.sum(d)) / math.sqrt(2.0 * losses) / math.sqrt(2.0)))

@@ -10,10 +10,10 @@ import numpy as np
 
 from ers_mj.identification import Fit, residuals, score
 from ers_mj.model import OBSERVER_RATE
-from ers_mj.selection import PARAMETER_PRICE
 from ers_mj.traces import Trace
 
 RUN = 4  # neighbouring blocks that chance strikes together: 1 s, as the intervals take it
+PARAMETER_PRICE = 0.25  # of C for each further parameter, when explanations are compared
 DRAWS = 1000  # of weights, in which each run of blocks counts more or less
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, converged, fit, hopped, near_noise, score, tau_of
+from ers_mj.isolability import PARAMETER_PRICE, probabilities
 from ers_mj.model import STATES
 from ers_mj.screening import Begin, screen
 from ers_mj.traces import Trace
@@ -27,12 +28,12 @@ LOST = 0.2  # share of the gain that the blocks which lose may lose, where it fa
 ONCE = 8.0  # of C that suffices where an effect acts once
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
 QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
-PARAMETER_PRICE = 0.25  # of C for each further parameter, when candidates are compared
 RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
 LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
+FOREMOST = 2  # effects of the largest promise, which are refitted from their other starts whatever the first refit's gain
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
@@ -115,6 +116,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         first = refitted([(label, begins[0]) for label, begins in starts.items()])
         most = max((reference - total(f) for f in first.values()), default=0.0)
         worth = {name for name, found in leaders(first).items() if bent or reference - total(found) >= AGAIN * most}
+        worth |= {name for name, _ in screened[:FOREMOST]}
         again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth for begin in begins[1:]])
         best = {label: min((ends[label] for ends in (first, again) if label in ends), key=total) for label in first}
         if not bent:
@@ -138,7 +140,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         if rivals > 1:
             lead, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau))), ranked[:rivals])
-    return _simplest_first(sorted(ranked, key=lambda c: -c.worth))
+    return _likeliest_first(sorted(ranked, key=lambda c: -c.worth))
 
 
 def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
@@ -147,8 +149,8 @@ def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
     return [c for c in ranked if c.worth > least]
 
 
-def _simplest_first(ranked: list[Candidate]) -> list[Candidate]:
-    """Of rivals the one with the fewest parameters leads: which of them the worth prefers is a matter of the last dents of the search.
+def _likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
+    """Of rivals the most probable leads (see isolability.probabilities): which of them the worth prefers may rest on one stick or slip.
 
     What has a clock of its own (a gust, a knock) leads only where no law of the servo itself explains CLOCKED of what it does: a swing
     bends to whatever a repeated excitation leaves over.
@@ -158,7 +160,9 @@ def _simplest_first(ranked: list[Candidate]) -> list[Candidate]:
     if _clocked(ranked[0]):
         lawful = [c for c in ranked if not _clocked(c) and c.gain >= CLOCKED * ranked[0].gain and c.z >= LEAST_Z]
         ranked = sorted(ranked, key=lambda c: c not in lawful)
-    first = min(_rivals(ranked) or ranked[:1], key=lambda c: (_clocked(c), c.fit.size))
+    rivals = _rivals(ranked) or ranked[:1]
+    chances = probabilities({c.name: c.fit for c in rivals})
+    first = max(rivals, key=lambda c: (not _clocked(c), chances[c.name]))
     return [first, *(c for c in ranked if c is not first)]
 
 

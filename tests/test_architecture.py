@@ -7,7 +7,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
 ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "proving", "simulation", "traces",
-         "excitation", "replay", "model_file", "rendering", "window", "model", "starts", "identification", "guess", "baseline", "screening", "selection", "isolability",
+         "excitation", "replay", "model_file", "rendering", "window", "model", "starts", "identification", "guess", "baseline", "isolability", "screening", "selection",
          "intervals", "evaluation", "spectra", "mismatch", "evidence", "design", "advice", "localisation", "confirmation", "multibody", "document", "diagnosis",
          "known", "streaming", "tracking", "experiment",
          "validation", "controllers", "references", "closed_loop", "measures", "trial", "robustness", "gains", "claims", "frequency", "display", "validity", "frames",

@@ -13,6 +13,8 @@ class VoltageSaturation(Drive):
     mjcf = "the ctrlrange of the motor"
     parameters = (Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),)
 
+    tries = 2
+
     def starts(self, scales):
         return [np.array([part * scales.input]) for part in (0.95, 0.8)]
 
