@@ -185,7 +185,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless."""
     current, rounds, mended = base, [], 0
     tau = tau_of(base.misfit)
-    while len(rounds) < (MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS):
+    while len(rounds) < _most_rounds(current):
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
@@ -205,6 +205,13 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         if near_noise(current):
             current = _exchanged(current, rounds[:-1], traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau)
+
+
+def _most_rounds(current: Fit) -> int:
+    """How many rounds there are at most: one where what is dear to simulate leaves the model wrong, since beside it every refit is."""
+    if near_noise(current):
+        return MOST_ROUNDS
+    return 1 if any(BY_NAME[name].dear for name in current.model.names) else FEWER_ROUNDS
 
 
 def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
