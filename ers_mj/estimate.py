@@ -32,7 +32,7 @@ WRONG = 1.5  # mean squared residual in sigmas from which the model is said to b
 NEAR_BOUND = 1e-3  # of a coordinate's range
 PRINTED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
-POLISH_BUDGET = 200
+POLISH_BUDGET, POLISHES, POLISH_WORTH = 200, 4, 1e-4  # the last: share of the value that another polish must have been worth
 
 Progress = Callable[[str, float], None]
 
@@ -183,13 +183,20 @@ def _found(search: Search, settings: Settings, simulate: Simulator | None) -> tu
         raise InputError("no motion that the model can make within these bounds resembles the recordings: check units and signs of input and output")
     x, used = found.x, found.evaluations
     if by_squares or settings.polish:
-        for runs in (None,) if simulate is None else (None, simulate):
-            x, search, more = _polished(search, x, runs)
-            used += more
+        value = found.value
+        for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
+            x, search, ended = _polished(search, x, None)
+            used += ended.evaluations
+            value, gain = ended.value, value - ended.value
+            if gain < POLISH_WORTH * value:
+                break
+        if simulate is not None:
+            x, search, ended = _polished(search, x, simulate)
+            used += ended.evaluations
     return x, search, found, used
 
 
-def _polished(search: Search, x: np.ndarray, simulate: Simulator | None) -> tuple[np.ndarray, Search, int]:
+def _polished(search: Search, x: np.ndarray, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum]:
     """ls from x (r,) with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``."""
     traces = search.traces if simulate else tuple(with_starts(search.unknowns.model(search.letters(x)), search.traces))
     begun = replace(search, traces=traces, with_starts=True)
@@ -197,7 +204,7 @@ def _polished(search: Search, x: np.ndarray, simulate: Simulator | None) -> tupl
     own = np.concatenate([x, np.zeros(lower.size - x.size)])
     found = LS(attempts=1, staged=False, gain=MUJOCO_GAIN if simulate else POLISH_GAIN).minimise(
         Misfit(begun, simulate=simulate), lower, upper, budget=POLISH_BUDGET, start=own)
-    return found.x[: x.size], replace(search, traces=begun.started(found.x)), found.evaluations
+    return found.x[: x.size], replace(search, traces=begun.started(found.x)), found
 
 
 # -- the answer ---------------------------------------------------------------------------------------------------------
@@ -209,25 +216,26 @@ def _told(recordings, datasheet, settings, search, x, simulate, minimum, used, b
     x = np.concatenate([x, np.zeros(open_ended.bounds[0].size - x.size)])
     reduced = Misfit(open_ended)
     e, weight = replace(reduced, simulate=simulate).residuals(x), reduced.weight
-    precision = precision_of(np.nan_to_num(central(reduced.residuals, x, STEP) / weight[:, None]), e / weight, search.traces, settings.seed)
-    profiles = () if simulate else _profiles(reduced, open_ended, x, precision)
+    slopes = np.nan_to_num(central(reduced.residuals, x, STEP) / weight[:, None])
+    precision = precision_of(slopes, e / weight, search.traces, settings.seed)
+    profiles = () if simulate else _profiles(reduced, open_ended, slopes, x, precision)
     seen = np.concatenate([t.seen for t in search.traces])
     misfit = float(np.sum((e / weight) ** 2)) / int(seen.sum())
     y, u = recordings[0].output_unit, {"pct": "%"}.get(recordings[0].input_unit, recordings[0].input_unit)
     rows = _rows(search, letters, precision, profiles, datasheet, y, u)
     predicted = _predicted(search, letters, e / weight)
     return Identified(settings, tuple(rows), float(e @ e), misfit, minimum, used, search.structure, profiles, search.traces, predicted,
-                      _model(unknowns, letters, datasheet), _sentence(search, misfit), tuple(_warnings(search, x, misfit)), time.monotonic() - began)
+                      _model(unknowns, letters), _sentence(search, misfit, settings), tuple(_warnings(search, x, misfit)), time.monotonic() - began)
 
 
-def _profiles(objective: Misfit, search: Search, x: np.ndarray, precision: Precision) -> tuple[Profile, ...]:
+def _profiles(objective: Misfit, search: Search, slopes: np.ndarray, x: np.ndarray, precision: Precision) -> tuple[Profile, ...]:
     """Of those coordinates whose interval is wide enough to be bent; in sigmas, so that a rise of one is one of chi^2."""
     out = []
     for k, name in enumerate(search.names):
         half = 1.96 * math.sqrt(precision.fisher[k, k])
         if name != "theta_0" and WEAK < half < WIDEST:
             unit = np.eye(x.size)[k]
-            out.append(profile(InSigmas(objective), x, k, name, half, precision.half_width(unit) / half, search.bounds))
+            out.append(profile(InSigmas(objective), slopes, x, k, name, half, precision.half_width(unit) / half, search.bounds))
     return tuple(out)
 
 
@@ -316,8 +324,8 @@ def _by_coordinate(search: Search, letters: np.ndarray, by_letter: np.ndarray) -
 def _unit(names: Sequence[str], powers: np.ndarray, y: str, u: str) -> str:
     """The unit of a product of powers, as the letters' units stand."""
     above = [unit_of_letter(n, y, u) for n, q in zip(names, powers) if q > 0]
-    below = [f"({unit_of_letter(n, y, u)})" if q == -1 else f"({unit_of_letter(n, y, u)})^{-q:g}" for n, q in zip(names, powers) if q < 0]
-    return "/".join([" ".join(above), *below])
+    below = [unit_of_letter(n, y, u) for n, q in zip(names, powers) if q < 0 for _ in range(round(-q))]
+    return "/".join([" ".join(above), *(f"({unit})" if " " in unit else unit for unit in below)])
 
 
 def _predicted(search: Search, letters: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -330,20 +338,20 @@ def _predicted(search: Search, letters: np.ndarray, e: np.ndarray) -> tuple[np.n
     return tuple(out)
 
 
-def _model(unknowns: Unknowns, letters: np.ndarray, datasheet: Datasheet | None) -> Datasheet:
+def _model(unknowns: Unknowns, letters: np.ndarray) -> Datasheet:
     """The identified model: what cannot be told stands as it was known, the rest beside it as the recordings have it."""
     values = unknowns.values(letters)
     lumped = {name: float(values[name]) for name in LUMPED}
     parameters = {} if unknowns.is_lumped else unknowns.everything(letters)
-    if unknowns.is_lumped and datasheet is not None:
-        parameters = {}
     return Datasheet(parameters=parameters, lumped=lumped, baseline={name: float(values[name]) for name in ("tau_e", "emf_share")}, name="model.toml")
 
 
-def _sentence(search: Search, misfit: float) -> str:
+def _sentence(search: Search, misfit: float, settings: Settings) -> str:
     structure, count = search.structure, len(search.traces)
     what = f"{structure.rank} of {len(structure.names)} parameters can be told" if structure.pivots else f"all {structure.rank} parameters can be told"
     said = f"From {'this recording' if count == 1 else f'these {count} recordings'} {what}{' as combinations' if structure.pivots else ''}"
+    if misfit > WRONG and settings.method != "ls" and not settings.polish:
+        return f"{said}, but {settings.method} left {math.sqrt(misfit):.2g} times the noise: it stopped short of the best fit, or the model is wrong (--polish tells)."
     if misfit > WRONG:
         return f"{said}, but the model is wrong: what it leaves is {math.sqrt(misfit):.2g} times the noise. `ers diagnose` looks for what is missing."
     return f"{said}; the model explains what was recorded within its noise."

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,10 +89,14 @@ class Profile:
 
 
 class Pinned:
-    """An objective (see minimisers/base.py) over all coordinates but one, which is held."""
+    """An objective (see minimisers/base.py) over all coordinates but one, which is held; its slopes (N, r) are those of the optimum throughout."""
 
-    def __init__(self, objective, k: int, value: float):
-        self._objective, self._k, self._value = objective, k, value
+    def __init__(self, objective, slopes: np.ndarray, k: int, value: float):
+        self._objective, self._slopes, self._k, self._value = objective, np.delete(slopes, k, axis=1), k, value
+
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """Slopes (N, r - 1), wherever x is: Broyden's updates see to the rest."""
+        return self._slopes
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Residuals (N,) at the other coordinates (r - 1,)."""
@@ -102,12 +106,12 @@ class Pinned:
         return np.array([float(e @ e) for e in map(self.residuals, x)])
 
 
-def profile(objective, x: np.ndarray, k: int, name: str, half: float, inflation: float, bounds: tuple[np.ndarray, np.ndarray],
-            progress: Callable[[], None] = lambda: None) -> Profile:
+def profile(objective, slopes: np.ndarray, x: np.ndarray, k: int, name: str, half: float, inflation: float, bounds: tuple[np.ndarray, np.ndarray]) -> Profile:
     """The profile likelihood of coordinate k about the optimum x (r,).
 
     Args:
-        objective: with residuals (N,) whose squares sum to chi^2 of one.
+        objective: with residuals (N,) whose squares sum to chi^2.
+        slopes: (N, r) of the residuals at the optimum.
         half: 95 % half-width by Fisher, which sets the places.
         inflation: of the level, where blocks scatter more than single residuals (a ratio of half-widths).
         bounds: lower and upper ends of the coordinates (r,).
@@ -121,8 +125,7 @@ def profile(objective, x: np.ndarray, k: int, name: str, half: float, inflation:
             at = float(np.clip(x[k] + way * share * half * inflation, lower[k], upper[k]))
             if at in places:
                 break
-            found = LS(attempts=1, staged=False, gain=1e-7).minimise(Pinned(objective, k, at), lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest)
-            progress()
+            found = LS(attempts=1, staged=False, gain=1e-7).minimise(Pinned(objective, slopes, k, at), lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest)
             places.append(at)
             rises.append(max(found.value - least, 0.0))
             rest = found.x

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
-ORDER = ["errors", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "proving", "simulation", "traces",
-         "excitation", "replay", "model_file", "rendering", "window", "model", "starts", "identification", "guess", "baseline", "screening", "selection", "isolability",
+ORDER = ["errors", "minimisers", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "proving", "simulation", "traces",
+         "excitation", "replay", "model_file", "rendering", "window", "model", "starts", "identification", "guess", "baseline", "unknowns", "structure", "misfit", "precision", "rollouts", "estimate", "screening", "selection", "isolability",
          "intervals", "evaluation", "evidence", "design", "advice", "spectra", "localisation", "confirmation", "multibody", "document", "diagnosis",
          "validation", "controllers", "references", "closed_loop", "measures", "trial", "robustness", "gains", "claims", "frequency", "display", "validity", "frames",
-         "figures", "page", "maps", "report", "validation_report", "proof_figures", "proof_report", "trial_figures", "trial_report", "frequency_figures", "frequency_report",
+         "figures", "page", "maps", "report", "validation_report", "proof_figures", "proof_report", "trial_figures", "trial_report", "frequency_figures", "frequency_report", "identify_figures", "identify_report",
          "commands", "cli"]
-SILENT = {"proving", "advice", "design", "excitation", "isolability", "model", "starts", "identification", "guess", "baseline", "screening", "selection", "intervals",
+SILENT = {"proving", "minimisers", "unknowns", "structure", "misfit", "precision", "rollouts", "estimate", "advice", "design", "excitation", "isolability", "model", "starts", "identification", "guess", "baseline", "screening", "selection", "intervals",
           "evaluation", "localisation", "confirmation", "multibody", "document", "diagnosis", "validation", "validity", "effects", "plants",
           "replay", "model_file", "rendering", "window", "frames", "controllers", "references", "closed_loop", "measures", "trial", "robustness", "gains", "claims", "spectra",
           "frequency"}

@@ -3,6 +3,6 @@
 What is slow to import is imported inside `run`, so that `ers --help` is quick.
 """
 
-from ers_mj.commands import demo, diagnose, frequency, gains, prove, simulate, trial, validate, view
+from ers_mj.commands import demo, diagnose, frequency, gains, identify, prove, simulate, trial, validate, view
 
-COMMANDS = (demo, diagnose, simulate, validate, view, prove, trial, gains, frequency)
+COMMANDS = (demo, diagnose, identify, simulate, validate, view, prove, trial, gains, frequency)
