@@ -11,7 +11,7 @@ class GA(IGA):
     name = "ga"
     sentence = "the paper's GA1: its genetic algorithm with fixed probabilities"
 
-    def __init__(self, size: int = 40, crossover: float = 0.9, mutation: float = 0.1):
+    def __init__(self, size: int = 40, crossover: float = 0.9, mutation: float = 0.15):
         super().__init__(size, (crossover, crossover), (mutation, mutation))
 
     def probabilities(self, share: float) -> tuple[float, float]:
