@@ -218,9 +218,9 @@ def _told(recordings, datasheet, settings, search, x, simulate, minimum, used, b
     e, weight = replace(reduced, simulate=simulate).residuals(x), reduced.weight
     slopes = np.nan_to_num(central(reduced.residuals, x, STEP) / weight[:, None])
     precision = precision_of(slopes, e / weight, search.traces, settings.seed)
-    profiles = () if simulate else _profiles(reduced, open_ended, slopes, x, precision)
     seen = np.concatenate([t.seen for t in search.traces])
     misfit = float(np.sum((e / weight) ** 2)) / int(seen.sum())
+    profiles = () if simulate or misfit > WRONG else _profiles(reduced, open_ended, slopes, x, precision)
     y, u = recordings[0].output_unit, {"pct": "%"}.get(recordings[0].input_unit, recordings[0].input_unit)
     rows = _rows(search, letters, precision, profiles, datasheet, y, u)
     predicted = _predicted(search, letters, e / weight)

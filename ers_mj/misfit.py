@@ -23,7 +23,7 @@ from ers_mj.unknowns import Unknowns
 STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone through before the free run
 IN_PROPORTION = ("B",)
 STEP = 1e-5  # of the letters' logarithms, for sensitivities
-COARSER, FORKS, FEWEST = 3.0, 1e-5, 100  # a second step, the share of a slope's size by which both may differ, and samples that must be left
+COARSER, FORKS, FEWEST = 3.0, 0.01, 0.5  # a second step, the share of a slope's size by which both may differ, and the samples' share that must be left
 START = 0.01  # half travels by which the angle at the start may be off
 EXPLAINED = 1.3  # mean squared residual in sigmas up to which a fit is good enough for no further start
 
@@ -179,4 +179,4 @@ def structure_at(unknowns: Unknowns, traces: Sequence[Trace], letters: np.ndarra
     slopes, coarser = (np.nan_to_num(central(moved, np.zeros(len(letters)), step)) for step in (STEP, COARSER * STEP))
     size = np.abs(slopes).max(axis=0) + 1e-300
     smooth = np.max(np.abs(slopes - coarser) / size, axis=1) < FORKS  # elsewhere stick and slip fork at a touch
-    return structure_of(slopes[smooth] if smooth.sum() > FEWEST else slopes, unknowns.names)
+    return structure_of(slopes[smooth] if smooth.mean() > FEWEST else slopes, unknowns.names)

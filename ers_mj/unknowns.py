@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.baseline import baseline
-from ers_mj.datasheet import LUMPED, TABLE_1, Datasheet
+from ers_mj.datasheet import LUMPED, Datasheet
 from ers_mj.errors import InputError
 from ers_mj.model import BASE, Model
 from ers_mj.traces import Trace
@@ -89,12 +89,11 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
         is_lumped, known = False, {name: x for name, x in known.items() if name in (*LETTERS, "n")}
     else:
         is_lumped, known = True, {**_lumped(traces, datasheet, is_angle, jobs), **fixed}
+    allowed = LUMPED if is_lumped else LETTERS
     for name in (*fixed, *bounds):
-        if name not in known or name in TABLE_1 and is_lumped and name not in LUMPED:
-            raise InputError(f"{name} cannot be given here: without {', '.join(x for x in NEEDED if x not in sheet)} of a datasheet or bounds for "
-                             f"them Eq. (6)'s letters are identified, {', '.join(LUMPED)}")
-        if name in LUMPED and name != "theta_0" and not is_lumped:
-            raise InputError(f"{name} cannot be given beside Eq. (1)'s letters, one of {', '.join(LETTERS)} was expected")
+        if name not in allowed:
+            why = f"without {', '.join(x for x in NEEDED if x not in sheet)} of a datasheet" if is_lumped else "where a datasheet gives those of Eq. (1)"
+            raise InputError(f"{name} cannot be fixed or bounded {why}: these are identified, {', '.join(allowed)}")
     y = np.concatenate([t.y[t.valid] for t in traces])
     names, ends = [], []
     order = [name for name in (BASE if is_lumped else LETTERS) if name in known and name not in fixed]
