@@ -132,7 +132,7 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
     unknowns = unknowns_of(traces, datasheet, settings.fixed or {}, settings.bounds or {}, settings.factors, recordings[0].output_unit == "rad", settings.jobs)
     y = np.concatenate([t.y[t.valid] for t in traces])
     scale = 0.5 * float(np.ptp(y))
-    search = Search(unknowns, _best_structure(unknowns, traces, scale, settings.seed), scale, traces)
+    search = Search(unknowns, _best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(unknowns.reference)
     progress(f"searching by {settings.method}", 0.1)
     simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad") if settings.plant == "mujoco" else None
     x, search, minimum, used = _found(search, settings, simulate)
@@ -198,13 +198,14 @@ def _found(search: Search, settings: Settings, simulate: Simulator | None) -> tu
 
 def _polished(search: Search, x: np.ndarray, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum]:
     """ls from x (r,) with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``."""
-    traces = search.traces if simulate else tuple(with_starts(search.unknowns.model(search.letters(x)), search.traces))
-    begun = replace(search, traces=traces, with_starts=True)
+    letters = search.letters(x)
+    traces = search.traces if simulate else tuple(with_starts(search.unknowns.model(letters), search.traces))
+    begun = replace(search, traces=traces, with_starts=True).at_home(letters)
     lower, upper = begun.bounds
     own = np.concatenate([x, np.zeros(lower.size - x.size)])
     found = LS(attempts=1, staged=False, gain=MUJOCO_GAIN if simulate else POLISH_GAIN).minimise(
         Misfit(begun, simulate=simulate), lower, upper, budget=POLISH_BUDGET, start=own)
-    return found.x[: x.size], replace(search, traces=begun.started(found.x)), found
+    return found.x[: x.size], replace(begun, traces=begun.started(found.x), with_starts=False), found
 
 
 # -- the answer ---------------------------------------------------------------------------------------------------------

@@ -30,11 +30,12 @@ def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> F
     above.plot(*decimate(trace.t, u.factor * trace.y, POINTS[wide]), color=MEASURED, linewidth=2.6, label="measured")
     above.plot(*decimate(trace.t, u.factor * predicted, POINTS[wide]), color=AFTER, linewidth=1.1, label="identified model, free run")
     below.plot(*decimate(trace.t, u.factor * (trace.y - predicted), POINTS[wide]), color=INK, linewidth=0.7)
-    below.axhspan(-2 * u.factor * trace.sigma, 2 * u.factor * trace.sigma, color=AFTER, alpha=0.15, linewidth=0, label="noise, ±2σ")
+    for k, edge in enumerate((-2, 2)):
+        below.axhline(edge * u.factor * trace.sigma, color=BEFORE, linewidth=1.0, label=None if k else "noise, ±2σ")
     for ax, label in ((above, f"output [{u.label}]"), (below, f"left [{u.label}]")):
         ax.set_ylabel(label)
         ax.margins(x=0)
-        ax.legend(loc="upper right", fontsize=8)
+    figure.legend(loc="outside upper left", ncols=3, fontsize=8)
     below.set_xlabel("time [s]")
     return figure
 

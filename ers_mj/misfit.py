@@ -24,7 +24,7 @@ STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone th
 IN_PROPORTION = ("B",)
 STEP = 1e-5  # of the letters' logarithms, for sensitivities
 COARSER, FORKS, FEWEST = 3.0, 0.01, 0.5  # a second step, the share of a slope's size by which both may differ, and the samples' share that must be left
-START = 0.01  # half travels by which the angle at the start may be off
+START, HOME = 0.01, 0.02  # half travels by which the angle at the start may be off, and within which of theta_0 a start is at home
 EXPLAINED = 1.3  # mean squared residual in sigmas up to which a fit is good enough for no further start
 
 Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace]], list[np.ndarray]]
@@ -32,13 +32,24 @@ Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace]], list[np.
 
 @dataclass(frozen=True)
 class Search:
-    """Coordinates (r,) of the combinations, and behind them, ``with_starts``, of where each recording starts (angle; speed where it moves)."""
+    """Coordinates (r,) of the combinations, and behind them, ``with_starts``, of where each recording starts (angle; speed where it moves).
+
+    A recording that starts at ``home`` starts at theta_0, wherever that is: a start that may lie on either side of it would make a kink.
+    """
 
     unknowns: Unknowns
     structure: Structure
     scale: float
     traces: tuple[Trace, ...]
+    home: tuple[bool, ...] = ()
     with_starts: bool = False
+
+    def at_home(self, letters: np.ndarray) -> Search:
+        """The search in which those recordings start at home that must: at rest near theta_0, where the preload is stronger than friction."""
+        values = self.unknowns.values(letters)
+        holds = values["c_1"] > values["c_2"]
+        near = HOME * self.scale
+        return replace(self, home=tuple(holds and t.start[1] == 0.0 and abs(t.start[0] - values["theta_0"]) < near + 5.0 * t.sigma for t in self.traces))
 
     @property
     def names(self) -> list[str]:
@@ -48,7 +59,8 @@ class Search:
     @property
     def _moved(self) -> list[tuple[int, int]]:
         """(recording, 0 for the angle or 1 for the speed) of the coordinates of the starts."""
-        return [(r, i) for r, t in enumerate(self.traces) for i in (0, 1) if i == 0 or t.start[1] != 0.0] if self.with_starts else []
+        return [(r, i) for r, t in enumerate(self.traces) for i in (0, 1)
+                if not (self.home and self.home[r]) and (i == 0 or t.start[1] != 0.0)] if self.with_starts else []
 
     def letters(self, x: np.ndarray) -> np.ndarray:
         """The letters (k,) at coordinates x, the pivots at their reference."""
@@ -97,9 +109,10 @@ class Search:
 
     def started(self, x: np.ndarray) -> tuple[Trace, ...]:
         """The traces with the starts of the coordinates x."""
-        if not self.with_starts:
+        if not self.with_starts and not any(self.home):
             return self.traces
-        starts = [list(t.start) for t in self.traces]
+        theta_0 = self.unknowns.values(self.letters(x))["theta_0"]
+        starts = [[theta_0, 0.0] if self.home and self.home[r] else list(t.start) for r, t in enumerate(self.traces)]
         for (r, i), z in zip(self._moved, x[len(self.names):]):
             starts[r][i] += z * self.scale
         return tuple(replace(t, start=tuple(s)) for t, s in zip(self.traces, starts))
