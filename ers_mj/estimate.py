@@ -175,7 +175,7 @@ def _found(search: Search, settings: Settings, simulate: Simulator | None) -> tu
     lower, upper = search.bounds
     by_squares = settings.method == "ls"
     objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
-    start = np.clip(search.coordinates(search.unknowns.reference), lower, upper) if by_squares else None
+    start = np.clip(search.coordinates(search.unknowns.reference), lower, upper)
     budget = settings.budget or BUDGET["reduced" if by_squares else settings.plant]
     method = LS(gain=SEARCH_GAIN) if by_squares else MINIMISERS[settings.method]
     found = method.minimise(objective, lower, upper, seed=settings.seed, budget=budget, start=start)
