@@ -226,9 +226,9 @@ class Model:
         """What ``predict`` gives, and behind it what each further channel of the recording would show, (N,) each."""
         plant, run = self.staged(trace, record, rate, None)
         theta, motion = plant.outputs(trace.t, trace.u, **run)
-        return [theta + self.offset(record), *self._shown(trace, plant, motion)]
+        return [theta + self.offset(record), *self.shown(trace, plant, motion)]
 
-    def _shown(self, trace: Trace, plant: ReducedModel, motion: np.ndarray) -> list[np.ndarray]:
+    def shown(self, trace: Trace, plant: ReducedModel, motion: np.ndarray) -> list[np.ndarray]:
         """What each further channel of a recording would show (N,) along a motion (N, 4)."""
         reading = {"speed": lambda: motion[:, 1], "motor": lambda: motion[:, 3],
                    "current": lambda: plant.current(trace.t, motion) / self.values["ampere"]}
@@ -250,12 +250,12 @@ class Model:
             path, clock = plant.path(trace.t, trace.u, **run), {key: v for key, v in run.items() if key != "start"}
             plants = [other.plant(k) for other in others]
             moved = plant.tangents(trace.t, trace.u, path, plants, scale, **clock)
-            here = self._shown(trace, plant, path)
+            here = self.shown(trace, plant, path)
             columns.append(np.empty((trace.rows, len(others))))
             for i, (other, its, move) in enumerate(zip(others, plants, moved)):
                 parts = [np.where(trace.valid, move[:, 0] + (other.offset(k) - self.offset(k)) * scale, 0.0) / trace.sigma]
                 if trace.channels:
-                    there = other._shown(trace, its, path + np.column_stack([move, move[:, 0]]) / scale)
+                    there = other.shown(trace, its, path + np.column_stack([move, move[:, 0]]) / scale)
                     parts += [np.where(np.isfinite(c.values), (b - a) * scale, 0.0) / c.sigma for c, a, b in zip(trace.channels, here, there)]
                 columns[-1][:, i] = np.concatenate(parts)
         return np.concatenate(columns)

@@ -210,14 +210,15 @@ def _viscous_asymmetry(c: Coefficients) -> Law:
     return Law("asymmetric viscous friction", np.array([half]), lambda p, theta, w, j, t: -p[0] * abs(w), None)
 
 
-def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarray, jobs: int = 0) -> list[Motion]:
-    """Free runs of many plants (or one plant under many inputs) from rest at theta_0, on many cores.
+def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarray, jobs: int = 0, start=None) -> list[Motion]:
+    """Free runs of many plants (or one plant under many inputs), from rest at theta_0 or all from one ``start``, on many cores.
 
     Args:
         plants: (M,), or one for all inputs.
         t: (N,) [s], uniform.
         u: (M, N), or (N,) for all plants.
         jobs: cores to use, 0 for all; they do not change the result.
+        start: (theta, omega[, drive acceleration]), as of MechanicalPlant.simulate.
 
     Raises:
         InputError: the counts do not match, or t is not uniform.
@@ -234,13 +235,13 @@ def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarra
     for group in _alike(plants):
         steppers = [plants[k]._stepper() for k in group]
         for stepper, k in zip(steppers, group, strict=True):
-            stepper.reset(plants[k]._start(None))
+            stepper.reset(plants[k]._start(start))
         terminal = np.array([plants[k].terminal(u[k]) for k in group])
         for k, rows in zip(group, step_many(steppers, t, terminal, jobs), strict=True):
             motions[k] = plants[k]._motion(t, rows)
     for k, plant in enumerate(plants):
         if motions[k] is None:
-            motions[k] = plant.simulate(t, u[k])
+            motions[k] = plant.simulate(t, u[k], start)
     return motions
 
 

@@ -1,0 +1,365 @@
+"""From recordings to parameters: what to search, the search, what the data tell, and how surely.
+
+    traces -> unknowns -> structure (rank) -> search of the combinations -> starts -> precision -> rows and model
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.datasheet import LUMPED, Datasheet
+from ers_mj.errors import InputError
+from ers_mj.minimisers import LS, MINIMISERS, Minimum
+from ers_mj.misfit import IN_PROPORTION, STEP, Misfit, Search, Simulator, central, structure_at
+from ers_mj.precision import WEAK, Precision, Profile, precision_of, profile
+from ers_mj.recording import Recording
+from ers_mj.rollouts import rollouts
+from ers_mj.starts import with_starts
+from ers_mj.structure import Structure
+from ers_mj.traces import Trace, trace_of
+from ers_mj.unknowns import FACTORS, LETTERS, Unknowns, unit_of_letter, unknowns_of
+
+FIRST = 4  # samples that tell whether a recording starts at rest
+BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is asked for
+WIDEST = 3.0  # relative half-width beyond which a profile says no more
+TELLING = 1.0  # relative 95 % half-width from which a number is not told
+WRONG = 1.5  # mean squared residual in sigmas from which the model is said to be wrong
+NEAR_BOUND = 1e-3  # of a coordinate's range
+PRINTED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
+SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
+POLISH_BUDGET, POLISHES, POLISH_WORTH = 200, 4, 1e-4  # the last: share of the value that another polish must have been worth
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to identify: minimiser, plant, what is held and bounded (see unknowns.py), evaluations at most, and whether ls goes on where another method ends."""
+
+    method: str = "ls"
+    plant: str = "reduced"
+    fixed: Mapping[str, float] = None
+    bounds: Mapping[str, tuple[float, float]] = None
+    factors: tuple[float, float] = FACTORS
+    budget: int | None = None
+    polish: bool = False
+    seed: int = 0
+    jobs: int = 1
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the answer: a letter, a combination, or a letter of Eq. (6); None for what is not told."""
+
+    name: str
+    value: float | None
+    unit: str
+    ci95: tuple[float | None, float | None]
+    datasheet: float | None
+    identifiable: bool
+    fixed: bool = False
+    why: str = ""
+
+    def as_document(self) -> dict:
+        """As diagnosis.json has it, with what was fixed and why a number is not told."""
+        return {"value": self.value, "unit": self.unit, "ci95": list(self.ci95), "datasheet": self.datasheet, "identifiable": self.identifiable,
+                "fixed": self.fixed} | ({"why": self.why} if self.why else {})
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What an identification found.
+
+    Attributes:
+        settings: how it was asked.
+        rows: the answer.
+        fitness: Eq. (13) [output unit^2 s].
+        misfit: mean squared residual in sigmas.
+        minimum: what the minimiser found, with its trace; ``evaluations`` counts the polish too.
+        structure: what the data can tell.
+        profiles: of the weak combinations.
+        traces, predicted: recordings with their fitted starts, and the model's free runs (N,) beside them.
+        model: the identified model.
+        sentence: what came out.
+        warnings: what to be careful about.
+        wall_s: time it took.
+    """
+
+    settings: Settings
+    rows: tuple[Row, ...]
+    fitness: float
+    misfit: float
+    minimum: Minimum
+    evaluations: int
+    structure: Structure
+    profiles: tuple[Profile, ...]
+    traces: tuple[Trace, ...]
+    predicted: tuple[np.ndarray, ...]
+    model: Datasheet
+    sentence: str
+    warnings: tuple[str, ...]
+    wall_s: float
+
+    @property
+    def explains(self) -> bool:
+        """Whether the model explains the recordings within their noise."""
+        return self.misfit <= WRONG
+
+
+def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, settings: Settings = Settings(), progress: Progress = lambda text, share: None) -> Identified:
+    """Identify a servo from recordings.
+
+    Args:
+        recordings: one or many, of one unit.
+        datasheet: where the search begins and what bounds it, or None.
+        settings: see there.
+        progress: told what is being done and how far it is.
+
+    Raises:
+        InputError: a method, a name or bounds that do not exist or contradict each other.
+    """
+    began = time.monotonic()
+    if settings.method not in MINIMISERS:
+        raise InputError(f"there is no method {settings.method[:40]!r}; there are {', '.join(MINIMISERS)}")
+    progress("looking at what the recordings can tell", 0.02)
+    inertia = (settings.fixed or {}).get("J") or (datasheet.parameters.get("J") if datasheet is not None else None)
+    traces = tuple(_early(trace_of(r, inertia)) for r in recordings)
+    unknowns = unknowns_of(traces, datasheet, settings.fixed or {}, settings.bounds or {}, settings.factors, recordings[0].output_unit == "rad", settings.jobs)
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    scale = 0.5 * float(np.ptp(y))
+    search = Search(unknowns, _best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(unknowns.reference)
+    progress(f"searching by {settings.method}", 0.1)
+    simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad") if settings.plant == "mujoco" else None
+    x, search, minimum, used = _found(search, settings, simulate)
+    again = structure_at(unknowns, traces, search.letters(x), scale)
+    if again.rank > search.structure.rank:  # the reference was a place where less can be told
+        x, search, minimum, used = _found(replace(search, structure=again, traces=traces), settings, simulate)
+    else:  # or one where stick and slip forked at a touch: what is told is what the found model says
+        x, search = replace(search, structure=again).coordinates(search.letters(x)), replace(search, structure=again)
+    progress("measuring how sure that is", 0.8)
+    return _told(recordings, datasheet, settings, search, x, simulate, minimum, used, began)
+
+
+def _early(trace: Trace) -> Trace:
+    """The trace with a start at rest, where its first samples do not show a speed: a fast rudder has turned within the 50 ms of make_trace.
+
+    The speed at the first sample by three samples is known to 2.5 sigma / h, and to what their third difference makes of it.
+    """
+    h, y = trace.sample_time, trace.y[: FIRST]
+    if not np.all(np.isfinite(y)):
+        return trace
+    speed = (-3.0 * y[0] + 4.0 * y[1] - y[2]) / (2.0 * h)
+    if abs(speed) > (7.5 * trace.sigma + abs(y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0])) / h:
+        return trace
+    still = trace.y[: int(np.argmax(np.append(np.abs(trace.y - y[0]) > 3.0 * trace.sigma, True)))]
+    return replace(trace, start=(float(np.mean(still)), 0.0))
+
+
+def _best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, seed: int) -> Structure:
+    """Of the reference, or of a place near by where more can be told."""
+    random = np.random.default_rng(seed)
+    best = structure_at(unknowns, traces, unknowns.reference, scale)
+    if best.rank < len(unknowns.names) - 1:
+        letters = np.clip(unknowns.reference * np.exp(random.normal(0.0, 0.2, unknowns.reference.size)), unknowns.lower, unknowns.upper)
+        best = max(best, structure_at(unknowns, traces, letters, scale), key=lambda s: s.rank)
+    return best
+
+
+def _found(search: Search, settings: Settings, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum, int]:
+    """(coordinates, search with the fitted starts, the minimiser's own result, evaluations in all)."""
+    lower, upper = search.bounds
+    by_squares = settings.method == "ls"
+    objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
+    start = np.clip(search.coordinates(search.unknowns.reference), lower, upper)
+    budget = settings.budget or BUDGET["reduced" if by_squares else settings.plant]
+    method = LS(gain=SEARCH_GAIN) if by_squares else MINIMISERS[settings.method]
+    found = method.minimise(objective, lower, upper, seed=settings.seed, budget=budget, start=start)
+    if not np.isfinite(found.value):
+        raise InputError("no motion that the model can make within these bounds resembles the recordings: check units and signs of input and output")
+    x, used = found.x, found.evaluations
+    if by_squares or settings.polish:
+        value = found.value
+        for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
+            x, search, ended = _polished(search, x, None)
+            used += ended.evaluations
+            value, gain = ended.value, value - ended.value
+            if gain < POLISH_WORTH * value:
+                break
+        if simulate is not None:
+            x, search, ended = _polished(search, x, simulate)
+            used += ended.evaluations
+    return x, search, found, used
+
+
+def _polished(search: Search, x: np.ndarray, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum]:
+    """ls from x (r,) with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``."""
+    letters = search.letters(x)
+    traces = search.traces if simulate else tuple(with_starts(search.unknowns.model(letters), search.traces))
+    begun = replace(search, traces=traces, with_starts=True).at_home(letters)
+    lower, upper = begun.bounds
+    own = np.concatenate([x, np.zeros(lower.size - x.size)])
+    found = LS(attempts=1, staged=False, gain=MUJOCO_GAIN if simulate else POLISH_GAIN).minimise(
+        Misfit(begun, simulate=simulate), lower, upper, budget=POLISH_BUDGET, start=own)
+    return found.x[: x.size], replace(begun, traces=begun.started(found.x), with_starts=False), found
+
+
+# -- the answer ---------------------------------------------------------------------------------------------------------
+
+
+def _told(recordings, datasheet, settings, search, x, simulate, minimum, used, began) -> Identified:
+    unknowns, letters = search.unknowns, search.letters(x)
+    open_ended = replace(search, with_starts=True)
+    x = np.concatenate([x, np.zeros(open_ended.bounds[0].size - x.size)])
+    reduced = Misfit(open_ended)
+    e, weight = replace(reduced, simulate=simulate).residuals(x), reduced.weight
+    slopes = np.nan_to_num(central(reduced.residuals, x, STEP) / weight[:, None])
+    precision = precision_of(slopes, e / weight, search.traces, settings.seed)
+    seen = np.concatenate([t.seen for t in search.traces])
+    misfit = float(np.sum((e / weight) ** 2)) / int(seen.sum())
+    profiles = () if simulate or misfit > WRONG else _profiles(reduced, open_ended, slopes, x, precision)
+    y, u = recordings[0].output_unit, {"pct": "%"}.get(recordings[0].input_unit, recordings[0].input_unit)
+    rows = _rows(search, letters, precision, profiles, datasheet, y, u)
+    predicted = _predicted(search, letters, e / weight)
+    return Identified(settings, tuple(rows), float(e @ e), misfit, minimum, used, search.structure, profiles, search.traces, predicted,
+                      _model(unknowns, letters), _sentence(search, misfit, settings), tuple(_warnings(search, x, misfit)), time.monotonic() - began)
+
+
+def _profiles(objective: Misfit, search: Search, slopes: np.ndarray, x: np.ndarray, precision: Precision) -> tuple[Profile, ...]:
+    """Of those coordinates whose interval is wide enough to be bent; in sigmas, so that a rise of one is one of chi^2."""
+    out = []
+    for k, name in enumerate(search.names):
+        half = 1.96 * math.sqrt(precision.fisher[k, k])
+        if name != "theta_0" and WEAK < half < WIDEST:
+            unit = np.eye(x.size)[k]
+            out.append(profile(InSigmas(objective), slopes, x, k, name, half, precision.half_width(unit) / half, search.bounds))
+    return tuple(out)
+
+
+class InSigmas:
+    """A misfit whose squares sum to chi^2."""
+
+    def __init__(self, misfit: Misfit):
+        self._misfit, self._weight = misfit, misfit.weight
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        """Residuals (N,) in sigmas."""
+        return self._misfit.residuals(x) / self._weight
+
+
+def _rows(search: Search, letters: np.ndarray, precision: Precision, profiles: Sequence[Profile], datasheet: Datasheet | None, y: str, u: str) -> list[Row]:
+    """Eq. (6)'s letters, then Eq. (1)'s, then the combinations that stand for those which cannot be told."""
+    unknowns, structure = search.unknowns, search.structure
+    sheet = ({**datasheet.to_lumped(), **datasheet.parameters} if datasheet is not None else {})
+    ends = {p.name: tuple(None if end is None else _from_coordinate(search, p.name, end) for end in p.ends) for p in profiles}
+
+    def row(name, function, unit, known, own=None):
+        return _row(name, function, unit, known, search, letters, precision, ends.get(own))
+
+    rows = [row(name, lambda v, name=name: unknowns.values(v)[name], unit_of_letter(name, y, u), sheet.get(name)) for name in PRINTED]
+    rows += [row(name, lambda v, name=name: unknowns.values(v)[name], unit_of_letter(name, y, u), sheet.get(name))
+             for name in ("tau_e", "emf_share", "ampere") if unknowns.is_lumped and name in unknowns.names]
+    if unknowns.is_lumped:
+        return rows
+    for name in (n for n in LETTERS if n != "theta_0" and n in (*unknowns.names, *unknowns.known)):
+        unit = unit_of_letter(name, y, u)
+        if name in unknowns.names:
+            k = unknowns.names.index(name)
+            own = name if structure.told(np.eye(len(letters))[k]) else None
+            rows.append(row(name, lambda v, k=k: v[k], unit, sheet.get(name), own))
+        else:
+            value = unknowns.known[name]
+            rows.append(Row(name, value, unit, (value, value) if name in unknowns.fixed else (None, None), sheet.get(name), True, True, "held"))
+    for k in structure.kept:
+        powers, label = structure.exponents(k), structure.combination(k)
+        if powers is not None and np.count_nonzero(powers) > 1:
+            known = [sheet.get(name) for name in unknowns.names]
+            told = float(np.prod([p**q for p, q in zip(known, powers) if q])) if all(p for p, q in zip(known, powers) if q) else None
+            rows.append(row(label, lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0])), _unit(unknowns.names, powers, y, u), told, unknowns.names[k]))
+    return rows
+
+
+def _from_coordinate(search: Search, name: str, z: float) -> float:
+    """The factor to the reference that a coordinate means."""
+    return z if name in IN_PROPORTION else math.exp(z)
+
+
+def _row(name, function, unit, known, search, letters, precision, profiled) -> Row:
+    """One line: the value of a function of the letters (k,), its interval, or null where the null space or the noise moves it."""
+    value, by_letter, by_coordinate = float(function(letters)), _gradient(search, letters, function), None
+    if value == 0.0 and not np.any(by_letter):
+        return Row(name, 0.0, unit, (None, None), known, True, True, "absent")
+    if not search.structure.told(by_letter / (abs(value) or 1.0)):
+        return Row(name, None, unit, (None, None), known, False, why="these recordings tell it in combination with others only")
+    by_coordinate = _by_coordinate(search, letters, by_letter)
+    half = precision.half_width(np.concatenate([by_coordinate, np.zeros(precision.fisher.shape[0] - by_coordinate.size)]))
+    relative = half / abs(value) if name != "theta_0" else half / search.scale
+    if not relative < TELLING:
+        return Row(name, None, unit, (None, None), known, False, why=f"too weak in these recordings: its 95 % half-width would be {relative:.0%} of it")
+    low, high = value - half, value + half
+    if profiled is not None:
+        k = search.names.index(name.partition("/")[0]) if name.partition("/")[0] in search.names else None
+        here = search.coordinates(letters)[k] if k is not None else None
+        if here is not None:
+            scale = value / _from_coordinate(search, search.names[k], here)
+            low, high = (x * scale if x is not None else other for x, other in zip(profiled, (low, high)))
+    return Row(name, value, unit, (low, high), known, True)
+
+
+def _gradient(search: Search, letters: np.ndarray, function: Callable[[np.ndarray], float]) -> np.ndarray:
+    """Slopes (k,) of a function of the letters by their logarithms (theta_0: by half travels)."""
+    angle = np.array([name == "theta_0" for name in search.unknowns.names])
+    return central(lambda z: np.array([function(np.where(angle, letters + search.scale * z, letters * np.exp(z)))]), np.zeros(letters.size), STEP)[0]
+
+
+def _by_coordinate(search: Search, letters: np.ndarray, by_letter: np.ndarray) -> np.ndarray:
+    """The same by the search's coordinates (r,)."""
+    here = search.coordinates(letters)
+    return np.array([by_letter[k] / here[i] if name in IN_PROPORTION else by_letter[k] for i, (k, name) in enumerate(zip(search.structure.kept, search.names))])
+
+
+def _unit(names: Sequence[str], powers: np.ndarray, y: str, u: str) -> str:
+    """The unit of a product of powers, as the letters' units stand."""
+    above = [unit_of_letter(n, y, u) for n, q in zip(names, powers) if q > 0]
+    below = [unit_of_letter(n, y, u) for n, q in zip(names, powers) if q < 0 for _ in range(round(-q))]
+    return "/".join([" ".join(above), *(f"({unit})" if " " in unit else unit for unit in below)])
+
+
+def _predicted(search: Search, letters: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, ...]:
+    """What the plant shows (N,) in each recording: the measured output less its residual, by the reduced model where none was measured."""
+    out, at = [], 0
+    for k, trace in enumerate(search.traces):
+        own = search.unknowns.model(letters).predict(trace, k)
+        out.append(np.where(trace.valid, trace.y - trace.sigma * e[at : at + trace.t.size], own))
+        at += trace.rows
+    return tuple(out)
+
+
+def _model(unknowns: Unknowns, letters: np.ndarray) -> Datasheet:
+    """The identified model: what cannot be told stands as it was known, the rest beside it as the recordings have it."""
+    values = unknowns.values(letters)
+    lumped = {name: float(values[name]) for name in LUMPED}
+    parameters = {} if unknowns.is_lumped else unknowns.everything(letters)
+    return Datasheet(parameters=parameters, lumped=lumped, baseline={name: float(values[name]) for name in ("tau_e", "emf_share")}, name="model.toml")
+
+
+def _sentence(search: Search, misfit: float, settings: Settings) -> str:
+    structure, count = search.structure, len(search.traces)
+    what = f"{structure.rank} of {len(structure.names)} parameters can be told" if structure.pivots else f"all {structure.rank} parameters can be told"
+    said = f"From {'this recording' if count == 1 else f'these {count} recordings'} {what}{' as combinations' if structure.pivots else ''}"
+    if misfit > WRONG and settings.method != "ls" and not settings.polish:
+        return f"{said}, but {settings.method} left {math.sqrt(misfit):.2g} times the noise: it stopped short of the best fit, or the model is wrong (--polish tells)."
+    if misfit > WRONG:
+        return f"{said}, but the model is wrong: what it leaves is {math.sqrt(misfit):.2g} times the noise. `ers diagnose` looks for what is missing."
+    return f"{said}; the model explains what was recorded within its noise."
+
+
+def _warnings(search: Search, x: np.ndarray, misfit: float) -> list[str]:
+    lower, upper = search.bounds
+    near = [name for name, z, low, high in zip(search.names, x, lower, upper) if min(z - low, high - z) < NEAR_BOUND * (high - low)]
+    out = [f"{name} rests at the end of its bounds: widen them (--bounds) or doubt the model" for name in near]
+    return out + (["the intervals hold for a model that is right, which this one is not"] if misfit > WRONG else []) + search.structure.trades()

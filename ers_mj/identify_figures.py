@@ -1,0 +1,79 @@
+"""Pictures of an identification as inline SVG: measured over simulated, the way to the minimum, profiles of what is weak."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ers_mj.display import shown
+from ers_mj.estimate import Identified
+from ers_mj.figures import AFTER, BEFORE, FAINT, INK, MEASURED, WIDE, both_widths, decimate
+from ers_mj.precision import Profile
+from ers_mj.traces import Trace
+
+POINTS = {True: 900, False: 450}
+SHADES = (AFTER, BEFORE, "#1d4f91", "#8a6bb8", "#a83a1e", "#4c8c2b", "#5b6b7b")
+
+
+def compared(trace: Trace, predicted: np.ndarray, unit: str) -> str:
+    """One recording: measured and simulated, and what is left, with the noise beside it."""
+    return both_widths(lambda width: _compared(trace, predicted, unit, width), f"{trace.name}: measured and simulated output over time")
+
+
+def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> Figure:
+    wide, u = width == WIDE, shown(unit)
+    figure = Figure(figsize=(width, 4.4), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.8, 1.0))
+    above.plot(*decimate(trace.t, u.factor * trace.y, POINTS[wide]), color=MEASURED, linewidth=2.6, label="measured")
+    above.plot(*decimate(trace.t, u.factor * predicted, POINTS[wide]), color=AFTER, linewidth=1.1, label="identified model, free run")
+    below.plot(*decimate(trace.t, u.factor * (trace.y - predicted), POINTS[wide]), color=INK, linewidth=0.7)
+    for k, edge in enumerate((-2, 2)):
+        below.axhline(edge * u.factor * trace.sigma, color=BEFORE, linewidth=1.0, label=None if k else "noise, ±2σ")
+    for ax, label in ((above, f"output [{u.label}]"), (below, f"left [{u.label}]")):
+        ax.set_ylabel(label)
+        ax.margins(x=0)
+    figure.legend(loc="outside upper left", ncols=3, fontsize=8)
+    below.set_xlabel("time [s]")
+    return figure
+
+
+def descent(found: Identified) -> str:
+    """Best fitness over evaluations of the search."""
+    return both_widths(lambda width: progress_figure({found.settings.method: [found.minimum.trace]}, width), "best fitness over evaluations")
+
+
+def progress_figure(traces: Mapping[str, Sequence[np.ndarray]], width: float) -> Figure:
+    """Median best fitness over evaluations by method, of the traces (T, 2) of its runs."""
+    figure = Figure(figsize=(width, 3.2), layout="constrained")
+    ax = figure.subplots()
+    last = max(run[-1, 0] for runs in traces.values() for run in runs)
+    grid = np.unique(np.round(np.geomspace(1, last, 300)))
+    for k, (method, runs) in enumerate(traces.items()):
+        levels = np.array([run[np.maximum(np.searchsorted(run[:, 0], grid, side="right") - 1, 0), 1] for run in runs])
+        ax.loglog(grid, np.maximum(np.median(levels, axis=0), 1e-30), color=SHADES[k % len(SHADES)], label=method)
+    ax.set_xlabel("evaluations")
+    ax.set_ylabel("fitness, Eq. (13) [rad² s]")
+    ax.legend(loc="lower left", fontsize=8)
+    return figure
+
+
+def profiles(found: Sequence[Profile]) -> str | None:
+    """How the misfit rises about what is weak; None where nothing is."""
+    return both_widths(lambda width: _profiles(found, width), "profile likelihood of the weak parameters") if found else None
+
+
+def _profiles(found: Sequence[Profile], width: float) -> Figure:
+    columns = min(len(found), 3 if width == WIDE else 1)
+    rows = math.ceil(len(found) / columns)
+    figure = Figure(figsize=(width, 2.8 * rows), layout="constrained")
+    for ax, p in zip(figure.subplots(rows, columns, squeeze=False).ravel(), found):
+        ax.plot(p.x, p.rise, color=AFTER, marker="o", markersize=3.5)
+        ax.axhline(p.level, color=FAINT, linewidth=0.8, linestyle=(0, (3, 3)))
+        ax.set_ylim(0, 2.5 * p.level)
+        ax.set_title(p.name)
+        ax.set_xlabel("over the reference")
+        ax.set_ylabel("rise of χ²")
+    return figure

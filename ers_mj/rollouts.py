@@ -1,0 +1,49 @@
+"""What the MuJoCo plant says of recordings: residuals of many candidate parameters at once, on many cores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ers_mj.plants.mechanical import MechanicalPlant, simulate_many
+from ers_mj.plants.reduced import Motion, lumped
+from ers_mj.plants.skeletons import bodily
+from ers_mj.traces import Trace
+from ers_mj.unknowns import Unknowns
+
+Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace]], list[np.ndarray]]
+
+
+def plant_of(unknowns: Unknowns, letters: np.ndarray, is_angle: bool = True) -> MechanicalPlant:
+    """The MuJoCo plant that letters (k,) make: the rudder system where they are Eq. (1)'s, else one joint."""
+    c = lumped(unknowns.values(letters))
+    return MechanicalPlant(c, parameters=None if unknowns.is_lumped else bodily(unknowns.everything(letters), is_angle, c.b), is_angle=is_angle)
+
+
+def rollouts(jobs: int, is_angle: bool = True) -> Simulator:
+    """(unknowns, candidates (M) of letters (k,), traces) -> M residuals (N,) in sigmas, as identification.residuals has them, of free runs."""
+    def simulate(unknowns, candidates, traces):
+        plants, parts = [plant_of(unknowns, letters, is_angle) for letters in candidates], [[] for _ in candidates]
+        for trace in traces:
+            for letters, part, motion in zip(candidates, parts, _motions(plants, trace, jobs)):
+                part.append(_compared(unknowns, letters, trace, motion))
+        return [np.concatenate(part) for part in parts]
+
+    return simulate
+
+
+def _motions(plants: Sequence[MechanicalPlant], trace: Trace, jobs: int) -> list[Motion]:
+    if len(plants) > 1 and trace.is_uniform and trace.enable is None and trace.load is None:
+        return simulate_many(plants, trace.t, trace.u, jobs, start=trace.start)
+    return [plant.simulate(trace.t, trace.u, trace.start, enable=trace.enable, load=trace.load) for plant in plants]
+
+
+def _compared(unknowns: Unknowns, letters: np.ndarray, trace: Trace, motion: Motion) -> np.ndarray:
+    """Residuals (rows,) of one recording in sigmas, 0 where a sample is missing."""
+    model = unknowns.model(letters)
+    path = np.column_stack([motion.theta, motion.omega, motion.drive, motion.theta_m])
+    parts = [np.where(trace.valid, (trace.y - motion.theta) / trace.sigma, 0.0)]
+    for channel, seen in zip(trace.channels, model.shown(trace, model.plant(), path)):
+        parts.append(np.where(np.isfinite(channel.values), (channel.values - seen) / channel.sigma, 0.0))
+    return np.concatenate(parts)

@@ -1,0 +1,147 @@
+"""What an identification searches: Eq. (1)'s letters where a datasheet gives them all, else Eq. (6)'s, each within bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ers_mj.baseline import baseline
+from ers_mj.datasheet import LUMPED, Datasheet
+from ers_mj.errors import InputError
+from ers_mj.model import BASE, Model
+from ers_mj.traces import Trace
+
+LETTERS = ("L", "R", "k_s", "T_LH", "F_c", "J", "B", "K_t", "K_e", "theta_0")  # Eq. (1), in the paper's order
+NEEDED = ("J", "B", "K_t", "K_e", "R")  # without them Eq. (1) cannot run
+FACTORS = (0.2, 3.0)  # of what is known beforehand, between which a positive one is searched
+REST = {"a_1": 0.0, "a_2": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0}
+UNITS = {"J": "kg m^2", "B": "N m s/rad", "K_t": "N m/A", "K_e": "V s/rad", "k_s": "N m/rad", "T_LH": "N m", "F_c": "N m", "R": "ohm", "L": "H", "n": "-"}
+
+
+def unit_of_letter(name: str, y: str, u: str) -> str:
+    """The unit of a letter of Eq. (1) or (6) for outputs in y and inputs in u."""
+    lumped = {"a_1": "1/s^2", "a_2": "1/s", "b": f"{y}/s^2/{u}", "c_1": f"{y}/s^2", "c_2": f"{y}/s^2", "theta_0": y, "tau_e": "s", "emf_share": "-",
+              "ampere": f"{y}/s^2/A"}
+    return UNITS.get(name) or lumped[name]
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """The letters that are searched.
+
+    Attributes:
+        names: (k,) letters, of Eq. (1) or, where ``is_lumped``, of Eq. (6).
+        reference: (k,) what is known beforehand, where a search begins.
+        lower, upper: (k,) bounds.
+        known: the letters that are held, n among them.
+        fixed: which of these the user fixed.
+        is_lumped: whose letters they are.
+    """
+
+    names: tuple[str, ...]
+    reference: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    known: Mapping[str, float]
+    fixed: tuple[str, ...]
+    is_lumped: bool
+
+    def everything(self, letters: np.ndarray) -> dict[str, float]:
+        """All letters by name, of the searched ones (k,) and those held."""
+        return {**self.known, **dict(zip(self.names, letters.tolist()))}
+
+    def values(self, letters: np.ndarray) -> dict[str, float]:
+        """Eq. (6)'s letters as Model takes them."""
+        every = self.everything(letters)
+        lumped = every if self.is_lumped else Datasheet(parameters=every).to_lumped()
+        return {**REST, "ampere": lumped["b"], **{name: x for name, x in lumped.items() if name in BASE}}
+
+    def model(self, letters: np.ndarray) -> Model:
+        """The model that the searched letters (k,) make."""
+        return Model(self.values(letters), ())
+
+
+def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Mapping[str, float], bounds: Mapping[str, tuple[float, float]],
+                factors: tuple[float, float] = FACTORS, is_angle: bool = True, jobs: int = 1) -> Unknowns:
+    """What to search in these recordings.
+
+    Args:
+        traces: the recordings.
+        datasheet: what is known, or None: Eq. (6) is then first fitted from scratch.
+        fixed: letters to hold, by name.
+        bounds: (lower, upper) by name; a letter that no datasheet gives begins in their middle.
+        factors: bounds of the others, as factors to what is known.
+
+    Raises:
+        InputError: a name that cannot be searched here, or bounds without what is fixed or known.
+    """
+    _refuse_unknown({**fixed, **bounds})
+    both = fixed.keys() & bounds.keys()
+    if both:
+        raise InputError(f"{sorted(both)[0]} is fixed and has bounds, one of both was expected")
+    sheet = dict(datasheet.parameters) if datasheet is not None else {}
+    middle = {name: _middle(name, ends) for name, ends in bounds.items()}
+    known = {"n": 1.0, **middle, **sheet, **fixed}
+    if all(name in known for name in NEEDED) and not (datasheet is not None and datasheet.lumped and not sheet):
+        is_lumped, known = False, {name: x for name, x in known.items() if name in (*LETTERS, "n")}
+    else:
+        is_lumped, known = True, {**_lumped(traces, datasheet, is_angle, jobs), **fixed}
+    allowed = LUMPED if is_lumped else LETTERS
+    for name in (*fixed, *bounds):
+        if name not in allowed:
+            why = f"without {', '.join(x for x in NEEDED if x not in sheet)} of a datasheet" if is_lumped else "where a datasheet gives those of Eq. (1)"
+            raise InputError(f"{name} cannot be fixed or bounded {why}: these are identified, {', '.join(allowed)}")
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    names, ends = [], []
+    order = [name for name in (BASE if is_lumped else LETTERS) if name in known and name not in fixed]
+    springs = known.get("a_1" if is_lumped else "k_s", 0.0) or known.get("c_1" if is_lumped else "T_LH", 0.0)
+    for name in order:
+        if name in bounds:
+            names.append(name)
+            ends.append(bounds[name])
+        elif name == "theta_0":
+            if springs:
+                names.append(name)
+                known[name] = min(max(known[name], float(y.min())), float(y.max()))
+                ends.append((float(y.min()), float(y.max())))
+        elif known[name] != 0.0 and _matters(name, traces, known, is_lumped):
+            names.append(name)
+            ends.append(tuple(sorted((factors[0] * known[name], factors[1] * known[name]))))
+    lower, upper = np.array(ends, float).reshape(-1, 2).T.copy()
+    reference = np.clip([known[name] for name in names], lower, upper)
+    if not names:
+        raise InputError("every letter is fixed, there is nothing to identify")
+    held = {name: x for name, x in known.items() if name not in names}
+    return Unknowns(tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped)
+
+
+def _matters(name: str, traces: Sequence[Trace], known: Mapping[str, float], is_lumped: bool) -> bool:
+    """Whether a letter of Eq. (6) can show at all: share and ampere only where a current does, or a time constant."""
+    seen = any(c.kind == "current" for t in traces for c in t.channels)
+    if not is_lumped or name not in ("ampere", "emf_share"):
+        return True
+    return seen or name == "emf_share" and known.get("tau_e", 0.0) > 0
+
+
+def _refuse_unknown(given: Mapping) -> None:
+    for name in given:
+        if name not in (*LETTERS, *LUMPED, "n"):
+            raise InputError(f"there is no parameter {name[:40]!r}; there are {', '.join(dict.fromkeys((*LETTERS, 'n', *LUMPED)))}")
+
+
+def _middle(name: str, ends: tuple[float, float]) -> float:
+    lower, upper = ends
+    if not lower < upper or lower < 0 and name not in ("theta_0", "b"):
+        raise InputError(f"the bounds of {name} are {lower:g} and {upper:g}, a lower one of at least zero and an upper one above it were expected")
+    return math.sqrt(lower * upper) if lower > 0 else 0.5 * (lower + upper)
+
+
+def _lumped(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool, jobs: int) -> dict[str, float]:
+    """Eq. (6)'s letters as known, or as the baseline finds them."""
+    known = datasheet.to_lumped() if datasheet is not None else {}
+    if not {"a_2", "b"} <= known.keys():
+        known = dict(baseline(traces, datasheet, is_angle, jobs).fit.model.values)
+    return {**REST, "ampere": known["b"], **known}

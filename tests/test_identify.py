@@ -1,0 +1,165 @@
+"""Identification: the truth from a wrong start, what cannot be told, intervals, and the command's answers."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ers_mj import cli
+from ers_mj.datasheet import Datasheet, read_datasheet
+from ers_mj.errors import InputError
+from ers_mj.estimate import Settings, identify
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.precision import precision_of
+from ers_mj.recording import from_arrays, write_recording
+from ers_mj.simulation import build_plant, simulate_recording
+from ers_mj.structure import structure_of
+from ers_mj.traces import trace_of
+
+TRUTH = {"L": 0.003, "R": 1.2, "k_s": 0.08, "T_LH": 0.4, "F_c": 0.2, "J": 0.001, "B": 0.006, "K_t": 0.5, "K_e": 0.6, "theta_0": 0.0}
+SHEET = Datasheet(parameters=TRUTH)
+OFF = Datasheet(parameters={**TRUTH, "L": 0.006, "k_s": 0.04, "F_c": 0.5, "B": 0.01, "K_t": 0.3, "K_e": 0.4, "T_LH": 0.7})
+T = np.arange(2000) / 1e3
+TOLD = {"L/R": 0.0025, "k_s/J": 80.0, "T_LH/J": 400.0, "F_c/J": 200.0, "B/J": 6.0, "K_t/(J R)": 0.5 / 0.0012, "K_e": 0.6}
+
+
+def record(noise_deg=0.0, seed=0, sheet=SHEET, current=False, inductance=True, **options):
+    u = INPUTS["multisine"](T)
+    columns = simulate_recording(sheet, T, u, noise=math.radians(noise_deg), seed=seed, inductance=inductance, **options)
+    more = {}
+    if current:
+        p = sheet.parameters
+        motion = build_plant(sheet, inductance=inductance).simulate(T, u)
+        more = {"current": motion.drive * p["J"] / (p.get("n", 1.0) * p["K_t"])}
+    return from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"], **more)
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return identify([record()], OFF)
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    return identify([record(0.01)], OFF)
+
+
+def rows(found):
+    return {row.name: row for row in found.rows}
+
+
+def test_the_seven_that_can_be_told_are_found_and_nothing_else(exact):
+    told = rows(exact)
+    assert {name: told[name].value for name in TOLD} == pytest.approx(TOLD, rel=1e-6)
+    assert exact.structure.rank == 8 and exact.evaluations < 400
+    for name in ("L", "R", "k_s", "T_LH", "F_c", "J", "B", "K_t"):
+        assert told[name].value is None and not told[name].identifiable and told[name].why
+
+
+def test_noise_widens_the_intervals_and_they_hold(noisy):
+    told = rows(noisy)
+    for name, truth in TOLD.items():
+        low, high = told[name].ci95
+        assert low - 0.5 * (high - low) < truth < high + 0.5 * (high - low)
+    assert 0.8 < noisy.misfit < 1.2 and noisy.explains
+    width = {name: (told[name].ci95[1] - told[name].ci95[0]) / truth for name, truth in TOLD.items()}
+    assert width["B/J"] > 10 * width["k_s/J"] and [p.name for p in noisy.profiles] == ["B"]
+
+
+def test_the_identified_model_moves_as_the_plant_does(exact):
+    u = INPUTS["steps"](T)
+    true, found = (build_plant(sheet, inductance=True).simulate(T, u).theta for sheet in (SHEET, exact.model))
+    assert np.abs(true - found).max() < 1e-6
+
+
+def test_with_current_and_a_scale_all_are_told():
+    told = rows(identify([record(current=True)], OFF, Settings(fixed={"J": TRUTH["J"]})))
+    for name in ("L", "R", "k_s", "T_LH", "F_c", "B", "K_t", "K_e"):
+        assert told[name].value == pytest.approx(TRUTH[name], rel=1e-3) and told[name].identifiable
+    assert told["J"].fixed and told["J"].value == TRUTH["J"]
+
+
+def test_without_inductance_damping_and_back_emf_are_told_together_only():
+    sheet = Datasheet(parameters={k: v for k, v in OFF.parameters.items() if k != "L"})
+    found = identify([record(inductance=False)], sheet)
+    told = rows(found)
+    assert found.structure.rank == 6 and told["B"].value is None and told["K_e"].value is None
+    assert told["a_2"].value == pytest.approx(6.0 + 0.5 * 0.6 / 0.0012, rel=1e-6)
+    assert any("made up for" in warning for warning in found.warnings)
+
+
+def test_a_play_makes_the_model_wrong():
+    found = identify([record(0.01, inductance=False, gap=math.radians(0.5))], SHEET)
+    assert not found.explains and "the model is wrong" in found.sentence
+
+
+def test_the_null_space_of_powers_is_found_without_being_told():
+    """y = (a/b) s + (c^2/b) s^2 can tell two of three; the third row of any basis is b, a b^-1 and c b^-1/2 where the exponents are whole."""
+    s = np.linspace(0, 1, 50)
+    found = structure_of(np.column_stack([s, -s - s**2, s**2]), ("k_s", "J", "T_LH"))
+    assert found.rank == 2 and [found.names[p] for p in found.pivots] == ["J"]
+    assert [found.combination(k) for k in found.kept] == ["k_s/J", "T_LH/J"] and found.told(np.array([1.0, -1.0, 0.0])) and not found.told(np.array([1.0, 0.0, 0.0]))
+
+
+def test_resampled_and_fisher_widths_agree_on_white_residuals_and_not_on_coloured_ones():
+    random, trace = np.random.default_rng(0), trace_of(record(0.01), None)
+    slopes = np.column_stack([np.ones(2000), np.sin(7 * T)])
+    white = random.standard_normal(2000)
+    coloured = np.repeat(random.standard_normal(100), 20)
+    fair, bent = (precision_of(slopes, e, [trace], 0) for e in (white, coloured))
+    ratio = [np.sqrt(np.diag(p.resampled) / np.diag(p.fisher)) for p in (fair, bent)]
+    assert np.all((0.6 < ratio[0]) & (ratio[0] < 1.5)) and np.all(ratio[1] > 2.0)
+
+
+def test_many_candidates_in_mujoco_are_what_one_is():
+    from ers_mj.rollouts import rollouts
+    from ers_mj.unknowns import unknowns_of
+
+    sheet = read_datasheet("table1")
+    u = INPUTS["multisine"](T[:300])
+    columns = simulate_recording(sheet, T[:300], u, plant="mujoco")
+    traces = [trace_of(from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"]), None)]
+    traces = [replace(traces[0], start=(sheet.parameters["theta_0"], 0.0))]
+    unknowns = unknowns_of(traces, sheet, {"L": 0.0}, {})
+    candidates = [unknowns.reference, 1.1 * unknowns.reference]
+    both, alone = rollouts(2)(unknowns, candidates, traces), [rollouts(1)(unknowns, [c], traces)[0] for c in candidates]
+    assert np.allclose(both, alone, atol=1e-6) and np.abs(both[0]).max() < np.abs(both[1]).max()
+
+
+@pytest.mark.parametrize("settings, said", [
+    (dict(method="magic"), "no method"), (dict(fixed={"zeta": 1.0}), "no parameter"), (dict(fixed={"a_1": 1.0}), "cannot be fixed or bounded"),
+    (dict(bounds={"R": (2.0, 1.0)}), "bounds of R"), (dict(fixed={"R": 1.0}, bounds={"R": (1.0, 2.0)}), "is fixed and has bounds"),
+])
+def test_what_cannot_be_asked_is_refused(settings, said):
+    with pytest.raises(InputError, match=said):
+        identify([record()], OFF, Settings(**settings))
+
+
+def test_the_command_writes_a_model_that_others_read(tmp_path, capsys):
+    columns = simulate_recording(read_datasheet("table1"), T, INPUTS["multisine"](T), noise=1e-4, inductance=True)
+    write_recording(tmp_path / "rec.csv", columns)
+    out = tmp_path / "out"
+    assert cli.main(["identify", str(tmp_path / "rec.csv"), "--datasheet", "table1", "--fix", "J=0.0031", "--out", str(out), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert {"method", "plant", "parameters", "fitness", "evaluations", "wall_s"} <= document.keys()
+    assert {"value", "unit", "ci95", "datasheet", "identifiable"} <= document["parameters"]["k_s"].keys()
+    assert document["parameters"]["R"]["value"] is None and document["parameters"]["L/R"]["value"] == pytest.approx(0.0016 / 1.55, rel=0.02)
+    assert read_datasheet(out / "model.toml").to_lumped()["b"] == pytest.approx(81.07, rel=0.01)
+    assert "<svg" in (out / "report.html").read_text()
+    assert cli.main(["trial", str(out / "model.toml"), "--json"]) == 0
+
+
+@pytest.mark.parametrize("method", ["iga", "cma"])
+def test_other_methods_are_the_same_by_seed_whatever_the_jobs(method):
+    found = [identify([record(0.01)], OFF, Settings(method=method, budget=200, seed=5, jobs=jobs)) for jobs in (1, 2)]
+    assert found[0].fitness == found[1].fitness and found[0].evaluations == 200
+
+
+@pytest.mark.parametrize("options", [["--fix", "J"], ["--fix", "J=x"], ["--fix", "J=1", "--fix", "J=2"], ["--bounds", "J=1"], ["--within", "2,3"], ["--method", "x"]])
+def test_bad_options_are_one_sentence_and_code_2(tmp_path, capsys, options):
+    write_recording(tmp_path / "rec.csv", simulate_recording(SHEET, T[:200], INPUTS["multisine"](T[:200])))
+    assert cli.main(["identify", str(tmp_path / "rec.csv"), "--datasheet", "table1", *options, "--json"]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.count("\n") == 1
