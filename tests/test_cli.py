@@ -172,7 +172,7 @@ def test_bad_input_is_one_sentence_code_2_and_nothing_written(argv, place, monke
     ("simulate --input steps --out n.csv --linkage rod", "a rod linkage needs --plant mujoco"),
     ("simulate lumped.toml --input steps --out n.csv --plant mujoco --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
     ("simulate --input steps --out n.csv --gap 1 --effect backlash:gap=0.01", "the play is given twice"),
-    ("diagnoze", "did you mean diagnose? there are demo, diagnose, simulate, validate, view"),
+    ("diagnoze", "did you mean diagnose? there are demo, diagnose, identify, simulate, validate, view"),
     ("validate --linkage constant,rope", "there is no 'rope'; there are constant, rod"),
     ("validate --datasheet lumped.toml --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
     ("diagnose good.csv --map t_s=Time", "the columns are t_s, u_V, theta_rad"),
