@@ -29,6 +29,7 @@ BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is
 WIDEST = 3.0  # relative half-width beyond which a profile says no more
 TELLING = 1.0  # relative 95 % half-width from which a number is not told
 WRONG = 1.5  # mean squared residual in sigmas from which the model is said to be wrong
+MOST_PLACES = 8  # beside the reference, at which the rank is looked for
 NEAR_BOUND = 1e-3  # of a coordinate's range
 PRINTED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
@@ -138,7 +139,9 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
     x, search, minimum, used = _found(search, settings, simulate)
     again = structure_at(unknowns, traces, search.letters(x), scale)
     if again.rank > search.structure.rank:  # the reference was a place where less can be told
+        before = used
         x, search, minimum, used = _found(replace(search, structure=again, traces=traces), settings, simulate)
+        used += before
     else:  # or one where stick and slip forked at a touch: what is told is what the found model says
         x, search = replace(search, structure=again).coordinates(search.letters(x)), replace(search, structure=again)
     progress("measuring how sure that is", 0.8)
@@ -161,12 +164,15 @@ def _early(trace: Trace) -> Trace:
 
 
 def _best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, seed: int) -> Structure:
-    """Of the reference, or of a place near by where more can be told."""
-    random = np.random.default_rng(seed)
-    best = structure_at(unknowns, traces, unknowns.reference, scale)
-    if best.rank < len(unknowns.names) - 1:
-        letters = np.clip(unknowns.reference * np.exp(random.normal(0.0, 0.2, unknowns.reference.size)), unknowns.lower, unknowns.upper)
-        best = max(best, structure_at(unknowns, traces, letters, scale), key=lambda s: s.rank)
+    """The highest rank met at the reference and at places drawn from the bounds, once it has been met twice: where a rudder sticks less can be told."""
+    random, found = np.random.default_rng(seed), [structure_at(unknowns, traces, unknowns.reference, scale)]
+    for _ in range(MOST_PLACES):
+        found.append(structure_at(unknowns, traces, unknowns.drawn(random), scale))
+        best = max(found, key=lambda s: s.rank)
+        if sum(s.rank == best.rank for s in found) > 1 and best.rank:
+            break
+    if not best.rank:
+        raise InputError("no motion that the model can make within these bounds shows any parameter: check units of input and output, or widen --within")
     return best
 
 

@@ -157,6 +157,10 @@ class Misfit:
         """Easier objectives: the same as an observer, which forgives an early error."""
         return tuple(replace(self, rate=rate, simulate=None) for rate in STAGES)
 
+    def draw(self, random: np.random.Generator) -> np.ndarray:
+        """Coordinates of letters drawn from their own bounds: those of the combinations reach much further."""
+        return self.search.coordinates(self.search.unknowns.drawn(random))
+
     @property
     def target(self) -> float:
         """The value that noise alone would leave, and a little more."""

@@ -49,6 +49,13 @@ class Unknowns:
     fixed: tuple[str, ...]
     is_lumped: bool
 
+    def drawn(self, random: np.random.Generator) -> np.ndarray:
+        """Letters (k,) drawn from the bounds, evenly by their logarithm where they are positive."""
+        positive = self.lower > 0
+        low, high = (np.log(np.where(positive, x, 1.0)) for x in (self.lower, self.upper))
+        share = random.random(self.lower.size)
+        return np.where(positive, np.exp(low + share * (high - low)), self.lower + share * (self.upper - self.lower))
+
     def everything(self, letters: np.ndarray) -> dict[str, float]:
         """All letters by name, of the searched ones (k,) and those held."""
         return {**self.known, **dict(zip(self.names, letters.tolist()))}

@@ -19,7 +19,7 @@ STAGE_LEFT, EXACT = 1e-5, 1e-22  # shares of the first value of an attempt: enou
 BELOW_TARGET = 1e-14  # share of the target that is as good as nothing
 WIDE = 100.0  # times DIFFERENCE: slopes that see over a kink, tried once where others lead no further
 ATTEMPTS = 6
-ALIKE = 0.01  # of the value, within which two attempts have ended in one place
+ALIKE, OFTEN = 0.01, 3  # of the value, within which attempts have ended in one place, and how many make it the bottom
 
 
 class LS(Minimiser):
@@ -42,16 +42,19 @@ class LS(Minimiser):
         ends: list[float] = []
         target = getattr(meter.objective, "target", 0.0)
         for _ in range(self.attempts):
-            x = meter.lower + meter.width * (random.random(meter.size) if start is None else start)
+            if start is None and hasattr(meter.objective, "draw"):
+                x = np.clip(meter.objective.draw(random), meter.lower, meter.lower + meter.width)
+            else:
+                x = meter.lower + meter.width * (random.random(meter.size) if start is None else start)
             start = None
             first = None
             for stage in getattr(meter.objective, "stages", ()) if self.staged else ():
                 x, _, begun = _descend(meter, stage, x, STAGE_GAIN, STAGE_LEFT)
                 first = first or begun
             x, value, _ = _descend(meter, None, x, self.gain, EXACT, first)
-            if value <= target or any(abs(value - other) <= ALIKE * other for other in ends if value <= min(ends) * (1.0 + ALIKE)):
-                return
             ends.append(value)
+            if value <= target or sum(end <= min(ends) * (1.0 + ALIKE) for end in ends) >= OFTEN:
+                return
 
 
 def _descend(meter: Meter, stage: Objective | None, x: np.ndarray, least_gain: float, enough: float,
