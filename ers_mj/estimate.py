@@ -16,6 +16,7 @@ from ers_mj.datasheet import LUMPED, Datasheet
 from ers_mj.errors import InputError
 from ers_mj.minimisers import LS, MINIMISERS, Minimum
 from ers_mj.misfit import IN_PROPORTION, STEP, Misfit, Search, Simulator, central, structure_at
+from ers_mj.plants.mechanical import TIMESTEP
 from ers_mj.precision import WEAK, Precision, Profile, precision_of, profile
 from ers_mj.recording import Recording
 from ers_mj.rollouts import rollouts
@@ -40,7 +41,8 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Settings:
-    """How to identify: minimiser, plant, what is held and bounded (see unknowns.py), evaluations at most, and whether ls goes on where another method ends."""
+    """How to identify: minimiser, plant, what is held and bounded (see unknowns.py), evaluations at most, whether ls goes on where
+    another method ends, and MuJoCo's step [s]."""
 
     method: str = "ls"
     plant: str = "reduced"
@@ -51,6 +53,7 @@ class Settings:
     polish: bool = False
     seed: int = 0
     jobs: int = 1
+    timestep: float = TIMESTEP
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,7 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
     scale = 0.5 * float(np.ptp(y))
     search = Search(unknowns, _best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(unknowns.reference)
     progress(f"searching by {settings.method}", 0.1)
-    simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad") if settings.plant == "mujoco" else None
+    simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad", settings.timestep) if settings.plant == "mujoco" else None
     x, search, minimum, used = _found(search, settings, simulate)
     again = structure_at(unknowns, traces, search.letters(x), scale)
     if again.rank > search.structure.rank:  # the reference was a place where less can be told

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ers_mj.plants.mechanical import MechanicalPlant, simulate_many
+from ers_mj.plants.mechanical import TIMESTEP, MechanicalPlant, simulate_many
 from ers_mj.plants.reduced import Motion, lumped
 from ers_mj.plants.skeletons import bodily
 from ers_mj.traces import Trace
@@ -15,16 +15,17 @@ from ers_mj.unknowns import Unknowns
 Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace]], list[np.ndarray]]
 
 
-def plant_of(unknowns: Unknowns, letters: np.ndarray, is_angle: bool = True) -> MechanicalPlant:
+def plant_of(unknowns: Unknowns, letters: np.ndarray, is_angle: bool = True, timestep: float = TIMESTEP) -> MechanicalPlant:
     """The MuJoCo plant that letters (k,) make: the rudder system where they are Eq. (1)'s, else one joint."""
     c = lumped(unknowns.values(letters))
-    return MechanicalPlant(c, parameters=None if unknowns.is_lumped else bodily(unknowns.everything(letters), is_angle, c.b), is_angle=is_angle)
+    return MechanicalPlant(c, parameters=None if unknowns.is_lumped else bodily(unknowns.everything(letters), is_angle, c.b), is_angle=is_angle,
+                           timestep=timestep)
 
 
-def rollouts(jobs: int, is_angle: bool = True) -> Simulator:
+def rollouts(jobs: int, is_angle: bool = True, timestep: float = TIMESTEP) -> Simulator:
     """(unknowns, candidates (M) of letters (k,), traces) -> M residuals (N,) in sigmas, as identification.residuals has them, of free runs."""
     def simulate(unknowns, candidates, traces):
-        plants, parts = [plant_of(unknowns, letters, is_angle) for letters in candidates], [[] for _ in candidates]
+        plants, parts = [plant_of(unknowns, letters, is_angle, timestep) for letters in candidates], [[] for _ in candidates]
         for trace in traces:
             for letters, part, motion in zip(candidates, parts, _motions(plants, trace, jobs)):
                 part.append(_compared(unknowns, letters, trace, motion))

@@ -32,6 +32,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--within", type=several(number(above=0), "factor"), default=[0.2, 3.0], metavar="LOW,HIGH",
                         help="search the others between these factors of what is known (default 0.2,3)")
     parser.add_argument("--evaluations", type=whole(1), metavar="N", help="simulations at most (default 10000, in MuJoCo 400)")
+    parser.add_argument("--timestep", type=number(above=0), metavar="S", help="MuJoCo's step [s] (default 5e-5)")
     parser.add_argument("--polish", action="store_true", help="let ls go on where another method ends")
     parser.add_argument("--map", type=pair, action="append", default=[], metavar="name=column", help="take the column as this name, as in t_s=Time; repeatable")
     add_out(parser)
@@ -49,7 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ers_mj.estimate import Settings, identify
     from ers_mj.recording import read_recording
 
-    settings = Settings(arguments.method, arguments.plant, fixed, bounds, tuple(arguments.within), arguments.evaluations, arguments.polish, arguments.seed, arguments.jobs)
+    settings = Settings(arguments.method, arguments.plant, fixed, bounds, tuple(arguments.within), arguments.evaluations, arguments.polish, arguments.seed, arguments.jobs,
+                        **({"timestep": arguments.timestep} if arguments.timestep else {}))
     datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
     recordings = [read_recording(spec, names) for spec in arguments.recordings]
     refuse_twice(recordings, [])
