@@ -207,8 +207,8 @@ def _widened(leader: str, hopeless: Sequence[str], wide: Mapping[str, Design], l
     low, high = (_in_degrees(x, units["output_unit"]) for x in (limits.low - more, limits.high + more))
     words = []
     for name, found in wide.items():
-        asked = asked({**found.excitation, **units})
-        words.append(f"If the rig bears a travel from {low} to {high}: {asked[0].lower()}{asked[1:-1]}, which would tell {_plain(leader)} and "
+        wish = asked({**found.excitation, **units})
+        words.append(f"If the rig bears a travel from {low} to {high}: {wish[0].lower()}{wish[1:-1]}, which would tell {_plain(leader)} and "
                      f"{_plain(name)} apart at {math.sqrt(2 * found.cost):.2g} sigmas.")
     if stuck := [name for name in hopeless if name not in wide]:
         at_load = all(BY_NAME[name].subsystem == "load" for name in (leader, *stuck) if name in BY_NAME)
