@@ -74,8 +74,11 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
 
     They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow and a
-    mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that matters they are left at that.
+    mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that
+    matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for.
     """
+    if _attainable(base.misfit, tau) < LEAST_GAIN:
+        return []
     reference = float(score(base.misfit, tau).sum())
 
     def total(found):
@@ -151,6 +154,12 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             lead, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau))), ranked[:rivals])
     return _likeliest_first(sorted(ranked, key=lambda c: -c.worth))
+
+
+def _attainable(misfit: np.ndarray, tau: float) -> float:
+    """What C would fall by, were no block (B,) worse than the noise: than half of them are where that is less."""
+    left = score(misfit, tau) - score(min(1.0, float(np.median(misfit))), tau)
+    return float(np.sum(np.maximum(left, 0.0)))
 
 
 def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:
