@@ -19,7 +19,7 @@ from ers_mj.identification import Fit, converged, fit, hopped, near_noise, score
 from ers_mj.isolability import PARAMETER_PRICE, probabilities
 from ers_mj.model import STATES
 from ers_mj.screening import Begin, screen
-from ers_mj.traces import Trace
+from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 5.0  # decrease of C that an effect must buy
 LEAST_SHARE = 0.1  # and the share of what is left to explain
@@ -41,6 +41,7 @@ MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself 
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
+HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that
     matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for.
     """
-    if _attainable(base.misfit, tau) < LEAST_GAIN:
+    if _attainable(base.misfit, Blocks.of(traces).counts, tau) < LEAST_GAIN:
         return []
     reference = float(score(base.misfit, tau).sum())
 
@@ -156,10 +157,11 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     return _likeliest_first(sorted(ranked, key=lambda c: -c.worth))
 
 
-def _attainable(misfit: np.ndarray, tau: float) -> float:
-    """What C would fall by, were no block (B,) worse than the noise: than half of them are where that is less."""
-    left = score(misfit, tau) - score(min(1.0, float(np.median(misfit))), tau)
-    return float(np.sum(np.maximum(left, 0.0)))
+def _attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
+    """What C would fall by, were no block (B,) worse than the noise, or than half of them where that is less; beyond what noise makes of ``counts`` samples."""
+    level = min(1.0, float(np.median(misfit)))
+    left = float(np.sum(np.maximum(score(misfit, tau) - score(level, tau), 0.0)))
+    return left - HALF_NORMAL * level / (tau + level) * float(np.sum(np.sqrt(2.0 / counts)))
 
 
 def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:
