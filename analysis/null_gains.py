@@ -1,8 +1,8 @@
 """How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
 
 Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits every effect whose secant
-promises anything at all, with the gate LEAST_PROMISE of screening.py open. Prints the largest gain in C of each servo, from whose tail comes the scale of
-the exponential that evaluation.paired_p assumes.
+promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of selection.py open. Prints the largest gain in C of each servo and
+(1 + misfit) / 2 of its worst block, from whose tails come the scales that evaluation.paired_p assumes.
 """
 
 import argparse
@@ -23,12 +23,12 @@ from ers_mj.traces import trace_of  # noqa: E402
 
 
 def largest_gain(folder):
-    """(gain in C, name) of the best effect on the recordings of a folder."""
+    """(gain in C, name) of the best effect on the recordings of a folder, and what the worst block is off by."""
     sheet = read_datasheet(str(folder / "datasheet.toml"))
     traces = [trace_of(read_recording(str(path)), sheet.parameters["J"]) for path in sorted(folder.glob("rec*.csv"))]
     start = baseline(traces, sheet, True)
     found = selection.select(start.fit, start.traces, anchors=start.anchors, exclude=("inductance",))
-    return max(((c.gain, c.name) for c in found.rounds[0] if c.name in BY_NAME), default=(0.0, "nothing"))
+    return (*max(((c.gain, c.name) for c in found.rounds[0] if c.name in BY_NAME), default=(0.0, "nothing")), 0.5 + 0.5 * float(found.base.misfit.max()))
 
 
 if __name__ == "__main__":
@@ -36,12 +36,14 @@ if __name__ == "__main__":
     parser.add_argument("--cases", type=int, default=24)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    screening.LEAST_PROMISE, selection.MOST_ROUNDS = 0.0, 1
-    gains = []
+    screening.LEAST_PROMISE, selection.LEAST_GAIN, selection.MOST_ROUNDS = 0.0, 0.0, 1
+    gains, worst = [], []
     with tempfile.TemporaryDirectory() as folder:
         make_cases(["--out", folder, "--seed", str(options.seed), "--cases", str(options.cases), "--kind", "none", "--coloured", "0.5", "--no-refit"])
         for case in sorted(Path(folder).glob("case-*")):
-            gain, name = largest_gain(case)
+            gain, name, block = largest_gain(case)
             gains.append(max(gain, 0.0))
-            print(f"{case.name}  {gain:6.2f}  {name}", flush=True)
-    print(f"{len(gains)} servos: mean {np.mean(gains):.2f}, 90 % {np.quantile(gains, 0.9):.2f}, largest {np.max(gains):.2f}")
+            worst.append(block)
+            print(f"{case.name}  {gain:6.2f}  {name:32}  worst block {block:6.2f}", flush=True)
+    print(f"{len(gains)} servos: mean {np.mean(gains):.2f}, 90 % {np.quantile(gains, 0.9):.2f}, largest {np.max(gains):.2f}; "
+          f"worst blocks: median {np.median(worst):.2f}, 90 % {np.quantile(worst, 0.9):.2f}, largest {np.max(worst):.2f}")

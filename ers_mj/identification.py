@@ -50,12 +50,15 @@ class Fit:
 
 def residuals(model: Model, traces: Sequence[Trace], rate: float) -> np.ndarray:
     """y - y_hat over all traces and their channels, in sigmas of each, 0 where a sample is missing; NaN where the simulation ran away."""
-    parts = []
-    for k, trace in enumerate(traces):
-        theta, *others = model.observed(trace, k, rate)
-        parts.append(np.where(trace.valid, (trace.y - theta) / trace.sigma, 0.0))
-        for channel, seen in zip(trace.channels, others):
-            parts.append(np.where(np.isfinite(channel.values), (channel.values - seen) / channel.sigma, 0.0))
+    return np.concatenate([residuals_in(model, trace, k, rate) for k, trace in enumerate(traces)])
+
+
+def residuals_in(model: Model, trace: Trace, record: int, rate: float) -> np.ndarray:
+    """The same (rows,) in one recording."""
+    theta, *others = model.observed(trace, record, rate)
+    parts = [np.where(trace.valid, (trace.y - theta) / trace.sigma, 0.0)]
+    for channel, seen in zip(trace.channels, others):
+        parts.append(np.where(np.isfinite(channel.values), (channel.values - seen) / channel.sigma, 0.0))
     return np.concatenate(parts)
 
 
@@ -254,6 +257,12 @@ def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None,
             jacobian[:, k] = (residuals(other, traces, rate) - e) / DIFFERENCE
     jacobian[~np.isfinite(jacobian)] = 0.0
     return jacobian
+
+
+def central_jacobian(model: Model, layout, z: np.ndarray, traces: Sequence[Trace], rate: float) -> np.ndarray:
+    """Central differences (N, k) of the residuals: tangents, good to a few per cent each, blur the directions in which their columns cancel."""
+    ends = [[residuals(model.at(layout, z + way * step), traces, rate) for way in (1, -1)] for step in DIFFERENCE * np.eye(z.size)]
+    return np.nan_to_num(np.column_stack([(ahead - behind) / (2.0 * DIFFERENCE) for ahead, behind in ends]), nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _prior_cost(layout, z):

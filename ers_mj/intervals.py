@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from ers_mj.identification import DIFFERENCE, residuals
+from ers_mj.identification import central_jacobian, residuals
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.traces import Blocks, Trace
 
@@ -39,7 +39,7 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
     """95 % half-widths (k,) by H^-1 (sum of outer products of the slopes of runs of blocks) H^-1."""
     layout, blocks = model.layout(), Blocks.of(traces)
     e, z = residuals(model, traces, OBSERVER_RATE), model.vector(layout)
-    jacobian = np.column_stack([_slope(model, layout, z, step, traces) for step in DIFFERENCE * np.eye(z.size)])
+    jacobian = central_jacobian(model, layout, z, traces, OBSERVER_RATE)
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     weighted = jacobian * weight[:, None]
     hessian = weighted.T @ jacobian
@@ -49,9 +49,3 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
     n = slopes.shape[0]
     covariance = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
     return student.ppf(0.975, max(n - len(layout), 1)) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-
-
-def _slope(model: Model, layout, z: np.ndarray, step: np.ndarray, traces: Sequence[Trace]) -> np.ndarray:
-    """Central difference (N,) of the residuals: tangents, good to a few per cent each, blur the directions in which their columns cancel."""
-    ahead, behind = (residuals(model.at(layout, z + way * step), traces, OBSERVER_RATE) for way in (1, -1))
-    return np.nan_to_num((ahead - behind) / (2.0 * float(np.sum(step))), nan=0.0, posinf=0.0, neginf=0.0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize
 
 from ers_mj.effects import BY_NAME, Effect
-from ers_mj.identification import jacobian_of, residuals, score
+from ers_mj.identification import central_jacobian, residuals, residuals_in, score
 from ers_mj.model import OBSERVER_RATE, Columns, Model
 from ers_mj.traces import BLOCK, Blocks, Trace
 
@@ -17,7 +18,7 @@ MOST_SENT, MOST_BENT, LATER = 10, 14, 5  # candidates of the screening that are 
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
 LEAST_PROMISE = 2.5  # of C that the secant of a candidate must promise where a model is quiet
 LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the screening may scale it
-HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
+HOTTEST, KNOCKS, NEARER = 3, (0.08, 0.25), 60  # blocks in which a knock is looked for, the lengths [s] from which its fit is begun, and simulations of it
 
 
 @dataclass(frozen=True)
@@ -49,10 +50,13 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         e = left if light is place else residuals(light, traces, OBSERVER_RATE)
         if not np.all(np.isfinite((left, e))):
             continue
-        (known, targets), scales = _targets(light, e, left, traces, tau), replace(place.scales, hot=_hot(left, traces, tau))
+        (known, targets), scales = _targets(light, left, traces, tau), replace(place.scales, hot=_hot(left, traces, tau))
         for effect in (BY_NAME[name] for name in names):
-            starts = _hopeful(light, effect, effect.starts(scales), targets, traces)
-            found = [p for start in starts if (p := _promise(light, effect, start, e, targets, traces))]
+            if effect.once:
+                found = _knocks(light, effect, effect.starts(scales), e, targets[0][2], traces, tau)
+            else:
+                starts = _hopeful(light, effect, effect.starts(scales), targets, traces)
+                found = [p for start in starts if (p := _promise(light, effect, start, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
                 begun = [Begin(_onto(place, model, effect), known) for _, model in found[:effect.tries]]
@@ -102,18 +106,46 @@ def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, tr
     return [starts[i] for i in best]
 
 
-def _targets(place: Model, e: np.ndarray, left: np.ndarray, traces: Sequence[Trace], tau: float):
-    """The Jacobian's columns at the place, where it leaves e (N,), and at either weighting (weights (N,), orthonormal basis (N, k) of the
+def _targets(place: Model, left: np.ndarray, traces: Sequence[Trace], tau: float):
+    """The Jacobian's columns at the place, and at either weighting (weights (N,), orthonormal basis (N, k) of the
     place's own parameters, weighted residual (N,) of ``left`` beside it)."""
     blocks, layout = Blocks.of(traces), place.layout()
     m = blocks.misfit(left)
-    jacobian = jacobian_of(place, layout, place.vector(layout), e, traces, OBSERVER_RATE)
+    jacobian = central_jacobian(place, layout, place.vector(layout), traces, OBSERVER_RATE)
     out = []
     for level in (tau, max(tau, float(np.mean(m)))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
         basis, _ = np.linalg.qr(jacobian * root[:, None])
         out.append((root, basis, root * left - basis @ (basis.T @ (root * left))))
     return {f.key: column for f, column in zip(layout, jacobian.T)}, out
+
+
+def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.ndarray, target: np.ndarray, traces: Sequence[Trace],
+            tau: float) -> list[tuple[float, Model]]:
+    """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all for a small one, so that no secant
+    may be scaled. The best start of each side and recording, brought nearer, with what it gains in C as a share of the residual like the others'.
+    """
+    ends, best = np.cumsum([0, *(trace.rows for trace in traces)]), {}
+    column = [p.name for p in effect.parameters].index("record")
+
+    def gain(start):
+        k = int(start[column])
+        left = e[ends[k]:ends[k + 1]], residuals_in(place.with_effect(effect.name, start), traces[k], k, OBSERVER_RATE)
+        without, beside = (float(np.sum(score(Blocks.of([traces[k]]).misfit(some), tau))) for some in left)
+        return without - beside if np.isfinite(beside) else -math.inf
+
+    for start in starts:
+        kind = int(start[column]), start[0] > 0, start[2]
+        best[kind] = max(best.get(kind, (0.0, start)), (gain(start), start), key=lambda found: found[0])
+    nearer = [_nearer(gain, start) for won, start in sorted(best.values(), key=lambda found: -found[0])[:effect.tries] if won > 0]
+    return [(2.0 * won / float(target @ target), place.with_effect(effect.name, start)) for won, start in nearer]
+
+
+def _nearer(gain: Callable[[np.ndarray], float], start: np.ndarray) -> tuple[float, np.ndarray]:
+    """A knock's size, beginning and length (the first three of ``start``) brought nearer: a time has no slope before the knock overlaps the mismatch."""
+    first = start[:3] + np.vstack([np.zeros(3), np.diag([0.3 * start[0], 0.03, 0.3 * start[2]])])
+    found = minimize(lambda p: -gain(np.append(p, start[3:])), start[:3], method="Nelder-Mead", options={"initial_simplex": first, "maxfev": NEARER})
+    return -float(found.fun), np.append(found.x, start[3:])
 
 
 def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:

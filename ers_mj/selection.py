@@ -25,7 +25,8 @@ LEAST_GAIN = 5.0  # decrease of C that an effect must buy
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
-ONCE = 8.0  # of C that suffices where an effect acts once
+ONCE = 8.0  # of C that an effect which acts once must buy
+PEAK = 30.0  # or the factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
 QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
 RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
@@ -48,7 +49,7 @@ HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its st
 class Candidate:
     """A model that adds one effect to another: the fit, its gain in C over the reference, the paired z of that gain.
 
-    ``lost`` is the C that the blocks which the effect makes worse lose together.
+    ``lost`` is the C that the blocks which the effect makes worse lose together, ``best`` what it wins in the block that it serves best.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Candidate:
     gain: float
     z: float
     lost: float
+    best: float
 
     @property
     def worth(self) -> float:
@@ -78,7 +80,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that
     matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for.
     """
-    if _attainable(base.misfit, Blocks.of(traces).counts, tau) < LEAST_GAIN:
+    if _attainable(base.misfit, Blocks.of(traces).counts, tau) < LEAST_GAIN and score(base.misfit, tau).max() < math.log(PEAK):
         return []
     reference = float(score(base.misfit, tau).sum())
 
@@ -111,8 +113,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
 
     def judged(item):
         name, found = item
-        lost = float(np.sum(np.maximum(score(found.misfit, tau) - score(base.misfit, tau), 0.0)))
-        return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau), lost)
+        won = score(base.misfit, tau) - score(found.misfit, tau)
+        lost = -float(np.sum(np.minimum(won, 0.0)))
+        return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau), lost, float(won.max()))
 
     states = [(s, [[Begin(base.model.with_state(s, len(traces)), {})]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
@@ -227,7 +230,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
                 base, current, mended = base if current.model.names else again, again, mended + 1
                 continue
         rounds.append(tuple(ranked))
-        if not ranked or ranked[0].gain < least or not _sure(ranked[0]):
+        if not ranked or not _asked_for(ranked[0], least):
             break
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
@@ -254,10 +257,17 @@ def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
     return fit(replace(model, states={k: v for k, v in model.states.items() if k != candidate.name} or None), traces, tau=tau, steps=12)
 
 
-def _sure(candidate: Candidate) -> bool:
-    """Whether the gain is more than chance: over the blocks, or, of what acts in few of them, since hardly any is worse or by its size."""
-    once = candidate.name in BY_NAME and BY_NAME[candidate.name].once
-    return candidate.z >= LEAST_Z or candidate.lost <= LOST * candidate.gain or (once and candidate.gain >= ONCE)
+def _asked_for(candidate: Candidate, least: float) -> bool:
+    """Whether the gain matters and is more than chance: over the blocks, or, of what acts in few of them, since hardly any is worse.
+
+    A knock must gain ONCE, or take away what no fork of stick and slip makes (PEAK): that is enough where little else is left, so that the
+    ``least`` gain is no share of it.
+    """
+    if candidate.name in BY_NAME and BY_NAME[candidate.name].once:
+        if candidate.best < math.log(PEAK):
+            return candidate.gain >= max(least, ONCE)
+        return candidate.gain >= (least if least > LEAST_GAIN else NEAR_LEAST * least)
+    return candidate.gain >= least and (candidate.z >= LEAST_Z or candidate.lost <= LOST * candidate.gain)
 
 
 def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:

@@ -31,11 +31,11 @@ class Backlash(Transmission):
                 for part in (0.003, 0.01, 0.03, 0.1)]
 
     def grown(self, name, p, scales):
-        """A twisting shaft is a contact without play: one as wide as the noise lets it be seen."""
+        """A twisting shaft is a contact without play: one as wide as the noise, or a third of that."""
         if name != "shaft_compliance":
             return []
         f, zeta, rho, phi = p
-        return [np.array([scales.noise, rho, phi, min(f, 1000.0), max(zeta, 0.05)])]
+        return [np.array([part * scales.noise, rho, phi, min(f, 1000.0), max(zeta, 0.05)]) for part in (1.0, 0.3)]
 
     def coefficients(self, p, c):
         return coupled(c, f=p[3], zeta=p[4], rho=p[1], phi=p[2], gap=p[0])

@@ -19,11 +19,12 @@ class LoadDisturbance(Load):
         Parameter("width", "time", "how long it lasts", lower=2 * EDGE, upper=10.0, absent=0.1, per_record=True),
         Parameter("record", "count", "recording in which it acts, from 0", positive=False, fitted=False),
     )
-    sized, tries = 1, 3
+    tries = 3
 
     def starts(self, scales):
-        return [np.array([0.3 * scales.acceleration, begin - before, length, record])
-                for record, begin, length in scales.hot for before in (0.0, 0.1)]
+        """Around each hot span: pushes either way, up to four times what friction holds (a preload holds as much), begun somewhat before it or in it."""
+        return [np.array([size * scales.acceleration, begin + later, length, record]) for record, begin, length in scales.hot
+                for later in (-0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2) for size in (-4.0, -2.5, -1.0, -0.3, 0.3, 1.0, 2.5, 4.0)]
 
     def constants(self, p, c):
         return p[:3]
