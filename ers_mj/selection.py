@@ -220,7 +220,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless."""
     current, rounds, mended = base, [], 0
     tau = tau_of(base.misfit)
-    while len(rounds) < _most_rounds(current):
+    while len(rounds) - len(current.model.states or {}) < _most_rounds(current):
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)

@@ -10,6 +10,8 @@ FEWEST_REVISITED = 0.05  # share of the distinct values that a converter shows t
 COARSE = 200  # levels of travel below which even a decimal grid acts as a converter
 JUMP, CALM_CHANGES, LONGEST_EXCURSION = 8.0, 6, 50  # noise levels of a jump; changes on either side that are usual; samples
 ON_LATTICE = 0.18  # of a step by which a gap may miss a multiple of it: a coarse converter behind a fine one of a seventh of its step misses by that
+LEAP = 3.0, 6.0, 1.5  # grid steps, noise levels and usual changes that the catching up after a held span must exceed at least
+LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
 LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
 
 
@@ -25,6 +27,23 @@ def frozen_spans(y: np.ndarray, grid: float) -> list[slice]:
     repeats = np.clip(np.mean(np.diff(y) == 0), by_chance, 0.9)
     shortest = max(SHORTEST_HELD, int(np.ceil(2 * np.log(len(y)) / -np.log(repeats))))
     return [s for s in held_spans(y, shortest) if _dithered(y, s)]
+
+
+def leapt_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
+    """Repeats after which y (N,) leaps to where the speed before and after would have brought it meanwhile: a hold that a coarse grid or a quiet
+    sensor does not betray by its missing noise. A rudder that sticks and breaks loose has no speed before it, and a larger one after it.
+    """
+    out = []
+    for s in held_spans(y, 3):
+        first, last = s.start - LEAP_SIDES, s.stop + LEAP_SIDES
+        if first < 0 or last >= y.size:
+            continue
+        leap, before, after = y[s.stop] - y[s.stop - 1], (y[s.start] - y[first]) / LEAP_SIDES, (y[last] - y[s.stop]) / LEAP_SIDES
+        way = (s.stop - s.start) * 0.5 * (before + after)
+        least = max(LEAP[0] * grid, LEAP[1] * sigma, LEAP[2] * max(abs(before), abs(after)))
+        if abs(leap) > least and before * after > 0 and LEAP_WAY[0] < leap / way < LEAP_WAY[1]:
+            out.append(slice(s.start + 1, s.stop))
+    return out
 
 
 def held_spans(x: np.ndarray, shortest: int = SHORTEST_HELD) -> list[slice]:

@@ -11,6 +11,7 @@ import pytest
 
 from ers_mj.errors import InputError
 from ers_mj.recording import converter_step, from_arrays, read_recording, write_recording
+from ers_mj.symptoms import leapt_spans
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 N = 400
@@ -425,6 +426,24 @@ def test_a_converter_is_found_among_outliers():
 def test_a_coarse_step_counts_before_the_converter_behind_it(coarse, fine):
     y = np.round(np.round(travel(4000, 2e-4, 0) / coarse) * coarse / fine) * fine
     assert converter_step(np.round(y, 6)) == pytest.approx(coarse, rel=1e-2)
+
+
+@pytest.mark.parametrize("grid", [0.0, 2.5e-4])
+def test_a_hold_is_known_by_the_leap_after_it_where_noise_does_not_show_it(grid):
+    t = np.arange(4000) * 2e-3
+    y = 0.26 + 0.2 * np.sin(4 * t) + 5e-5 * np.random.default_rng(0).normal(size=t.size)
+    held = [(330, 350), (1250, 1262), (2450, 2490)]
+    for first, last in held:
+        y[first + 1:last] = y[first]
+    y = np.round(y / grid) * grid if grid else y
+    found = [(s.start - 1, s.stop) for s in leapt_spans(y, grid, 8e-5)]
+    assert all(any(abs(a - first) <= 2 and b == last for a, b in found) for first, last in held) and len(found) == len(held)
+
+
+def test_a_rudder_that_breaks_loose_is_no_hold():
+    t = np.arange(600) * 5e-3
+    y = np.where(t < 1.5, 0.3 - 0.02 * np.exp(-8 * t), 0.3 + 40.0 * np.maximum(t - 1.5, 0.0) ** 2)
+    assert leapt_spans(np.round(y / 2.5e-4) * 2.5e-4, 2.5e-4, 8e-5) == []
 
 
 def test_decimal_steps_in_degrees_are_told_apart_by_their_size(tmp_path, columns):
