@@ -146,7 +146,9 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
         x, search, minimum, used = _found(replace(search, structure=again, traces=traces), settings, simulate)
         used += before
     else:  # or one where stick and slip forked at a touch: what is told is what the found model says
-        x, search = replace(search, structure=again).coordinates(search.letters(x)), replace(search, structure=again)
+        letters = search.letters(x)
+        search = replace(search, unknowns=replace(unknowns, reference=letters), structure=again)
+        x = search.coordinates(letters)
     progress("measuring how sure that is", 0.8)
     return _told(recordings, datasheet, settings, search, x, simulate, minimum, used, began)
 

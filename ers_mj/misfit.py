@@ -89,7 +89,7 @@ class Search:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Those of the combinations (r,): what the letters' own bounds leave to them."""
+        """Those of the combinations (r,): the letters' own, wider by those of the pivots whose bounds the user gave."""
         u = self.unknowns
         ends = []
         for k, name in zip(self.structure.kept, self.names):
@@ -98,6 +98,8 @@ class Search:
                 continue
             low, high = (math.log(max(x[k] / u.reference[k], 1e-6)) for x in ((u.lower, u.upper) if u.reference[k] > 0 else (u.upper, u.lower)))
             for row, p in zip(self._powers, self.structure.pivots):
+                if u.names[p] not in u.bounded:
+                    continue
                 reach = sorted(-row[k] * math.log(max(x[p] / u.reference[p], 1e-6)) for x in (u.lower, u.upper))
                 low, high = low + reach[0], high + reach[1]
             ends.append((math.exp(low), math.exp(high)) if name in IN_PROPORTION else (low, high))
