@@ -133,10 +133,10 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
     progress("looking at what the recordings can tell", 0.02)
     inertia = (settings.fixed or {}).get("J") or (datasheet.parameters.get("J") if datasheet is not None else None)
     traces = tuple(_early(trace_of(r, inertia)) for r in recordings)
-    unknowns = unknowns_of(traces, datasheet, settings.fixed or {}, settings.bounds or {}, settings.factors, recordings[0].output_unit == "rad", settings.jobs)
+    unknowns = unknowns_of(traces, datasheet, settings.fixed or {}, settings.bounds or {}, settings.factors, recordings[0].output_unit == "rad")
     y = np.concatenate([t.y[t.valid] for t in traces])
     scale = 0.5 * float(np.ptp(y))
-    search = Search(unknowns, _best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(unknowns.reference)
+    search = Search(unknowns, _best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(unknowns.reference, surely=False)
     progress(f"searching by {settings.method}", 0.1)
     simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad", settings.timestep) if settings.plant == "mujoco" else None
     x, search, minimum, used = _found(search, settings, simulate)

@@ -44,10 +44,13 @@ class Search:
     home: tuple[bool, ...] = ()
     with_starts: bool = False
 
-    def at_home(self, letters: np.ndarray) -> Search:
-        """The search in which those recordings start at home that must: at rest near theta_0, where the preload is stronger than friction."""
+    def at_home(self, letters: np.ndarray, surely: bool = True) -> Search:
+        """The search in which those recordings start at home that must: at rest near theta_0, where the preload is stronger than friction.
+
+        Where that is not known ``surely``, a preload is enough.
+        """
         values = self.unknowns.values(letters)
-        holds = values["c_1"] > values["c_2"]
+        holds = values["c_1"] > (values["c_2"] if surely else 0.0)
         near = HOME * self.scale
         return replace(self, home=tuple(holds and t.start[1] == 0.0 and abs(t.start[0] - values["theta_0"]) < near + 5.0 * t.sigma for t in self.traces))
 
