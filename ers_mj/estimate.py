@@ -22,7 +22,7 @@ from ers_mj.recording import Recording
 from ers_mj.rollouts import rollouts
 from ers_mj.starts import with_starts
 from ers_mj.structure import Structure
-from ers_mj.traces import Trace, trace_of
+from ers_mj.traces import Blocks, Trace, trace_of
 from ers_mj.unknowns import FACTORS, LETTERS, Unknowns, unit_of_letter, unknowns_of
 
 FIRST = 4  # samples that tell whether a recording starts at rest
@@ -34,6 +34,7 @@ MOST_PLACES = 8  # beside the reference, at which the rank is looked for
 NEAR_BOUND = 1e-3  # of a coordinate's range
 PRINTED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
+FOLLOWED = (60.0, 30.0)  # [1/s] observer rates of the polish in MuJoCo: of the reduced model's and MuJoCo's own, then of the last, by which the answer is judged
 POLISH_BUDGET, POLISHES, POLISH_WORTH = 200, 4, 1e-4  # the last: share of the value that another polish must have been worth
 
 Progress = Callable[[str, float], None]
@@ -83,7 +84,8 @@ class Identified:
         settings: how it was asked.
         rows: the answer.
         fitness: Eq. (13) [output unit^2 s].
-        misfit: mean squared residual in sigmas.
+        misfit: mean squared residual in sigmas; in MuJoCo the median block's, as an observer (see FOLLOWED): its step decides when a lever is met, and
+            a free run carries each such chance on.
         minimum: what the minimiser found, with its trace; ``evaluations`` counts the polish too.
         structure: what the data can tell.
         profiles: of the weak combinations.
@@ -196,26 +198,26 @@ def _found(search: Search, settings: Settings, simulate: Simulator | None) -> tu
     if by_squares or settings.polish:
         value = found.value
         for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
-            x, search, ended = _polished(search, x, None)
+            x, search, ended = _polished(search, x, None, FOLLOWED[0] if simulate else 0.0)
             used += ended.evaluations
             value, gain = ended.value, value - ended.value
             if gain < POLISH_WORTH * value:
                 break
-        if simulate is not None:
-            x, search, ended = _polished(search, x, simulate)
+        for rate in FOLLOWED if simulate is not None else ():
+            x, search, ended = _polished(search, x, simulate, rate)
             used += ended.evaluations
     return x, search, found, used
 
 
-def _polished(search: Search, x: np.ndarray, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum]:
-    """ls from x (r,) with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``."""
+def _polished(search: Search, x: np.ndarray, simulate: Simulator | None, rate: float = 0.0) -> tuple[np.ndarray, Search, Minimum]:
+    """ls from x (r,) with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``, forgiving single blocks."""
     letters = search.letters(x)
     traces = search.traces if simulate else tuple(with_starts(search.unknowns.model(letters), search.traces))
     begun = replace(search, traces=traces, with_starts=True).at_home(letters)
     lower, upper = begun.bounds
     own = np.concatenate([x, np.zeros(lower.size - x.size)])
     found = LS(attempts=1, staged=False, gain=MUJOCO_GAIN if simulate else POLISH_GAIN).minimise(
-        Misfit(begun, simulate=simulate), lower, upper, budget=POLISH_BUDGET, start=own)
+        Misfit(begun, rate, simulate=simulate, robust=simulate is not None), lower, upper, budget=POLISH_BUDGET, start=own)
     return found.x[: x.size], replace(begun, traces=begun.started(found.x), with_starts=False), found
 
 
@@ -226,17 +228,18 @@ def _told(recordings, datasheet, settings, search, x, simulate, minimum, used, b
     unknowns, letters = search.unknowns, search.letters(x)
     open_ended = replace(search, with_starts=True)
     x = np.concatenate([x, np.zeros(open_ended.bounds[0].size - x.size)])
-    reduced = Misfit(open_ended)
+    reduced = Misfit(open_ended, FOLLOWED[-1] if simulate else 0.0)
     e, weight = replace(reduced, simulate=simulate).residuals(x), reduced.weight
+    free = replace(reduced, simulate=simulate, rate=0.0).residuals(x) if simulate else e
     slopes = np.nan_to_num(central(reduced.residuals, x, STEP) / weight[:, None])
     precision = precision_of(slopes, e / weight, search.traces, settings.seed)
     seen = np.concatenate([t.seen for t in search.traces])
-    misfit = float(np.sum((e / weight) ** 2)) / int(seen.sum())
+    misfit = float(np.median(Blocks.of(search.traces).misfit(e / weight))) if simulate else float(np.sum((e / weight) ** 2)) / int(seen.sum())
     profiles = () if simulate or misfit > WRONG else _profiles(reduced, open_ended, slopes, x, precision)
     y, u = recordings[0].output_unit, {"pct": "%"}.get(recordings[0].input_unit, recordings[0].input_unit)
     rows = _rows(search, letters, precision, profiles, datasheet, y, u)
-    predicted = _predicted(search, letters, e / weight)
-    return Identified(settings, tuple(rows), float(e @ e), misfit, minimum, used, search.structure, profiles, search.traces, predicted,
+    predicted = _predicted(search, letters, free / weight)
+    return Identified(settings, tuple(rows), float(free @ free), misfit, minimum, used, search.structure, profiles, search.traces, predicted,
                       _model(unknowns, letters), _sentence(search, misfit, settings), tuple(_warnings(search, x, misfit)), time.monotonic() - began)
 
 

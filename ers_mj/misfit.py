@@ -17,7 +17,7 @@ import numpy as np
 
 from ers_mj.identification import residuals
 from ers_mj.structure import Structure, structure_of
-from ers_mj.traces import Trace
+from ers_mj.traces import Blocks, Trace
 from ers_mj.unknowns import Unknowns
 
 STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone through before the free run
@@ -27,7 +27,7 @@ COARSER, FORKS, FEWEST = 3.0, 0.01, 0.5  # a second step, the share of a slope's
 START, HOME = 0.01, 0.02  # half travels by which the angle at the start may be off, and within which of theta_0 a start is at home
 EXPLAINED = 1.3  # mean squared residual in sigmas up to which a fit is good enough for no further start
 
-Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace]], list[np.ndarray]]
+Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace], float], list[np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -127,19 +127,21 @@ class Search:
 class Misfit:
     """Eq. (13) over a search's coordinates: x (M, r) -> (M,) [rad^2 s, or output unit^2 s].
 
-    Further channels enter with the weight of their noise. ``simulate`` gives the residuals in sigmas of many candidates at once where it is not
-    the reduced model in the observer form of ``rate``; the slopes are the reduced model's then.
+    The model runs in the observer form of ``rate`` (see identification.py), free where that is 0. Further channels enter with the weight of their noise.
+    ``simulate`` gives the residuals in sigmas of many candidates at once where it is not the reduced model that runs; the slopes are the reduced model's then.
+    A ``robust`` one has the logarithm of identification.py, block by block.
     """
 
     search: Search
     rate: float = 0.0
     jobs: int = 1
     simulate: Simulator | None = None
+    robust: bool = False
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         if self.simulate is not None:
-            found = self.simulate(self.search.unknowns, [self.search.letters(row) for row in x], self.search.traces)
-            return np.array([_squares(self.weight * e) for e in found])
+            found = self.simulate(self.search.unknowns, [self.search.letters(row) for row in x], self.search.traces, self.rate)
+            return np.array([_squares(self.weight * (forgiving(e, self.search.traces) if self.robust else e)) for e in found])
         with ThreadPoolExecutor(self.jobs) as pool:
             return np.array(list(pool.map(lambda row: _squares(self.residuals(row)), x)))
 
@@ -147,8 +149,10 @@ class Misfit:
         """(N,), whose squares sum to the value."""
         traces, letters = self.search.started(x), self.search.letters(x)
         if self.simulate is not None:
-            return self.weight * self.simulate(self.search.unknowns, [letters], traces)[0]
-        return self.weight * residuals(self.search.unknowns.model(letters), traces, self.rate)
+            e = self.simulate(self.search.unknowns, [letters], traces, self.rate)[0]
+        else:
+            e = residuals(self.search.unknowns.model(letters), traces, self.rate)
+        return self.weight * (forgiving(e, traces) if self.robust else e)
 
     @property
     def weight(self) -> np.ndarray:
@@ -173,12 +177,31 @@ class Misfit:
         return EXPLAINED * float(np.sum(self.weight[seen] ** 2))
 
     @property
-    def slopes(self) -> Callable[[np.ndarray], np.ndarray] | None:
-        """x -> slopes (N, r) by the reduced model, where another one is simulated."""
+    def slopes(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray] | None:
+        """(x, residuals (N,) there) -> slopes (N, r) by the reduced model, where another one is simulated."""
         if self.simulate is None:
             return None
-        reduced = replace(self, simulate=None)
-        return lambda x: central(reduced.residuals, x, STEP)
+        reduced = replace(self, simulate=None, robust=False)
+
+        def slopes(x, e):
+            found = central(reduced.residuals, x, STEP)
+            return found * forgiven(e / self.weight, self.search.traces)[:, None] if self.robust else found
+
+        return slopes
+
+
+def forgiving(e: np.ndarray, traces: Sequence[Trace]) -> np.ndarray:
+    """Residuals e (N,) in sigmas, scaled so that each block's squares sum to n ln(1 + m), m their mean: a few blocks cannot decide everything."""
+    blocks = Blocks.of(traces)
+    m = blocks.misfit(e)
+    return e * np.sqrt(np.log1p(m) / np.maximum(m, 1e-300))[blocks.index]
+
+
+def forgiven(e: np.ndarray, traces: Sequence[Trace]) -> np.ndarray:
+    """What the slopes of plain residuals are to be multiplied by, (N,), so that with the scaled ones e (N,) they give the slope of the sum."""
+    blocks = Blocks.of(traces)
+    m = np.expm1(blocks.misfit(e))
+    return (np.sqrt(m / np.maximum(np.log1p(m), 1e-300)) / (1.0 + m))[blocks.index]
 
 
 def _squares(e: np.ndarray) -> float:

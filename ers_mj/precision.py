@@ -94,7 +94,7 @@ class Pinned:
     def __init__(self, objective, slopes: np.ndarray, k: int, value: float):
         self._objective, self._slopes, self._k, self._value = objective, np.delete(slopes, k, axis=1), k, value
 
-    def slopes(self, x: np.ndarray) -> np.ndarray:
+    def slopes(self, x: np.ndarray, e: np.ndarray) -> np.ndarray:
         """Slopes (N, r - 1), wherever x is: Broyden's updates see to the rest."""
         return self._slopes
 

@@ -71,23 +71,23 @@ def _descend(meter: Meter, stage: Objective | None, x: np.ndarray, least_gain: f
         return x, np.inf, first
     damping, slopes, fresh, wide = 1e-2, None, False, 1.0
     exact = max(enough * first, BELOW_TARGET * getattr(meter.objective, "target", 0.0))
+    given = getattr(stage or meter.objective, "slopes", None)
     while value > exact:
         if slopes is None:
-            given = getattr(stage or meter.objective, "slopes", None)
-            slopes, fresh = given(x) if given else _slopes(meter, stage, x, e, wide * DIFFERENCE), True
+            slopes, fresh = given(x, e) if given else _slopes(meter, stage, x, e, wide * DIFFERENCE), True
         hessian, slope = slopes.T @ slopes, slopes.T @ e
         for attempt in range(8 if fresh else 2):
             there = np.clip(x + _step(hessian, slope, damping, (x <= lower) & (slope > 0) | (x >= upper) & (slope < 0)), lower, upper)
             move = there - x
             promised = -(2.0 * slope @ move + move @ hessian @ move)
-            if fresh and attempt == 0 and promised < PROMISING * least_gain * value:
+            if fresh and (given or attempt == 0) and promised < PROMISING * least_gain * value:
                 return x, value, first
             e_there = meter.residuals(there, stage)
             if _squares(e_there) < value:
                 break
             damping = max(6.0 * damping, 1e-7)
         else:
-            if fresh and (wide > 1.0 or stage is not None):
+            if fresh and (wide > 1.0 or given or stage is not None):
                 break
             wide, damping, slopes = (WIDE, 1e-2, None) if fresh else (wide, damping, None)
             continue
