@@ -13,10 +13,10 @@ from ers_mj.identification import jacobian_of, residuals, score
 from ers_mj.model import OBSERVER_RATE, Columns, Model
 from ers_mj.traces import BLOCK, Blocks, Trace
 
-MOST_SENT, LATER = 10, 5  # candidates of the screening that are refitted at most, in the first round and beside an effect
+MOST_SENT, MOST_BENT, LATER = 10, 14, 5  # candidates of the screening that are refitted at most, in the first round, there if bent, and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
 LEAST_PROMISE = 2.5  # of C that the secant of a candidate must promise where a model is quiet
-LEAST_SIZE, MOST_SIZE = 0.05, 3.0  # of a start's visible size, to which the screening may scale it
+LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the screening may scale it
 HOTTEST, KNOCKS = 4, (0.1, 0.4)  # blocks in which a knock is looked for, and the lengths [s] from which its fit is begun
 
 
@@ -36,13 +36,13 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
     largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
     a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
-    the first place, or from all of them where it is far from the noise, ``bent`` by what is missing: MOST_SENT at most, those with
+    the first place, or from all of them where it is far from the noise, ``bent`` by what is missing: MOST_SENT (MOST_BENT) at most, those with
     PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth LEAST_PROMISE. (How far C
     lies above zero is no such sign: it hangs on the noise, which is an estimate.)
 
     What is dear to simulate is refitted from its most promising place only, and beside it secants are taken along the motion without it.
     """
-    names, floor = [name for name in BY_NAME if name not in exclude], 0.0
+    names, floor, most = [name for name in BY_NAME if name not in exclude], 0.0, LATER if places[0].names else MOST_BENT if bent else MOST_SENT
     promises, begins = {}, {}
     for place in places:
         left, light = residuals(place, traces, OBSERVER_RATE), _light(place)
@@ -60,12 +60,13 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
                     begins.setdefault(effect.name, []).append(begun)
                 elif found[0][0] > promises.get(effect.name, 0.0):
                     begins[effect.name] = [begun]
-                promises[effect.name] = max(promises.get(effect.name, 0.0), found[0][0])
+                if bent or place is places[0]:
+                    promises[effect.name] = max(promises.get(effect.name, 0.0), found[0][0])
         if quiet and not floor:
             floor = 2.0 * LEAST_PROMISE / float(targets[0][2] @ targets[0][2])
         if not bent:
-            names = _promising(promises, floor, LATER if place.names else MOST_SENT)
-    return [(name, begins[name]) for name in _promising(promises, floor, LATER if places[0].names else MOST_SENT)]
+            names = _promising(promises, floor, most)
+    return [(name, begins[name]) for name in _promising(promises, floor, most)]
 
 
 def _light(place: Model) -> Model:

@@ -74,8 +74,11 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
 
     They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow and a
-    mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that matters they are left at that.
+    mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that
+    matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for.
     """
+    if _attainable(base.misfit, tau) < LEAST_GAIN:
+        return []
     reference = float(score(base.misfit, tau).sum())
 
     def total(found):
@@ -100,6 +103,11 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
 
+    def contending(labels, ends):
+        """Those labels that may still be the explanation: all while none explains everything, then those with RIVAL of the best one's gain."""
+        least = reference - min(map(total, ends.values()), default=reference)
+        return [label for label in labels if reference - least > QUIET * base.misfit.size or reference - total(ends[label]) >= RIVAL * least]
+
     def judged(item):
         name, found = item
         lost = float(np.sum(np.maximum(score(found.misfit, tau) - score(base.misfit, tau), 0.0)))
@@ -116,12 +124,12 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         first = refitted([(label, begins[0]) for label, begins in starts.items()])
         most = max((reference - total(f) for f in first.values()), default=0.0)
         worth = {name for name, found in leaders(first).items() if bent or reference - total(found) >= AGAIN * most}
-        worth |= {name for name, _ in screened[:FOREMOST]}
+        worth = {*contending(worth, leaders(first)), *(name for name, _ in screened[:FOREMOST])}
         again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth for begin in begins[1:]])
         best = {label: min((ends[label] for ends in (first, again) if label in ends), key=total) for label in first}
         if not bent:
             best = {(name, 0): found for name, found in leaders(best).items()}
-        running = list(best)
+        running = contending(best, best)
         for _ in range(LATER_LAPS if base.model.names else LAPS):
             leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
             pace = max(PACE * least, PACE_SHARE * leading)
@@ -129,18 +137,40 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             running = [label for label in running if total(best[label]) - total(ends[label]) > pace
                        and not (label[0] in BY_NAME and BY_NAME[label[0]].dear)]
             best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
+            running = contending(running, best)
         best = leaders(best)
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
             return sorted(map(judged, rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
-        ranked = sorted(map(judged, list(pool.map(finish, rough[:close])) + rough[close:]), key=lambda c: -c.worth)
+        finished = dict(pool.map(finish, rough[:close]))
+        for name, found in pool.map(finish, _wider(finished, exclude)):
+            if name not in best or total(found) < total(finished.get(name, best[name])):
+                finished[name] = found
+        ranked = sorted(map(judged, {**dict(rough), **finished}.items()), key=lambda c: -c.worth)
         rivals = len(_rivals(ranked))
         if rivals > 1:
             lead, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau))), ranked[:rivals])
     return _likeliest_first(sorted(ranked, key=lambda c: -c.worth))
+
+
+def _attainable(misfit: np.ndarray, tau: float) -> float:
+    """What C would fall by, were no block (B,) worse than the noise: than half of them are where that is less."""
+    left = score(misfit, tau) - score(min(1.0, float(np.median(misfit))), tau)
+    return float(np.sum(np.maximum(left, 0.0)))
+
+
+def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:
+    """Effects that have a finished one as their limit, with the models that begin there: what is wider is no worse, if its fit finds it."""
+    out = []
+    for name, found in finished.items():
+        if name in BY_NAME:
+            without, p = found.model.without_effect(name), dict(found.model.effects)[name]
+            out += [(effect.name, Begin(without.with_effect(effect.name, start), {})) for effect in BY_NAME.values()
+                    if effect.name not in exclude for start in effect.grown(name, p, found.model.scales)]
+    return out
 
 
 def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:

@@ -9,6 +9,7 @@ FEWEST_LEVELS = 3  # distinct values below which no lattice can be told
 FEWEST_REVISITED = 0.05  # share of the distinct values that a converter shows twice or more
 COARSE = 200  # levels of travel below which even a decimal grid acts as a converter
 JUMP, CALM_CHANGES, LONGEST_EXCURSION = 8.0, 6, 50  # noise levels of a jump; changes on either side that are usual; samples
+ON_LATTICE = 0.18  # of a step by which a gap may miss a multiple of it: a coarse converter behind a fine one of a seventh of its step misses by that
 LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
 
 
@@ -67,7 +68,7 @@ def converter_step(y: np.ndarray) -> float:
     """The step of the lattice that y (N,) lies on, in y's unit; 0.0 when there is none.
 
     The differences between neighbouring distinct values must be whole multiples of one step, exactly or,
-    where values were rounded in print, within an eighth of it. The decimal grid of the print is a
+    where values were rounded in print or by a second converter, within ON_LATTICE of it. The decimal grid of the print is a
     lattice too: it counts only where the travel has fewer than 200 of its steps, for then it hides as
     much as a converter would. Pass values in the unit they were printed in.
     """
@@ -91,7 +92,7 @@ def decimal_grain(levels: np.ndarray) -> float:
 
 
 def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
-    """The largest step that nine in ten differences of the levels are multiples of, within an eighth."""
+    """The largest step that nine in ten differences of the levels are multiples of, within ON_LATTICE."""
     finest = 8 * max(grain, float(np.finfo(np.float32).eps) * np.abs(levels).max())
     gaps = np.diff(levels)
     gaps = gaps[gaps > finest / 8]
@@ -100,7 +101,7 @@ def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
 
 
 def _on_lattice(gaps: np.ndarray, step: float) -> np.ndarray:
-    return np.abs(gaps / step - np.rint(gaps / step)) < 0.125
+    return np.abs(gaps / step - np.rint(gaps / step)) < ON_LATTICE
 
 
 def _refined(gaps: np.ndarray, step: float) -> float:

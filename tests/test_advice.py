@@ -1,11 +1,12 @@
 """What to record next: within the limits, the same every time, and telling what it promises."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from ers_mj.advice import next_recording
+from ers_mj.advice import _widened, next_recording
 from ers_mj.baseline import baseline
 from ers_mj.commands.diagnose import _input_table
 from ers_mj.datasheet import Datasheet
@@ -131,6 +132,14 @@ def test_a_constant_torque_and_coulomb_asymmetry_are_said_to_be_one(pushed):
     assert advice["separates"] == [] and advice["excitation"] == {} and advice["channel"] is None
     assert advice["expected_sigmas"] < 1.5 and "change of the rig" in advice["sentence"]
     assert max(advice["checked"]["against"]["asymmetric_friction"]["channels_sigmas"].values()) < 1.5
+
+
+def test_a_wider_travel_is_told_with_what_to_record_there():
+    limits = SimpleNamespace(low=-0.2, high=0.3)
+    found = SimpleNamespace(cost=8.0, excitation={"kind": "chirp", "from_hz": 1.0, "to_hz": 9.0, "amplitude": 6.0, "offset": 0.0, "duration_s": 7.0, "rate_hz": 500.0})
+    told = _widened("backlash", ["shaft_compliance", "gravity_imbalance"], {"shaft_compliance": found}, limits, {"input_unit": "V", "output_unit": "rad"})
+    assert "record a chirp from 1 to 9 Hz" in told[0] and "at 4 sigmas" in told[0]
+    assert told[1] == "Only a change of the rig can tell backlash and gravity imbalance apart."
 
 
 def test_the_limits_are_kept(late):

@@ -161,12 +161,13 @@ def test_a_growing_file_is_followed_until_ctrl_c(life, tmp_path):
     file, text = tmp_path / "s.csv", csv(life[0], slice(3000))
     file.write_text(text[:1000])
     command = [sys.executable, "-m", "ers_mj", "watch", str(file), "--datasheet", "table1"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                               preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # which a shell's background job would ignore
     with file.open("a") as handle:
         handle.write(text[1000:])
     line = process.stdout.readline()
     process.send_signal(signal.SIGINT)
-    rest, errors = process.communicate()
+    rest, errors = process.communicate(timeout=60)
     assert line.startswith("0.5 s") and "c_2" in line and process.returncode == 0 and errors == ""
 
 

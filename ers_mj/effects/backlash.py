@@ -30,5 +30,12 @@ class Backlash(Transmission):
         return [np.array([part * scales.position, 0.6, 0.2, contact, 0.2])
                 for part in (0.003, 0.01, 0.03, 0.1)]
 
+    def grown(self, name, p, scales):
+        """A twisting shaft is a contact without play: one as wide as the noise lets it be seen."""
+        if name != "shaft_compliance":
+            return []
+        f, zeta, rho, phi = p
+        return [np.array([scales.noise, rho, phi, min(f, 1000.0), max(zeta, 0.05)])]
+
     def coefficients(self, p, c):
         return coupled(c, f=p[3], zeta=p[4], rho=p[1], phi=p[2], gap=p[0])

@@ -183,6 +183,10 @@ class Effect:
         """Parameter vectors (k,) of a visible size from which a fit is begun; empty where the effect cannot apply."""
         raise NotImplementedError
 
+    def grown(self, name: str, p: np.ndarray, scales: Scales) -> list[np.ndarray]:
+        """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of this one."""
+        return []
+
     def coefficients(self, p: np.ndarray, c: Coefficients) -> Coefficients:
         """The plant's coefficients with the effect in place."""
         return c

@@ -16,7 +16,7 @@ class Inductance(Drive):
     sized = 1
 
     def starts(self, scales):
-        return [np.array([2 * scales.sample_time])]
+        return [np.array([times * scales.sample_time]) for times in (2.0, 5.0)]
 
     def coefficients(self, p, c):
         return c._replace(tau_e=c.tau_e + p[0])

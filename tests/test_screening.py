@@ -1,0 +1,51 @@
+"""Which effects are refitted, and from where."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ers_mj.baseline import baseline
+from ers_mj.datasheet import Datasheet
+from ers_mj.effects import BY_NAME
+from ers_mj.identification import residuals
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.recording import from_arrays
+from ers_mj.screening import screen
+from ers_mj.traces import trace_of
+
+T = np.arange(0.0, 3.0, 1e-3)
+TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625}
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    """The refitted baseline of a servo that a torque of 0.05 % of its friction pushes."""
+    traces = []
+    for k, name in enumerate(("multisine", "steps", "chirp")):
+        u = INPUTS[name](T)
+        y = ReducedModel(lumped(TRUTH), [("bias_torque", np.array([0.06]))]).simulate(T, u).measured
+        traces.append(trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+    return baseline(traces, Datasheet(lumped=TRUTH), True, 1)
+
+
+def names(found):
+    return {name for name, _ in found}
+
+
+def test_a_place_far_from_the_data_takes_no_candidate_from_one_near_it(pushed):
+    near, far = pushed.fit.model, replace(pushed.fit.model, values={**pushed.fit.model.values, "b": 60.0})
+    alone, both = (screen(places, pushed.traces, 1.0, (), False, False) for places in ([near], [near, far]))
+    assert "bias_torque" in names(alone) and names(alone) <= names(both)
+    assert all(len(begins) == 2 for name, begins in both if not BY_NAME[name].dear)
+
+
+def test_a_wider_effect_begins_where_its_limit_ended(pushed):
+    model, traces = pushed.fit.model, pushed.traces
+    twisting = np.array([80.0, 0.2, 0.6, 0.2])
+    starts = BY_NAME["backlash"].grown("shaft_compliance", twisting, model.scales)
+    one, other = (residuals(model.with_effect(name, p), traces, 5.0) for name, p in (("shaft_compliance", twisting), ("backlash", starts[0])))
+    apart = np.sqrt(np.mean((one - other) ** 2))
+    assert apart < 0.2 * np.sqrt(np.mean((one - residuals(model, traces, 5.0)) ** 2))
+    assert not BY_NAME["backlash"].grown("bias_torque", np.array([0.5]), model.scales)
