@@ -21,13 +21,13 @@ import numpy as np
 from ers_mj.datasheet import Datasheet
 from ers_mj.identify_figures import progress_figure
 from ers_mj.minimisers import MINIMISERS, Minimum
-from ers_mj.misfit import Misfit, Search
+from ers_mj.identifying.misfit import Misfit, Search
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.recording import from_arrays
 from ers_mj.simulation import simulate_recording
-from ers_mj.structure import Structure
+from ers_mj.identifying.structure import Structure
 from ers_mj.traces import trace_of
-from ers_mj.unknowns import unknowns_of
+from ers_mj.identifying.unknowns import unknowns_of
 
 TABLE_2 = {"L": 0.003, "R": 1.2, "k_s": 0.08, "T_LH": 0.4, "F_c": 0.2, "J": 0.001, "B": 0.006, "K_t": 0.5, "K_e": 0.6}
 PRINTED = {"pso": (33, 27, 25, 37.5, 55, 20, 35, 38, 47), "ga": (33, 15, 37.5, 37.5, 25, 20, 48.3, 24, 25), "iga": (16.7, 7.9, 11.3, 20, 15, 10, 15, 16, 15)}

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from ers_mj.display import SUPERSCRIPT, shown
-from ers_mj.estimate import Identified
+from ers_mj.identifying.answer import Identified
 from ers_mj.figures import AFTER, BEFORE, FAINT, INK, MEASURED, WIDE, both_widths, decimate
-from ers_mj.precision import Profile
+from ers_mj.identifying.precision import Profile
 from ers_mj.traces import Trace
 
 POINTS = {True: 900, False: 450}

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from ers_mj import figures, identify_figures, page
 from ers_mj.display import NONE, figure as digits, pretty, shown
-from ers_mj.estimate import Identified, Row
+from ers_mj.identifying.answer import Identified, Row
 
 HEADS = ("parameter", ">value", ">95 % interval", ">datasheet", "")
 WEAKEST = 4  # digits of a value

@@ -10,15 +10,16 @@ import pytest
 from ers_mj import cli
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.errors import InputError
-from ers_mj.estimate import Settings, identify
-from ers_mj.misfit import forgiven, forgiving
+from ers_mj.identifying.estimate import identify
+from ers_mj.identifying.finding import Settings
+from ers_mj.identifying.misfit import forgiven, forgiving
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped
-from ers_mj.precision import precision_of
+from ers_mj.identifying.precision import precision_of
 from ers_mj.recording import from_arrays, write_recording
 from ers_mj.simulation import build_plant, simulate_recording
-from ers_mj.structure import structure_of
+from ers_mj.identifying.structure import structure_of
 from ers_mj.traces import trace_of
 
 TRUTH = {"L": 0.003, "R": 1.2, "k_s": 0.08, "T_LH": 0.4, "F_c": 0.2, "J": 0.001, "B": 0.006, "K_t": 0.5, "K_e": 0.6, "theta_0": 0.0}
@@ -117,8 +118,8 @@ def test_resampled_and_fisher_widths_agree_on_white_residuals_and_not_on_coloure
 
 
 def test_many_candidates_in_mujoco_are_what_one_is():
-    from ers_mj.rollouts import rollouts
-    from ers_mj.unknowns import unknowns_of
+    from ers_mj.identifying.rollouts import rollouts
+    from ers_mj.identifying.unknowns import unknowns_of
 
     sheet = read_datasheet("table1")
     u = INPUTS["multisine"](T[:300])

@@ -12,7 +12,7 @@ from ers_mj.commands.output import Progress, as_json, bold, plain, write_results
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.estimate import Identified
+    from ers_mj.identifying.answer import Identified
     from ers_mj.recording import Recording
 
 
@@ -47,7 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     if len(arguments.within) != 2 or not arguments.within[0] < 1 < arguments.within[1]:
         raise InputError(f"--within gives {', '.join(f'{x:g}' for x in arguments.within)}, a factor below one and one above it were expected")
     from ers_mj.datasheet import read_datasheet
-    from ers_mj.estimate import Settings, identify
+    from ers_mj.identifying.estimate import identify
+    from ers_mj.identifying.finding import Settings
     from ers_mj.recording import read_recording
 
     settings = Settings(arguments.method, arguments.plant, fixed, bounds, tuple(arguments.within), arguments.evaluations, arguments.polish, arguments.seed, arguments.jobs,

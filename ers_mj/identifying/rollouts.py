@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ers_mj.misfit import Simulator
+from ers_mj.identifying.misfit import Simulator
 from ers_mj.model import observer_gain
 from ers_mj.plants.mechanical import TIMESTEP, MechanicalPlant, simulate_many
 from ers_mj.plants.reduced import Motion, lumped
 from ers_mj.plants.skeletons import bodily
 from ers_mj.traces import Trace
-from ers_mj.unknowns import Unknowns
+from ers_mj.identifying.unknowns import Unknowns
 
 
 def plant_of(unknowns: Unknowns, letters: np.ndarray, is_angle: bool = True, timestep: float = TIMESTEP) -> MechanicalPlant:

@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.identification import residuals
-from ers_mj.structure import Structure, structure_of
+from ers_mj.identifying.structure import Structure, structure_of
 from ers_mj.traces import Blocks, Trace
-from ers_mj.unknowns import Unknowns
+from ers_mj.identifying.unknowns import Unknowns
 
 STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone through before the free run
 IN_PROPORTION = ("B",)
