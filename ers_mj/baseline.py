@@ -144,9 +144,13 @@ def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: b
 
     ``bare`` and ``sprung`` are the scaffolds, names of effects, under which a search without and with springs is tried.
     """
+    if not any(t.u.any() for t in traces):
+        raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
     opened = any(t.enable is not None and not t.enable.all() for t in traces)
     shown = opened or any(c.kind == "current" for t in traces for c in t.channels)
     starts = [{"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known} for g in guesses(traces)]
+    if not starts:
+        raise InputError("the output nowhere moves for long enough to guess parameters from it: a longer or livelier recording, or a datasheet, was expected")
     scales = scales_of(traces, starts[0], is_angle, None)
     at = {"end_stop": BY_NAME["end_stop"].starts(scales)[-1], "asymmetric_friction": BY_NAME["asymmetric_friction"].starts(scales)[0]}
     least = {"a_1": 1e-3 * scales.acceleration / scales.position, "c_1": 0.1 * scales.acceleration}

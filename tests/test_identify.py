@@ -205,3 +205,23 @@ def test_bad_options_are_one_sentence_and_code_2(tmp_path, capsys, options):
     assert cli.main(["identify", str(tmp_path / "rec.csv"), "--datasheet", "table1", *options, "--json"]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("u, options, said", [
+    (0.0, [], "the input is zero throughout"), (None, ["--datasheet", "table1", "--fix", "J=-1"], "negative J"),
+    (None, ["--datasheet", "table1", "--fix", "R=0"], "R = 0"),
+])
+def test_what_no_servo_has_and_what_shows_nothing_are_one_sentence_and_code_2(tmp_path, capsys, u, options, said):
+    columns = dict(simulate_recording(read_datasheet("table1"), T[:700], INPUTS["multisine"](T[:700]), noise=1e-4))
+    if u is not None:
+        columns["u_V"] = np.full(700, u)
+    write_recording(tmp_path / "rec.csv", columns)
+    assert cli.main(["identify", str(tmp_path / "rec.csv"), *options, "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr()
+    assert said in told.err and told.err.count("\n") == 1 and told.out == "" and not (tmp_path / "out").exists()
+
+
+def test_theta_0_that_cannot_be_told_is_no_combination():
+    """Where the rudder is never near theta_0 its bounds, and nothing else, say where it is."""
+    told = rows(identify([record(0.01)], OFF, Settings(bounds={"theta_0": (5.0, 6.0)})))
+    assert not any("theta_0" in name for name in told if name != "theta_0")

@@ -156,7 +156,8 @@ def _rows(search: Search, letters: np.ndarray, precision: Precision, profiles: S
         if powers is not None and np.count_nonzero(powers) > 1:
             known = [sheet.get(name) for name in unknowns.names]
             told = float(np.prod([p**q for p, q in zip(known, powers) if q])) if all(p for p, q in zip(known, powers) if q) else None
-            rows.append(row(label, lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0])), _unit(unknowns.names, powers, y, u), told, unknowns.names[k]))
+            product = lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0]))  # noqa: E731
+            rows.append(row(label, product, _unit(unknowns.names, powers, y, u), told, unknowns.names[k]))
     return rows
 
 
@@ -229,7 +230,8 @@ def _sentence(search: Search, misfit: float, settings: Settings) -> str:
     what = f"{structure.rank} of {len(structure.names)} parameters can be told" if structure.pivots else f"all {structure.rank} parameters can be told"
     said = f"From {'this recording' if count == 1 else f'these {count} recordings'} {what}{' as combinations' if structure.pivots else ''}"
     if misfit > WRONG and settings.method != "ls" and not settings.polish:
-        return f"{said}, but {settings.method} left {math.sqrt(misfit):.2g} times the noise: it stopped short of the best fit, or the model is wrong (--polish tells)."
+        return (f"{said}, but {settings.method} left {math.sqrt(misfit):.2g} times the noise: it stopped short of the best fit, or the model is wrong "
+                "(--polish tells).")
     if misfit > WRONG:
         return f"{said}, but the model is wrong: what it leaves is {math.sqrt(misfit):.2g} times the noise. `ers diagnose` looks for what is missing."
     return f"{said}; the model explains what was recorded within its noise."

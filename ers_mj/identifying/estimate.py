@@ -27,7 +27,8 @@ FIRST = 4  # samples that tell whether a recording starts at rest
 Progress = Callable[[str, float], None]
 
 
-def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, settings: Settings = Settings(), progress: Progress = lambda text, share: None) -> Identified:
+def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, settings: Settings = Settings(),
+             progress: Progress = lambda text, share: None) -> Identified:
     """Identify a servo from recordings.
 
     Args:
@@ -53,6 +54,8 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
     simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad", settings.timestep) if settings.plant == "mujoco" else None
     x, search, minimum, used = found_by(search, settings, simulate)
     again = structure_at(unknowns, traces, search.letters(x), scale)
+    if not again.rank:
+        raise InputError("where the model comes nearest to these recordings no parameter shows: check that the input is the one that moved the output")
     if again.rank > search.structure.rank:  # the reference was a place where less can be told
         before = used
         x, search, minimum, used = found_by(replace(search, structure=again, traces=traces), settings, simulate)

@@ -19,7 +19,7 @@ from ers_mj.traces import Trace
 BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is asked for
 MOST_PLACES = 8  # beside the reference, at which the rank is looked for
 SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
-FOLLOWED = (60.0, 30.0)  # [1/s] observer rates of the polish in MuJoCo: of the reduced model's and MuJoCo's own, then of the last, by which the answer is judged
+FOLLOWED = (60.0, 30.0)  # [1/s] observer rates of the polish in MuJoCo; the answer is judged by the last
 POLISH_BUDGET, POLISHES, POLISH_WORTH = 200, 4, 1e-4  # the last: share of the value that another polish must have been worth
 
 

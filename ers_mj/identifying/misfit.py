@@ -74,7 +74,7 @@ class Search:
 
     def coordinates(self, letters: np.ndarray) -> np.ndarray:
         """Of letters (k,): the combinations' coordinates, wherever the pivots are; the starts at 0."""
-        ratio = {k: math.log(letters[k] / self.unknowns.reference[k]) for k in range(len(letters)) if self.unknowns.names[k] != "theta_0"}
+        ratio = [0.0 if name == "theta_0" else math.log(letters[k] / self.unknowns.reference[k]) for k, name in enumerate(self.unknowns.names)]
         out = []
         for k, name in zip(self.structure.kept, self.names):
             if name == "theta_0":
@@ -101,7 +101,7 @@ class Search:
                 continue
             low, high = (math.log(max(x[k] / u.reference[k], 1e-6)) for x in ((u.lower, u.upper) if u.reference[k] > 0 else (u.upper, u.lower)))
             for row, p in zip(self._powers, self.structure.pivots):
-                if u.names[p] not in u.bounded:
+                if u.names[p] not in u.bounded or u.names[p] == "theta_0":
                     continue
                 reach = sorted(-row[k] * math.log(max(x[p] / u.reference[p], 1e-6)) for x in (u.lower, u.upper))
                 low, high = low + reach[0], high + reach[1]

@@ -125,7 +125,8 @@ def profile(objective, slopes: np.ndarray, x: np.ndarray, k: int, name: str, hal
             at = float(np.clip(x[k] + way * share * half * inflation, lower[k], upper[k]))
             if at in places:
                 break
-            found = LS(attempts=1, staged=False, gain=1e-7).minimise(Pinned(objective, slopes, k, at), lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest)
+            held = Pinned(objective, slopes, k, at)
+            found = LS(attempts=1, staged=False, gain=1e-7).minimise(held, lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest)
             places.append(at)
             rises.append(max(found.value - least, 0.0))
             rest = found.x

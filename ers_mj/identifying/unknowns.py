@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.baseline import opening
-from ers_mj.datasheet import LUMPED, Datasheet
+from ers_mj.datasheet import LUMPED, Datasheet, refuse_impossible
 from ers_mj.errors import InputError
 from ers_mj.model import BASE, Model
 from ers_mj.traces import Trace
@@ -88,6 +88,8 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
         InputError: a name that cannot be searched here, or bounds without what is fixed or known.
     """
     _refuse_unknown({**fixed, **bounds})
+    for name, x in fixed.items():
+        refuse_impossible(name, x, "--fix")
     both = fixed.keys() & bounds.keys()
     if both:
         raise InputError(f"{sorted(both)[0]} is fixed and has bounds, one of both was expected")
