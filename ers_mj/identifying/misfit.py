@@ -92,7 +92,7 @@ class Search:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Those of the combinations (r,): the letters' own, wider by those of the pivots whose bounds the user gave."""
+        """Those of the combinations (r,): the letters' own and the pivots' together."""
         u = self.unknowns
         ends = []
         for k, name in zip(self.structure.kept, self.names):
@@ -101,7 +101,7 @@ class Search:
                 continue
             low, high = (math.log(max(x[k] / u.reference[k], 1e-6)) for x in ((u.lower, u.upper) if u.reference[k] > 0 else (u.upper, u.lower)))
             for row, p in zip(self._powers, self.structure.pivots):
-                if u.names[p] not in u.bounded or u.names[p] == "theta_0":
+                if u.names[p] == "theta_0":
                     continue
                 reach = sorted(-row[k] * math.log(max(x[p] / u.reference[p], 1e-6)) for x in (u.lower, u.upper))
                 low, high = low + reach[0], high + reach[1]

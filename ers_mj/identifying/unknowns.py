@@ -38,7 +38,6 @@ class Unknowns:
         lower, upper: (k,) bounds.
         known: the letters that are held, n among them.
         fixed: which of these the user fixed.
-        bounded: the letters whose bounds the user gave; those of the others bound combinations of them just as well.
         is_lumped: whose letters they are.
     """
 
@@ -48,7 +47,6 @@ class Unknowns:
     upper: np.ndarray
     known: Mapping[str, float]
     fixed: tuple[str, ...]
-    bounded: tuple[str, ...]
     is_lumped: bool
 
     def drawn(self, random: np.random.Generator) -> np.ndarray:
@@ -126,7 +124,7 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
     if not names:
         raise InputError("every letter is fixed, there is nothing to identify")
     held = {name: x for name, x in known.items() if name not in names}
-    return Unknowns(tuple(names), reference, lower, upper, held, tuple(fixed), tuple(bounds), is_lumped)
+    return Unknowns(tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped)
 
 
 def _matters(name: str, traces: Sequence[Trace], known: Mapping[str, float], is_lumped: bool) -> bool:
