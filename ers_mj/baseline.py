@@ -20,6 +20,7 @@ from ers_mj.traces import Trace
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
 OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
+OPENING_RENEWALS = 3  # Jacobians of a fit that a search goes on from anyhow
 STARTS = 6  # guesses that are refitted
 VALLEY = 10.0  # of C by which two fits differ that ended in different valleys
 SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
@@ -74,7 +75,7 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
 
 def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:
     """Eq. (6)'s letters from recordings alone, with the springs that these support: near enough for a search to begin, not refined."""
-    return dict(_structured(traces, {}, is_angle, ((),), ((),)).model.values)
+    return dict(_structured(traces, {}, is_angle, ((),), ((),), OPENING_RENEWALS).model.values)
 
 
 def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace], list[Mapping[str, float]]]:
@@ -139,10 +140,11 @@ def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle:
     return Start(found, traces, (*((dict(chosen.model.values),) if chosen.model.effects else ()), *others))
 
 
-def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, bare: Scaffolds, sprung: Scaffolds) -> Fit:
+def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, bare: Scaffolds, sprung: Scaffolds,
+                renewals: float = math.inf) -> Fit:
     """The fit from guesses alone without springs, with a spring or with a preload beside it, whichever is the simplest that the data supports.
 
-    ``bare`` and ``sprung`` are the scaffolds, names of effects, under which a search without and with springs is tried.
+    ``bare`` and ``sprung`` are the scaffolds, names of effects, under which a search without and with springs is tried; ``renewals`` is that of ``fit``.
     """
     if not any(t.u.any() for t in traces):
         raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
@@ -155,9 +157,9 @@ def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: b
     at = {"end_stop": BY_NAME["end_stop"].starts(scales)[-1], "asymmetric_friction": BY_NAME["asymmetric_friction"].starts(scales)[0]}
     least = {"a_1": 1e-3 * scales.acceleration / scales.position, "c_1": 0.1 * scales.acceleration}
     bare, sprung = ([tuple((name, at[name]) for name in names) for names in scaffolds] for scaffolds in (bare, sprung))
-    best = {"bare": _searched(traces, starts, scales, (), {}, bare),
-            "spring": _searched(traces, starts, scales, ("a_1",), least, sprung),
-            "preload": _searched(traces, starts, scales, ("a_1", "c_1"), least, sprung)}
+    best = {"bare": _searched(traces, starts, scales, (), {}, bare, renewals),
+            "spring": _searched(traces, starts, scales, ("a_1",), least, sprung, renewals),
+            "preload": _searched(traces, starts, scales, ("a_1", "c_1"), least, sprung, renewals)}
     chosen, price = best["bare"], SUPPORT * best["bare"].misfit.size
     for kind in ("spring", "preload"):
         if chosen.cost - best[kind].cost > price:
@@ -165,7 +167,7 @@ def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: b
     return chosen
 
 
-def _searched(traces, starts, scales, springs, least, scaffolds) -> Fit:
+def _searched(traces, starts, scales, springs, least, scaffolds, renewals) -> Fit:
     """The best of the guesses with these spring terms, under the scaffold that serves it best: of the two that open best, where there are scaffolds."""
     def prepared(values):
         absent = {name: 0.0 for name in ("a_1", "c_1") if name not in springs}
@@ -180,5 +182,5 @@ def _searched(traces, starts, scales, springs, least, scaffolds) -> Fit:
             model = Model(values, _free(values, traces), effects=effects, scales=scales)
             tries.append(descend(model, traces, OPENING_RATES[0], 1e3, 6, 1.0))
     tries.sort(key=lambda f: f.cost)
-    finals = [fit(f.model, traces, rate=OPENING_RATES[1], steps=10) for f in tries[:2]]
+    finals = [fit(f.model, traces, rate=OPENING_RATES[1], steps=10, renewals=renewals) for f in tries[:2]]
     return min(finals, key=lambda f: f.cost)

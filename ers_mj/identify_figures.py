@@ -55,6 +55,8 @@ def progress_figure(traces: Mapping[str, Sequence[np.ndarray]], width: float) ->
     for k, (method, runs) in enumerate(traces.items()):
         levels = np.array([run[np.maximum(np.searchsorted(run[:, 0], grid, side="right") - 1, 0), 1] for run in runs])
         ax.loglog(grid, np.maximum(np.median(levels, axis=0), 1e-30), color=SHADES[k % len(SHADES)], label=method)
+    low, high = (math.log10(x) for x in ax.get_ylim())
+    ax.set_ylim(10.0 ** math.floor(low), 10.0 ** math.ceil(high))
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter(_power)
         axis.set_minor_formatter(NullFormatter())
