@@ -15,7 +15,8 @@ import time
 import numpy as np
 
 from ers_mj.datasheet import Datasheet, read_datasheet
-from ers_mj.estimate import Settings, identify
+from ers_mj.identifying.estimate import identify
+from ers_mj.identifying.finding import Settings
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped

@@ -18,7 +18,8 @@ import numpy as np
 from ers_mj.controllers import Gains, Servo
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.errors import InputError
-from ers_mj.estimate import Settings, identify
+from ers_mj.identifying.estimate import identify
+from ers_mj.identifying.finding import Settings
 from ers_mj.gains import conditions, search
 from ers_mj.measures import settling_time
 from ers_mj.plants.inputs import INPUTS

@@ -20,9 +20,12 @@ from ers_mj.traces import Trace
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
 OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
+OPENING_RENEWALS = 3  # Jacobians of a fit that a search goes on from anyhow
 STARTS = 6  # guesses that are refitted
 VALLEY = 10.0  # of C by which two fits differ that ended in different valleys
 SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
+
+Scaffolds = tuple[tuple[str, ...], ...]
 
 
 def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bool, tau_e: float | None) -> Scales:
@@ -68,6 +71,11 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
     if not np.isfinite(found.fit.cost):
         raise InputError("no motion that the reduced model can make resembles these recordings: check units and signs of input and output")
     return found
+
+
+def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:
+    """Eq. (6)'s letters from recordings alone, with the springs that these support: near enough for a search to begin, not refined."""
+    return dict(_structured(traces, {}, is_angle, ((),), ((),), OPENING_RENEWALS).model.values)
 
 
 def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace], list[Mapping[str, float]]]:
@@ -126,27 +134,41 @@ def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle:
     Stops and one-sided friction disturb the search most, so both are tried as a scaffold that is taken away at the end: a spring
     must beat one-sided friction to be kept, and what was found under the scaffold stays as an anchor for later fits.
     """
-    opened = any(t.enable is not None and not t.enable.all() for t in traces)
-    shown = opened or any(c.kind == "current" for t in traces for c in t.channels)
-    starts = [{"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known} for g in guesses(traces)]
-    scales = scales_of(traces, starts[0], is_angle, None)
-    stops = ("end_stop", BY_NAME["end_stop"].starts(scales)[-1])
-    sided = ("asymmetric_friction", BY_NAME["asymmetric_friction"].starts(scales)[0])
-    least = {"a_1": 1e-3 * scales.acceleration / scales.position, "c_1": 0.1 * scales.acceleration}
-    best = {"bare": _searched(traces, starts, scales, (), {}, ((), (stops,), (sided,))),
-            "spring": _searched(traces, starts, scales, ("a_1",), least, ((), (stops,))),
-            "preload": _searched(traces, starts, scales, ("a_1", "c_1"), least, ((), (stops,)))}
-    chosen, price = best["bare"], SUPPORT * best["bare"].misfit.size
-    for kind in ("spring", "preload"):
-        if chosen.cost - best[kind].cost > price:
-            chosen = best[kind]
+    chosen = _structured(traces, known, is_angle, ((), ("end_stop",), ("asymmetric_friction",)), ((), ("end_stop",)))
     scales = scales_of(traces, chosen.model.values, is_angle, None)
     found, traces, others = _refined(replace(chosen.model, effects=(), scales=scales), traces, jobs)
     return Start(found, traces, (*((dict(chosen.model.values),) if chosen.model.effects else ()), *others))
 
 
-def _searched(traces, starts, scales, springs, least, scaffolds) -> Fit:
-    """The best of the guesses with these spring terms, under the scaffold that serves it best."""
+def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, bare: Scaffolds, sprung: Scaffolds,
+                renewals: float = math.inf) -> Fit:
+    """The fit from guesses alone without springs, with a spring or with a preload beside it, whichever is the simplest that the data supports.
+
+    ``bare`` and ``sprung`` are the scaffolds, names of effects, under which a search without and with springs is tried; ``renewals`` is that of ``fit``.
+    """
+    if not any(t.u.any() for t in traces):
+        raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
+    opened = any(t.enable is not None and not t.enable.all() for t in traces)
+    shown = opened or any(c.kind == "current" for t in traces for c in t.channels)
+    starts = [{"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known} for g in guesses(traces)]
+    if not starts:
+        raise InputError("the output nowhere moves for long enough to guess parameters from it: a longer or livelier recording, or a datasheet, was expected")
+    scales = scales_of(traces, starts[0], is_angle, None)
+    at = {"end_stop": BY_NAME["end_stop"].starts(scales)[-1], "asymmetric_friction": BY_NAME["asymmetric_friction"].starts(scales)[0]}
+    least = {"a_1": 1e-3 * scales.acceleration / scales.position, "c_1": 0.1 * scales.acceleration}
+    bare, sprung = ([tuple((name, at[name]) for name in names) for names in scaffolds] for scaffolds in (bare, sprung))
+    best = {"bare": _searched(traces, starts, scales, (), {}, bare, renewals),
+            "spring": _searched(traces, starts, scales, ("a_1",), least, sprung, renewals),
+            "preload": _searched(traces, starts, scales, ("a_1", "c_1"), least, sprung, renewals)}
+    chosen, price = best["bare"], SUPPORT * best["bare"].misfit.size
+    for kind in ("spring", "preload"):
+        if chosen.cost - best[kind].cost > price:
+            chosen = best[kind]
+    return chosen
+
+
+def _searched(traces, starts, scales, springs, least, scaffolds, renewals) -> Fit:
+    """The best of the guesses with these spring terms, under the scaffold that serves it best: of the two that open best, where there are scaffolds."""
     def prepared(values):
         absent = {name: 0.0 for name in ("a_1", "c_1") if name not in springs}
         if not springs:
@@ -160,5 +182,5 @@ def _searched(traces, starts, scales, springs, least, scaffolds) -> Fit:
             model = Model(values, _free(values, traces), effects=effects, scales=scales)
             tries.append(descend(model, traces, OPENING_RATES[0], 1e3, 6, 1.0))
     tries.sort(key=lambda f: f.cost)
-    finals = [fit(f.model, traces, rate=OPENING_RATES[1], steps=10) for f in tries[:2]]
+    finals = [fit(f.model, traces, rate=OPENING_RATES[1], steps=10, renewals=renewals) for f in tries[:2]]
     return min(finals, key=lambda f: f.cost)

@@ -154,11 +154,16 @@ def _section(document: dict, section: str, known: Iterable[str], path: Path) -> 
     where = f"{path}: [{section}]"
     numbers = _numbers(document.get(section, {}), where, known)
     for key, x in numbers.items():
-        if x < 0 and key not in SIGNED:
-            raise InputError(f"{where} has the negative {key} = {x:g}, zero or more was expected")
-        if x == 0 and key in NEVER_ZERO:
-            raise InputError(f"{where} has {key} = 0, which no servo has")
+        refuse_impossible(key, x, where)
     return numbers
+
+
+def refuse_impossible(key: str, x: float, where: str) -> None:
+    """Raise InputError where no servo has this value of a key."""
+    if x < 0 and key not in SIGNED:
+        raise InputError(f"{where} has the negative {key} = {x:g}, zero or more was expected")
+    if x == 0 and key in NEVER_ZERO:
+        raise InputError(f"{where} has {key} = 0, which no servo has")
 
 
 def _entries(document: dict, path: Path) -> list:

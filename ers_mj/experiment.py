@@ -42,7 +42,8 @@ GRADIENT = 1e-5  # step in z of a wanted number's gradient
 TOLD: Mapping[str, tuple[str, Callable[[Mapping[str, float]], float]]] = {  # meaning, and value of what may be wanted
     "a_1": ("k_s/J", lambda v: v["a_1"]), "a_2": ("damping of Eq. (6)", lambda v: v["a_2"]), "b": ("n K_t/(J R)", lambda v: v["b"]),
     "c_1": ("T_LH/J", lambda v: v["c_1"]), "c_2": ("F_c/J", lambda v: v["c_2"]), "theta_0": ("home", lambda v: v["theta_0"]),
-    "tau_e": ("L/R", lambda v: v["tau_e"]), "B": ("B/J", lambda v: v["a_2"] * (1 - v["emf_share"])), "K_e": ("n K_e", lambda v: v["a_2"] * v["emf_share"] / v["b"]),
+    "tau_e": ("L/R", lambda v: v["tau_e"]), "B": ("B/J", lambda v: v["a_2"] * (1 - v["emf_share"])),
+    "K_e": ("n K_e", lambda v: v["a_2"] * v["emf_share"] / v["b"]),
     "K_t": ("n K_t/J", lambda v: v["ampere"]), "R": ("R", lambda v: v["ampere"] / v["b"]),
 }
 NEEDS = {"tau_e": "tau_e", "B": "emf_share", "K_e": "emf_share", "K_t": "ampere", "R": "ampere"}  # the number that must be free
@@ -137,7 +138,8 @@ class Question:
         for _ in range(SECANTS):
             size, axes = np.linalg.eigh(_inverse(self._trimmed(self._blocks(jacobian))))
             reach = axes * np.sqrt(size)
-            ends = [[np.nan_to_num(residuals(self.model.at(layout, z + way * row), [trace], OBSERVER_RATE), posinf=0.0, neginf=0.0) for way in (-1, 1)] for row in reach.T]
+            ends = [[np.nan_to_num(residuals(self.model.at(layout, z + way * row), [trace], OBSERVER_RATE), posinf=0.0, neginf=0.0) for way in (-1, 1)]
+                    for row in reach.T]
             jacobian = np.column_stack([0.5 * (after - before) for before, after in ends]) @ np.linalg.inv(reach)
         return self._blocks(jacobian)
 
@@ -237,8 +239,8 @@ def planned(question: Question, before: Plan, progress: Callable[[str, float], N
         if tried:
             break
     if not tried:
-        raise InputError(f"every input that was tried leaves the travel of {math.degrees(limits.low):.4g} .. {math.degrees(limits.high):.4g} deg: more travel or "
-                         "less voltage was expected")
+        raise InputError(f"every input that was tried leaves the travel of {math.degrees(limits.low):.4g} .. {math.degrees(limits.high):.4g} deg: "
+                         "more travel or less voltage was expected")
     order = _distinct(tried)
     if all(x > UNSEEN for name, x in order[0].spread.items() if name != "theta_0" or len(order[0].spread) == 1):
         raise InputError("no input within these limits moves the servo so that anything of what is wanted shows: more voltage or travel was expected")
@@ -279,7 +281,8 @@ def _named(limits: Limits, shares: Sequence[float]) -> list[list[dict]]:
     """The package's named inputs at their own amplitude and at every share of the rig's."""
     half = 0.5 * (limits.high_u - limits.low_u)
     return [[{"kind": "named", "name": name, "amplitude": x, "offset": 0.0, "peak_u": x, "duration_s": limits.duration, "lead_s": 0.0,
-              "rate_hz": limits.rate_hz, "start": limits.start} for x in sorted({min(_peak(name), half), *(share * half for share in shares)})] for name in INPUTS]
+              "rate_hz": limits.rate_hz, "start": limits.start} for x in sorted({min(_peak(name), half), *(share * half for share in shares)})]
+            for name in INPUTS]
 
 
 def _refined(question: Question, plan: Plan) -> Plan:

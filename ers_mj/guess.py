@@ -19,6 +19,7 @@ WINDOWS = (0.1, 0.3, 1.0)  # [s], never shorter than SHORTEST samples
 SHORTEST = 16
 EDGE = 0.02  # share of the travel next to its ends that is left out: a stop may act there
 PLACES = np.linspace(0.05, 0.95, 13)  # quantiles of the output at which theta_0 is tried
+FASTEST = 1e4  # [1/s] acceleration by the largest input over the speeds that are met: what makes more was guessed from no input at all
 
 
 def _rows(trace: Trace, window: float, still: float):
@@ -49,7 +50,7 @@ def _rows(trace: Trace, window: float, still: float):
 
 
 def guesses(traces: Sequence[Trace]) -> list[dict[str, float]]:
-    """Starting values of Eq. (6), best regression first, with and without spring and preload."""
+    """Starting values of Eq. (6), best regression first, with and without spring and preload; none of an absurd gain."""
     y = np.concatenate([t.y[t.valid] for t in traces])
     speed = np.concatenate([np.abs(np.diff(savgol_filter(t.y[t.valid], 9, 2))) / t.sample_time for t in traces])
     still = max(0.02 * float(np.quantile(speed, 0.98)), 1e-12)
@@ -62,9 +63,11 @@ def guesses(traces: Sequence[Trace]) -> list[dict[str, float]]:
         columns = np.vstack([r[1] for r in rows])
         for theta_0 in (None, *np.quantile(y, PLACES)):
             for spring in (False, True) if theta_0 is None else (True,):
-                found.append(_solve(right, columns, rows, theta_0, spring, float(np.median(y))))
+                with np.errstate(all="ignore"):  # of a constant input next to nothing follows
+                    found.append(_solve(right, columns, rows, theta_0, spring, float(np.median(y))))
     found.sort(key=lambda item: item[0])
-    return [values for _, values in found]
+    most, peak = FASTEST * float(np.quantile(speed, 0.98)), max(float(np.max(np.abs(t.u))) for t in traces)
+    return [values for _, values in found if abs(values["b"]) * peak <= most]
 
 
 def _solve(right, columns, rows, theta_0, spring, middle):

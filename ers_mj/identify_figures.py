@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
-from ers_mj.display import shown
-from ers_mj.estimate import Identified
+from ers_mj.display import SUPERSCRIPT, shown
+from ers_mj.identifying.answer import Identified
 from ers_mj.figures import AFTER, BEFORE, FAINT, INK, MEASURED, WIDE, both_widths, decimate
-from ers_mj.precision import Profile
+from ers_mj.identifying.precision import Profile
 from ers_mj.traces import Trace
 
 POINTS = {True: 900, False: 450}
@@ -54,10 +55,20 @@ def progress_figure(traces: Mapping[str, Sequence[np.ndarray]], width: float) ->
     for k, (method, runs) in enumerate(traces.items()):
         levels = np.array([run[np.maximum(np.searchsorted(run[:, 0], grid, side="right") - 1, 0), 1] for run in runs])
         ax.loglog(grid, np.maximum(np.median(levels, axis=0), 1e-30), color=SHADES[k % len(SHADES)], label=method)
+    low, high = (math.log10(x) for x in ax.get_ylim())
+    ax.set_ylim(10.0 ** math.floor(low), 10.0 ** math.ceil(high))
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter(_power)
+        axis.set_minor_formatter(NullFormatter())
     ax.set_xlabel("evaluations")
     ax.set_ylabel("fitness, Eq. (13) [rad² s]")
     ax.legend(loc="lower left", fontsize=8)
     return figure
+
+
+def _power(x: float, place: int) -> str:
+    """The label of a power of ten."""
+    return f"10{f'{math.log10(x):.0f}'.translate(SUPERSCRIPT)}"
 
 
 def profiles(found: Sequence[Profile]) -> str | None:

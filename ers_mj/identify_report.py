@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from ers_mj import figures, identify_figures, page
 from ers_mj.display import NONE, figure as digits, pretty, shown
-from ers_mj.estimate import Identified, Row
+from ers_mj.identifying.answer import Identified, Row
 
 HEADS = ("parameter", ">value", ">95 % interval", ">datasheet", "")
 WEAKEST = 4  # digits of a value
@@ -35,8 +35,8 @@ def _header(document: Mapping, found: Identified, kind: str) -> str:
 
 def _parameters(found: Identified) -> str:
     rows = [(_cells(row), "" if row.identifiable else "untold") for row in found.rows]
-    lead = ("Intervals: the wider of Fisher's information and resampled pieces of the recordings; for what is weak the profile likelihood. A letter that the recordings cannot "
-            "tell has no number, the combination that they can has a row of its own.")
+    lead = ("Intervals: the wider of Fisher's information and resampled pieces of the recordings; for what is weak the profile likelihood. "
+            "A letter that the recordings cannot tell has no number, the combination that they can has a row of its own.")
     return page.section("Parameters", lead, page.table(HEADS, rows))
 
 
@@ -48,7 +48,8 @@ def _cells(row: Row) -> tuple[str, ...]:
 
     low, high = row.ci95
     label = unit.label if unit else pretty(row.unit)
-    return (f"{page.text(row.name)} <span class=\"why\">{page.text(label)}</span>", number(row.value), NONE if low is None else f"{number(low)} … {number(high)}",
+    ends = NONE if low is None else f"{number(low)} … {number(high)}"
+    return (f"{page.text(row.name)} <span class=\"why\">{page.text(label)}</span>", number(row.value), ends,
             number(row.datasheet), f'<span class="why">{page.text(row.why)}</span>')
 
 
@@ -59,8 +60,9 @@ def _recording(found: Identified, k: int, unit: str) -> str:
 
 def _search(found: Identified) -> str:
     drawn = page.figure(identify_figures.descent(found), f"The search by {page.text(found.settings.method)}: {found.minimum.evaluations} evaluations.")
-    return page.section("Search", "", drawn + page.figure(identify_figures.profiles(found.profiles), "Profiles: the misfit where one parameter is held and all others are fitted again; "
-                                                          "dashed the 95 % level."))
+    weak = page.figure(identify_figures.profiles(found.profiles),
+                       "Profiles: the misfit where one parameter is held and all others are fitted again; dashed the 95 % level.")
+    return page.section("Search", "", drawn + weak)
 
 
 def _footer(document: Mapping) -> str:

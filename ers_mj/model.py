@@ -26,6 +26,12 @@ FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing
 CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 
 
+def observer_gain(rate: float, sample_time: float) -> tuple[float, int]:
+    """(gain, every) of the observer that follows a measurement at this rate [1/s]: one sample in ``every`` is followed by the share ``gain``."""
+    every = max(1, round(OBSERVER_STEP / sample_time))
+    return 1.0 - math.exp(-rate * every * sample_time), every
+
+
 @dataclass(frozen=True)
 class Free:
     """One fitted number: where it lives, how it is transformed and bounded."""
@@ -262,8 +268,7 @@ class Model:
 
     def staged(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
         """The plant of a recording, and how it is run along it."""
-        every = max(1, round(OBSERVER_STEP / trace.sample_time))
-        gain, shift, plant = 1.0 - math.exp(-rate * every * trace.sample_time), self.offset(record), self.plant(record)
+        (gain, every), shift, plant = observer_gain(rate, trace.sample_time), self.offset(record), self.plant(record)
         theta, omega = trace.start if start is None else start
         drive = 0.0 if omega == 0 else plant.coefficients.b * trace.u[0] - plant.coefficients.a_emf * omega
         return plant, {"start": (theta - shift, omega, drive), "enable": trace.enable, "load": trace.load,

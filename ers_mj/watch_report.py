@@ -30,8 +30,9 @@ def events(last: Estimate | None, now: Estimate, shown: Mapping[str, tuple[str, 
         share = f" ({100 * (after / before - 1):+.0f} %)" if name != "theta_0" else ""
         out.append(f"{MEANING[name]} {name} has changed from {figure(before * factor, 4)} to {figure(after * factor, 4)} {unit}{share}")
     if now.flag and not (last and last.flag):
-        out.append(f"FLAG: for {now.unexplained:.1f} s no parameters of this model have explained the stream, {math.sqrt(max(now.misfit, 0)):.1f} times the noise is left; "
-                   "something is in the servo that the model has not (record it, and ask ers diagnose)")
+        out.append(f"FLAG: for {now.unexplained:.1f} s no parameters of this model have explained the stream, "
+                   f"{math.sqrt(max(now.misfit, 0)):.1f} times the noise is left; something is in the servo that the model has not "
+                   "(record it, and ask ers diagnose)")
     if last and last.flag and not now.flag:
         out.append("the model explains the stream again")
     return out
@@ -58,7 +59,8 @@ def _interval(now: Estimate, name: str) -> list[float]:
     return sorted((x * math.exp(-min(half, 50.0)), x * math.exp(min(half, 50.0))))
 
 
-def screen(name: str, history: Sequence[Estimate], told: Sequence[str], first: Mapping[str, float], shown: Mapping[str, tuple[str, float]], width: int) -> list[str]:
+def screen(name: str, history: Sequence[Estimate], told: Sequence[str], first: Mapping[str, float], shown: Mapping[str, tuple[str, float]],
+           width: int) -> list[str]:
     """The live view: state, parameters with what they were lately, events; lines of at most ``width`` characters without their colours."""
     now = history[-1]
     if now.flag:

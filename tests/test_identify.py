@@ -10,12 +10,16 @@ import pytest
 from ers_mj import cli
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.errors import InputError
-from ers_mj.estimate import Settings, identify
+from ers_mj.identifying.estimate import identify
+from ers_mj.identifying.finding import Settings
+from ers_mj.identifying.misfit import forgiven, forgiving
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.precision import precision_of
+from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.reduced import lumped
+from ers_mj.identifying.precision import precision_of
 from ers_mj.recording import from_arrays, write_recording
 from ers_mj.simulation import build_plant, simulate_recording
-from ers_mj.structure import structure_of
+from ers_mj.identifying.structure import structure_of
 from ers_mj.traces import trace_of
 
 TRUTH = {"L": 0.003, "R": 1.2, "k_s": 0.08, "T_LH": 0.4, "F_c": 0.2, "J": 0.001, "B": 0.006, "K_t": 0.5, "K_e": 0.6, "theta_0": 0.0}
@@ -114,8 +118,8 @@ def test_resampled_and_fisher_widths_agree_on_white_residuals_and_not_on_coloure
 
 
 def test_many_candidates_in_mujoco_are_what_one_is():
-    from ers_mj.rollouts import rollouts
-    from ers_mj.unknowns import unknowns_of
+    from ers_mj.identifying.rollouts import rollouts
+    from ers_mj.identifying.unknowns import unknowns_of
 
     sheet = read_datasheet("table1")
     u = INPUTS["multisine"](T[:300])
@@ -124,8 +128,46 @@ def test_many_candidates_in_mujoco_are_what_one_is():
     traces = [replace(traces[0], start=(sheet.parameters["theta_0"], 0.0))]
     unknowns = unknowns_of(traces, sheet, {"L": 0.0}, {})
     candidates = [unknowns.reference, 1.1 * unknowns.reference]
-    both, alone = rollouts(2)(unknowns, candidates, traces), [rollouts(1)(unknowns, [c], traces)[0] for c in candidates]
+    both, alone = rollouts(2)(unknowns, candidates, traces, 0.0), [rollouts(1)(unknowns, [c], traces, 0.0)[0] for c in candidates]
     assert np.allclose(both, alone, atol=1e-6) and np.abs(both[0]).max() < np.abs(both[1]).max()
+
+
+def test_an_observer_in_mujoco_changes_nothing_where_it_is_right_and_comes_back_where_it_is_not():
+    plant, t = build_plant(read_datasheet("table1"), plant="mujoco"), T[:400]
+    u = INPUTS["multisine"](t)
+    free, start = plant.simulate(t, u).theta, read_datasheet("table1").parameters["theta_0"]
+    assert np.abs(plant.simulate(t, u, y=free, gain=0.3, every=5).theta - free).max() < 1e-12
+    off = plant.simulate(t, u, (start - 0.05, 0.0), y=free, gain=0.3, every=5).theta - free
+    assert abs(off[0]) > 0.04 and np.abs(off[200:]).max() < 2e-3
+
+
+def test_forgiving_blocks_keeps_the_slope_of_the_sum_that_it_makes():
+    trace, random = trace_of(record(0.01), None), np.random.default_rng(0)
+    e, direction = random.standard_normal(trace.rows) * (1 + 30 * (trace.block == 3)), random.standard_normal(trace.rows)
+    made = forgiving(e, [trace])
+    slope = 2 * made @ (forgiven(made, [trace]) * direction)
+    ahead, behind = (np.sum(forgiving(e + way * 1e-5 * direction, [trace]) ** 2) for way in (1, -1))
+    assert slope == pytest.approx((ahead - behind) / 2e-5, rel=1e-5)
+    assert np.sum(made[trace.block == 3] ** 2) < 0.02 * np.sum(e[trace.block == 3] ** 2)
+
+
+def test_five_parameters_of_a_mujoco_plant():
+    """Within twice their intervals; and with a play, which the plant that is fitted has not, the model is wrong."""
+    t, step = np.arange(4000) / 2e3, 5e-4
+    u, true = INPUTS["multisine"](t), read_datasheet("table1").to_lumped()
+    begin = Datasheet(lumped={name: x * (1.0 if name == "theta_0" else 1.3) for name, x in true.items()})
+    settings = Settings(plant="mujoco", fixed={"theta_0": true["theta_0"]}, timestep=step)
+    said = []
+    for gap in (0.0, math.radians(0.5)):
+        plant = MechanicalPlant(lumped(true), gap=gap, timestep=step)
+        y = plant.simulate(t, u).theta + math.radians(0.01) * np.random.default_rng(1).standard_normal(t.size)
+        said.append(identify([from_arrays(t, u, y)], begin, settings))
+    assert said[0].explains
+    for name in ("a_2", "b", "c_1", "c_2"):
+        row = rows(said[0])[name]
+        half = 0.5 * (row.ci95[1] - row.ci95[0])
+        assert abs(row.value - true[name]) < 2 * half < 0.05 * true[name]
+    assert not said[1].explains
 
 
 @pytest.mark.parametrize("settings, said", [
@@ -163,3 +205,23 @@ def test_bad_options_are_one_sentence_and_code_2(tmp_path, capsys, options):
     assert cli.main(["identify", str(tmp_path / "rec.csv"), "--datasheet", "table1", *options, "--json"]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("u, options, said", [
+    (0.0, [], "the input is zero throughout"), (None, ["--datasheet", "table1", "--fix", "J=-1"], "negative J"),
+    (None, ["--datasheet", "table1", "--fix", "R=0"], "R = 0"),
+])
+def test_what_no_servo_has_and_what_shows_nothing_are_one_sentence_and_code_2(tmp_path, capsys, u, options, said):
+    columns = dict(simulate_recording(read_datasheet("table1"), T[:700], INPUTS["multisine"](T[:700]), noise=1e-4))
+    if u is not None:
+        columns["u_V"] = np.full(700, u)
+    write_recording(tmp_path / "rec.csv", columns)
+    assert cli.main(["identify", str(tmp_path / "rec.csv"), *options, "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr()
+    assert said in told.err and told.err.count("\n") == 1 and told.out == "" and not (tmp_path / "out").exists()
+
+
+def test_theta_0_that_cannot_be_told_is_no_combination():
+    """Where the rudder is never near theta_0 its bounds, and nothing else, say where it is."""
+    told = rows(identify([record(0.01)], OFF, Settings(bounds={"theta_0": (5.0, 6.0)})))
+    assert not any("theta_0" in name for name in told if name != "theta_0")

@@ -12,7 +12,7 @@ from ers_mj.commands.output import Progress, as_json, bold, plain, write_results
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.estimate import Identified
+    from ers_mj.identifying.answer import Identified
     from ers_mj.recording import Recording
 
 
@@ -21,12 +21,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "identify", help="parameters with intervals, and which the recordings can tell",
         description="Identify a servo's parameters from recordings: values, intervals, and which the recordings cannot tell.",
-        epilog="examples:\n  ers identify run1.csv --datasheet servo.toml\n  ers identify run1.csv run2.csv --datasheet servo.toml --fix J=0.0031 --method iga --polish\n"
+        epilog="examples:\n  ers identify run1.csv --datasheet servo.toml\n"
+               "  ers identify run1.csv run2.csv --datasheet servo.toml --fix J=0.0031 --method iga --polish\n"
                "  ers identify run1.csv --datasheet servo.toml --plant mujoco --json")
     parser.add_argument("recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several")
     parser.add_argument("--method", default="ls", metavar="NAME", help="ls, iga, iga-rotated, ga, pso, cma or de (default ls, trust-region least squares)")
     parser.add_argument("--plant", type=one_of(("reduced", "mujoco")), default="reduced", metavar="reduced|mujoco", help="what is simulated (default reduced)")
-    parser.add_argument("--datasheet", metavar="TOML", help="what is known of the servo: where the search begins; table1 is the paper's (default: nothing, Eq. 6 from scratch)")
+    parser.add_argument("--datasheet", metavar="TOML",
+                        help="what is known of the servo: where the search begins; table1 is the paper's (default: nothing, Eq. 6 from scratch)")
     parser.add_argument("--fix", type=pair, action="append", default=[], metavar="NAME=VALUE", help="hold a parameter, as in J=0.0031; repeatable")
     parser.add_argument("--bounds", type=pair, action="append", default=[], metavar="NAME=LOW:HIGH", help="search a parameter here; repeatable")
     parser.add_argument("--within", type=several(number(above=0), "factor"), default=[0.2, 3.0], metavar="LOW,HIGH",
@@ -47,11 +49,12 @@ def run(arguments: argparse.Namespace) -> int:
     if len(arguments.within) != 2 or not arguments.within[0] < 1 < arguments.within[1]:
         raise InputError(f"--within gives {', '.join(f'{x:g}' for x in arguments.within)}, a factor below one and one above it were expected")
     from ers_mj.datasheet import read_datasheet
-    from ers_mj.estimate import Settings, identify
+    from ers_mj.identifying.estimate import identify
+    from ers_mj.identifying.finding import Settings
     from ers_mj.recording import read_recording
 
-    settings = Settings(arguments.method, arguments.plant, fixed, bounds, tuple(arguments.within), arguments.evaluations, arguments.polish, arguments.seed, arguments.jobs,
-                        **({"timestep": arguments.timestep} if arguments.timestep else {}))
+    settings = Settings(arguments.method, arguments.plant, fixed, bounds, tuple(arguments.within), arguments.evaluations, arguments.polish,
+                        arguments.seed, arguments.jobs, **({"timestep": arguments.timestep} if arguments.timestep else {}))
     datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
     recordings = [read_recording(spec, names) for spec in arguments.recordings]
     refuse_twice(recordings, [])
@@ -91,7 +94,8 @@ def _document(found: Identified, recordings: list[Recording]) -> dict:
     from ers_mj.commands.trial import versions
 
     return {"method": found.settings.method, "plant": found.settings.plant, "sentence": found.sentence,
-            "parameters": {row.name: row.as_document() for row in found.rows}, "fitness": found.fitness, "evaluations": found.evaluations, "wall_s": found.wall_s,
+            "parameters": {row.name: row.as_document() for row in found.rows},
+            "fitness": found.fitness, "evaluations": found.evaluations, "wall_s": found.wall_s,
             "explains": found.explains, "misfit_sigma2": found.misfit, "warnings": list(found.warnings),
             "structure": {"letters": list(found.structure.names), "rank": found.structure.rank, "null_space": found.structure.null,
                           "singular_values": found.structure.singular},
@@ -122,6 +126,7 @@ def _told(document: dict, files: list[Path]) -> list[str]:
         ends = f"{low:.5g} .. {high:.5g}" if low is not None and not row["fixed"] else "held" if row["fixed"] else ""
         sheet = "" if row["datasheet"] is None else f"{row['datasheet']:.5g}"
         lines.append(f"  {name:14}{value:>14}{ends:>30}{sheet:>14}  {row['unit']}")
-    lines += ["", f"{document['method']} on the {document['plant']} plant: fitness {document['fitness']:.3g}, {document['evaluations']} simulations, {document['wall_s']:.2f} s"]
+    lines += ["", f"{document['method']} on the {document['plant']} plant: fitness {document['fitness']:.3g}, {document['evaluations']} simulations, "
+              f"{document['wall_s']:.2f} s"]
     lines += ["", bold("be careful"), *(f"  {warning}" for warning in document["warnings"])] if document["warnings"] else []
     return lines + (["", bold("written"), *(f"  {path}" for path in files)] if files else [])

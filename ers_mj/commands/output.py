@@ -63,6 +63,18 @@ def write_results(folder: Path, writers: Mapping[str, Callable[[Path], None]]) -
     return [folder / name for name in writers]
 
 
+def make_room(path: Path) -> None:
+    """Make the folder that a file is to lie in.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+
+
 def write_whole(path: Path, content: bytes) -> None:
     """One file, whole or not at all.
 

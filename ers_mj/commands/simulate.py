@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import number, refuse_unwritable, whole
-from ers_mj.commands.output import as_json
+from ers_mj.commands.output import as_json, make_room
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
         datasheet, t, u, effects=effects, noise=math.radians(arguments.noise_deg), seed=arguments.seed,
         plant=arguments.plant, gap=math.radians(arguments.gap), linkage=arguments.linkage, play=arguments.play,
         inductance=arguments.inductance == "on")
-    out.parent.mkdir(parents=True, exist_ok=True)
+    make_room(out)
     write_recording(out, columns)
     summary = _summary(arguments, columns, [*datasheet.effects, *effects])
     print(as_json(summary) if arguments.json else _told(summary))

@@ -36,7 +36,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
                     "explain the stream. Without excitation nothing is told: the voltage should keep the output moving through stick and slip.",
         epilog="examples:\n  ers watch rig.csv --datasheet servo.toml\n  my_logger | ers watch - --json\n  ers watch run1.csv --once")
     parser.add_argument("stream", metavar="FILE|-", help="a CSV file that may grow, or - for standard input")
-    parser.add_argument("--datasheet", metavar="TOML", help="what is known of the servo, or a model.toml; table1 for the paper's (default: learn it from the first 5 s)")
+    parser.add_argument("--datasheet", metavar="TOML",
+                        help="what is known of the servo, or a model.toml; table1 for the paper's (default: learn it from the first 5 s)")
     parser.add_argument("--map", action="append", default=[], type=pair, metavar="NAME=COLUMN", help="take a column of another name; repeatable")
     parser.add_argument("--once", action="store_true", help="stop at the end of the file instead of waiting for more")
     parser.add_argument("--every", type=number(above=0), default=1.0, metavar="S", help="a line every S seconds of the stream, in a pipe (default 1)")

@@ -12,6 +12,7 @@ from ers_mj.minimisers.base import Meter, Minimiser, Objective
 
 DIFFERENCE = 1e-5  # of the coordinates, or of the box's width where that is less
 LONGEST = 2.0  # step in any coordinate
+PROMISING = 0.3  # of that share, which a step along fresh slopes must promise to be tried
 KEPT = 0.3  # share of the promised decrease from which a slope is updated, not taken anew
 STAGE_GAIN = 0.01  # share of the value below which a step ends a stage
 END_GAIN = 1e-9  # and the search
@@ -19,7 +20,7 @@ STAGE_LEFT, EXACT = 1e-5, 1e-22  # shares of the first value of an attempt: enou
 BELOW_TARGET = 1e-14  # share of the target that is as good as nothing
 WIDE = 100.0  # times DIFFERENCE: slopes that see over a kink, tried once where others lead no further
 ATTEMPTS = 6
-ALIKE, OFTEN = 0.01, 3  # of the value, within which attempts have ended in one place, and how many make it the bottom
+ALIKE, OFTEN = 0.01, 2  # of the value, within which attempts have ended in one place, and how many make it the bottom
 
 
 class LS(Minimiser):
@@ -70,24 +71,27 @@ def _descend(meter: Meter, stage: Objective | None, x: np.ndarray, least_gain: f
         return x, np.inf, first
     damping, slopes, fresh, wide = 1e-2, None, False, 1.0
     exact = max(enough * first, BELOW_TARGET * getattr(meter.objective, "target", 0.0))
+    given = getattr(stage or meter.objective, "slopes", None)
     while value > exact:
         if slopes is None:
-            given = getattr(stage or meter.objective, "slopes", None)
-            slopes, fresh = given(x) if given else _slopes(meter, stage, x, e, wide * DIFFERENCE), True
+            slopes, fresh = given(x, e) if given else _slopes(meter, stage, x, e, wide * DIFFERENCE), True
         hessian, slope = slopes.T @ slopes, slopes.T @ e
-        for _ in range(8 if fresh else 2):
+        for attempt in range(8 if fresh else 2):
             there = np.clip(x + _step(hessian, slope, damping, (x <= lower) & (slope > 0) | (x >= upper) & (slope < 0)), lower, upper)
+            move = there - x
+            promised = -(2.0 * slope @ move + move @ hessian @ move)
+            if fresh and (given or attempt == 0) and promised < PROMISING * least_gain * value:
+                return x, value, first
             e_there = meter.residuals(there, stage)
             if _squares(e_there) < value:
                 break
             damping = max(6.0 * damping, 1e-7)
         else:
-            if fresh and (wide > 1.0 or stage is not None):
+            if fresh and (wide > 1.0 or given or stage is not None):
                 break
             wide, damping, slopes = (WIDE, 1e-2, None) if fresh else (wide, damping, None)
             continue
-        move, gain = there - x, value - _squares(e_there)
-        was_fresh, promised = fresh, -(2.0 * slope @ move + move @ hessian @ move)
+        gain, was_fresh = value - _squares(e_there), fresh
         if gain > KEPT * promised and np.any(move):
             slopes, fresh = slopes + np.outer(e_there - e - slopes @ move, move / (move @ move)), False
         else:

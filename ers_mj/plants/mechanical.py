@@ -18,7 +18,7 @@ from ers_mj.errors import InputError
 from ers_mj.plants.play import rigid_play
 from ers_mj.plants.reduced import Motion
 from ers_mj.plants.skeletons import Skeleton, lumped_skeleton, rudder_skeleton
-from ers_mj.plants.stepping import Law, Stepper, step_many
+from ers_mj.plants.stepping import Law, Observer, Stepper, step_many
 from ers_mj.plants.writing import motor_gain, write_coefficients
 
 TIMESTEP = 5e-5  # [s] RMS error on Table 1 at most 0.01 deg; twice the step, twice the error
@@ -70,8 +70,8 @@ class MechanicalPlant:
         parameters = None if self.parameters is None else dict(self.parameters)
         return type(self), (self.coefficients, tuple(self.effects), parameters, self.linkage, self.gap, self.is_angle, self.timestep)
 
-    def simulate(self, t, u, start=None, *, enable=None, load=None) -> Motion:
-        """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples.
+    def simulate(self, t, u, start=None, *, enable=None, load=None, y=None, gain=0.0, every=1) -> Motion:
+        """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples; the observer form where ``gain`` > 0.
 
         Args:
             t: sample times (N,) [s], strictly increasing; they need not be uniform.
@@ -79,6 +79,7 @@ class MechanicalPlant:
             start: (theta, omega[, drive acceleration]), the play centred.
             enable: (N,) bool, false an open circuit.
             load: (N,) a known acceleration of the rudder.
+            y, gain, every: what was measured (N,) and how the observer follows it (see stepping.Observer).
 
         Returns:
             Motion, theta taken just before u[k] acts; NaN from where the motion leaves all bounds.
@@ -86,7 +87,7 @@ class MechanicalPlant:
         t, u = np.ascontiguousarray(t, float), self.terminal(u)
         stepper = self._stepper()
         stepper.reset(self._start(start))
-        rows = stepper.run(t, u, self._lowered.delay, enable, load)
+        rows = stepper.run(t, u, self._lowered.delay, enable, load, Observer(y, gain, every, self._moved) if gain > 0 else None)
         return self._motion(t, rows)
 
     def ratio(self, theta: float) -> float:
@@ -194,6 +195,11 @@ class MechanicalPlant:
         slip = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_twist if c.has_bristle else 0.0
         bent = float(np.clip(omega / np.sqrt(c.k_twist), -slip, slip)) if c.has_bristle else 0.0
         return joints | {"drive": (drive, 0.0), "bristle": (bent, 0.0)}
+
+    def _moved(self, theta: float, by: float) -> dict[str, float]:
+        """{joint: change of its position} where the output moves from theta by so much."""
+        before, after = self._start((theta, 0.0)), self._start((theta + by, 0.0))
+        return {name: q - before[name][0] for name, (q, _) in after.items() if q != before[name][0]}
 
     def _motion(self, t: np.ndarray, rows: np.ndarray) -> Motion:
         """Rows (N, 5) of theta, omega, theta_m, motor speed over n, drive -> Motion."""

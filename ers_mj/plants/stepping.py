@@ -28,6 +28,19 @@ class Law:
     friction: Callable | None
 
 
+@dataclass(frozen=True)
+class Observer:
+    """Corrections on the way, as events.simulate_kernel makes them: at one sample in ``every`` the output is moved by gain (y - theta).
+
+    ``moved(theta, by)`` gives {joint: change of its position} of such a move; y is (N,), NaN where there is none.
+    """
+
+    y: np.ndarray
+    gain: float
+    every: int
+    moved: Callable[[float, float], Mapping[str, float]]
+
+
 @dataclass
 class Stepper:
     """One run of one plant, on a copy of its model.
@@ -73,7 +86,7 @@ class Stepper:
             self.data.act[self.model.actuator_actadr[self.bristle]] = start["bristle"][0]
 
     @unlogged()
-    def run(self, t: np.ndarray, u: np.ndarray, delay: float, enable=None, load=None) -> np.ndarray:
+    def run(self, t: np.ndarray, u: np.ndarray, delay: float, enable=None, load=None, observer: Observer | None = None) -> np.ndarray:
         """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration."""
         model, data, rows = self.model, self.data, np.full((t.size, 5), np.nan)
         late = _delayed(t, u, delay) if delay > 0 else None
@@ -82,6 +95,9 @@ class Stepper:
             rows[k] = self._observe()
             if k == t.size - 1 or not abs(rows[k, 0]) < 1e12:
                 break
+            if observer is not None and k % observer.every == 0 and np.isfinite(observer.y[k]):
+                for name, change in observer.moved(rows[k, 0], observer.gain * (observer.y[k] - rows[k, 0])).items():
+                    data.qpos[self._address(name)] += change
             h, steps = self._divide(t[k + 1] - t[k])
             model.opt.timestep = h
             self._connect(enable is None or bool(enable[k]))

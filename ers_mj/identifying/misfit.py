@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.identification import residuals
-from ers_mj.structure import Structure, structure_of
-from ers_mj.traces import Trace
-from ers_mj.unknowns import Unknowns
+from ers_mj.identifying.structure import Structure, structure_of
+from ers_mj.traces import Blocks, Trace
+from ers_mj.identifying.unknowns import Unknowns
 
 STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone through before the free run
 IN_PROPORTION = ("B",)
@@ -27,7 +27,7 @@ COARSER, FORKS, FEWEST = 3.0, 0.01, 0.5  # a second step, the share of a slope's
 START, HOME = 0.01, 0.02  # half travels by which the angle at the start may be off, and within which of theta_0 a start is at home
 EXPLAINED = 1.3  # mean squared residual in sigmas up to which a fit is good enough for no further start
 
-Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace]], list[np.ndarray]]
+Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace], float], list[np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,13 @@ class Search:
     home: tuple[bool, ...] = ()
     with_starts: bool = False
 
-    def at_home(self, letters: np.ndarray) -> Search:
-        """The search in which those recordings start at home that must: at rest near theta_0, where the preload is stronger than friction."""
+    def at_home(self, letters: np.ndarray, surely: bool = True) -> Search:
+        """The search in which those recordings start at home that must: at rest near theta_0, where the preload is stronger than friction.
+
+        Where that is not known ``surely``, a preload is enough.
+        """
         values = self.unknowns.values(letters)
-        holds = values["c_1"] > values["c_2"]
+        holds = values["c_1"] > (values["c_2"] if surely else 0.0)
         near = HOME * self.scale
         return replace(self, home=tuple(holds and t.start[1] == 0.0 and abs(t.start[0] - values["theta_0"]) < near + 5.0 * t.sigma for t in self.traces))
 
@@ -71,7 +74,7 @@ class Search:
 
     def coordinates(self, letters: np.ndarray) -> np.ndarray:
         """Of letters (k,): the combinations' coordinates, wherever the pivots are; the starts at 0."""
-        ratio = {k: math.log(letters[k] / self.unknowns.reference[k]) for k in range(len(letters)) if self.unknowns.names[k] != "theta_0"}
+        ratio = [0.0 if name == "theta_0" else math.log(letters[k] / self.unknowns.reference[k]) for k, name in enumerate(self.unknowns.names)]
         out = []
         for k, name in zip(self.structure.kept, self.names):
             if name == "theta_0":
@@ -89,7 +92,7 @@ class Search:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Those of the combinations (r,): what the letters' own bounds leave to them."""
+        """Those of the combinations (r,): the letters' own and the pivots' together."""
         u = self.unknowns
         ends = []
         for k, name in zip(self.structure.kept, self.names):
@@ -98,6 +101,8 @@ class Search:
                 continue
             low, high = (math.log(max(x[k] / u.reference[k], 1e-6)) for x in ((u.lower, u.upper) if u.reference[k] > 0 else (u.upper, u.lower)))
             for row, p in zip(self._powers, self.structure.pivots):
+                if u.names[p] == "theta_0":
+                    continue
                 reach = sorted(-row[k] * math.log(max(x[p] / u.reference[p], 1e-6)) for x in (u.lower, u.upper))
                 low, high = low + reach[0], high + reach[1]
             ends.append((math.exp(low), math.exp(high)) if name in IN_PROPORTION else (low, high))
@@ -122,19 +127,21 @@ class Search:
 class Misfit:
     """Eq. (13) over a search's coordinates: x (M, r) -> (M,) [rad^2 s, or output unit^2 s].
 
-    Further channels enter with the weight of their noise. ``simulate`` gives the residuals in sigmas of many candidates at once where it is not
-    the reduced model in the observer form of ``rate``; the slopes are the reduced model's then.
+    The model runs in the observer form of ``rate`` (see identification.py), free where that is 0. Further channels enter with the weight of their noise.
+    ``simulate`` gives the residuals in sigmas of many candidates at once where it is not the reduced model that runs; the slopes are the reduced model's then.
+    A ``robust`` one has the logarithm of identification.py, block by block.
     """
 
     search: Search
     rate: float = 0.0
     jobs: int = 1
     simulate: Simulator | None = None
+    robust: bool = False
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         if self.simulate is not None:
-            found = self.simulate(self.search.unknowns, [self.search.letters(row) for row in x], self.search.traces)
-            return np.array([_squares(self.weight * e) for e in found])
+            found = self.simulate(self.search.unknowns, [self.search.letters(row) for row in x], self.search.traces, self.rate)
+            return np.array([_squares(self.weight * (forgiving(e, self.search.traces) if self.robust else e)) for e in found])
         with ThreadPoolExecutor(self.jobs) as pool:
             return np.array(list(pool.map(lambda row: _squares(self.residuals(row)), x)))
 
@@ -142,8 +149,10 @@ class Misfit:
         """(N,), whose squares sum to the value."""
         traces, letters = self.search.started(x), self.search.letters(x)
         if self.simulate is not None:
-            return self.weight * self.simulate(self.search.unknowns, [letters], traces)[0]
-        return self.weight * residuals(self.search.unknowns.model(letters), traces, self.rate)
+            e = self.simulate(self.search.unknowns, [letters], traces, self.rate)[0]
+        else:
+            e = residuals(self.search.unknowns.model(letters), traces, self.rate)
+        return self.weight * (forgiving(e, traces) if self.robust else e)
 
     @property
     def weight(self) -> np.ndarray:
@@ -168,12 +177,31 @@ class Misfit:
         return EXPLAINED * float(np.sum(self.weight[seen] ** 2))
 
     @property
-    def slopes(self) -> Callable[[np.ndarray], np.ndarray] | None:
-        """x -> slopes (N, r) by the reduced model, where another one is simulated."""
+    def slopes(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray] | None:
+        """(x, residuals (N,) there) -> slopes (N, r) by the reduced model, where another one is simulated."""
         if self.simulate is None:
             return None
-        reduced = replace(self, simulate=None)
-        return lambda x: central(reduced.residuals, x, STEP)
+        reduced = replace(self, simulate=None, robust=False)
+
+        def slopes(x, e):
+            found = central(reduced.residuals, x, STEP)
+            return found * forgiven(e / self.weight, self.search.traces)[:, None] if self.robust else found
+
+        return slopes
+
+
+def forgiving(e: np.ndarray, traces: Sequence[Trace]) -> np.ndarray:
+    """Residuals e (N,) in sigmas, scaled so that each block's squares sum to n ln(1 + m), m their mean: a few blocks cannot decide everything."""
+    blocks = Blocks.of(traces)
+    m = blocks.misfit(e)
+    return e * np.sqrt(np.log1p(m) / np.maximum(m, 1e-300))[blocks.index]
+
+
+def forgiven(e: np.ndarray, traces: Sequence[Trace]) -> np.ndarray:
+    """What the slopes of plain residuals are to be multiplied by, (N,), so that with the scaled ones e (N,) they give the slope of the sum."""
+    blocks = Blocks.of(traces)
+    m = np.expm1(blocks.misfit(e))
+    return (np.sqrt(m / np.maximum(np.log1p(m), 1e-300)) / (1.0 + m))[blocks.index]
 
 
 def _squares(e: np.ndarray) -> float:

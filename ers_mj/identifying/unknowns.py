@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.baseline import baseline
-from ers_mj.datasheet import LUMPED, Datasheet
+from ers_mj.baseline import opening
+from ers_mj.datasheet import LUMPED, Datasheet, refuse_impossible
 from ers_mj.errors import InputError
 from ers_mj.model import BASE, Model
 from ers_mj.traces import Trace
@@ -72,7 +72,7 @@ class Unknowns:
 
 
 def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Mapping[str, float], bounds: Mapping[str, tuple[float, float]],
-                factors: tuple[float, float] = FACTORS, is_angle: bool = True, jobs: int = 1) -> Unknowns:
+                factors: tuple[float, float] = FACTORS, is_angle: bool = True) -> Unknowns:
     """What to search in these recordings.
 
     Args:
@@ -86,6 +86,8 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
         InputError: a name that cannot be searched here, or bounds without what is fixed or known.
     """
     _refuse_unknown({**fixed, **bounds})
+    for name, x in fixed.items():
+        refuse_impossible(name, x, "--fix")
     both = fixed.keys() & bounds.keys()
     if both:
         raise InputError(f"{sorted(both)[0]} is fixed and has bounds, one of both was expected")
@@ -95,7 +97,7 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
     if all(name in known for name in NEEDED) and not (datasheet is not None and datasheet.lumped and not sheet):
         is_lumped, known = False, {name: x for name, x in known.items() if name in (*LETTERS, "n")}
     else:
-        is_lumped, known = True, {**_lumped(traces, datasheet, is_angle, jobs), **fixed}
+        is_lumped, known = True, {**_lumped(traces, datasheet, is_angle), **fixed}
     allowed = LUMPED if is_lumped else LETTERS
     for name in (*fixed, *bounds):
         if name not in allowed:
@@ -146,9 +148,9 @@ def _middle(name: str, ends: tuple[float, float]) -> float:
     return math.sqrt(lower * upper) if lower > 0 else 0.5 * (lower + upper)
 
 
-def _lumped(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool, jobs: int) -> dict[str, float]:
-    """Eq. (6)'s letters as known, or as the baseline finds them."""
+def _lumped(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool) -> dict[str, float]:
+    """Eq. (6)'s letters as known, or as a first search finds them."""
     known = datasheet.to_lumped() if datasheet is not None else {}
     if not {"a_2", "b"} <= known.keys():
-        known = dict(baseline(traces, datasheet, is_angle, jobs).fit.model.values)
+        known = opening(traces, is_angle)
     return {**REST, "ampere": known["b"], **known}

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from ers_mj.identifying.misfit import Simulator
+from ers_mj.model import observer_gain
 from ers_mj.plants.mechanical import TIMESTEP, MechanicalPlant, simulate_many
 from ers_mj.plants.reduced import Motion, lumped
 from ers_mj.plants.skeletons import bodily
 from ers_mj.traces import Trace
-from ers_mj.unknowns import Unknowns
-
-Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace]], list[np.ndarray]]
+from ers_mj.identifying.unknowns import Unknowns
 
 
 def plant_of(unknowns: Unknowns, letters: np.ndarray, is_angle: bool = True, timestep: float = TIMESTEP) -> MechanicalPlant:
@@ -23,21 +23,22 @@ def plant_of(unknowns: Unknowns, letters: np.ndarray, is_angle: bool = True, tim
 
 
 def rollouts(jobs: int, is_angle: bool = True, timestep: float = TIMESTEP) -> Simulator:
-    """(unknowns, candidates (M) of letters (k,), traces) -> M residuals (N,) in sigmas, as identification.residuals has them, of free runs."""
-    def simulate(unknowns, candidates, traces):
+    """(unknowns, candidates (M) of letters (k,), traces, rate) -> M residuals (N,) in sigmas, as identification.residuals has them."""
+    def simulate(unknowns, candidates, traces, rate):
         plants, parts = [plant_of(unknowns, letters, is_angle, timestep) for letters in candidates], [[] for _ in candidates]
         for trace in traces:
-            for letters, part, motion in zip(candidates, parts, _motions(plants, trace, jobs)):
+            for letters, part, motion in zip(candidates, parts, _motions(plants, trace, rate, jobs)):
                 part.append(_compared(unknowns, letters, trace, motion))
         return [np.concatenate(part) for part in parts]
 
     return simulate
 
 
-def _motions(plants: Sequence[MechanicalPlant], trace: Trace, jobs: int) -> list[Motion]:
-    if len(plants) > 1 and trace.is_uniform and trace.enable is None and trace.load is None:
+def _motions(plants: Sequence[MechanicalPlant], trace: Trace, rate: float, jobs: int) -> list[Motion]:
+    if len(plants) > 1 and trace.is_uniform and trace.enable is None and trace.load is None and rate == 0.0:
         return simulate_many(plants, trace.t, trace.u, jobs, start=trace.start)
-    return [plant.simulate(trace.t, trace.u, trace.start, enable=trace.enable, load=trace.load) for plant in plants]
+    gain, every = observer_gain(rate, trace.sample_time)
+    return [plant.simulate(trace.t, trace.u, trace.start, enable=trace.enable, load=trace.load, y=trace.y, gain=gain, every=every) for plant in plants]
 
 
 def _compared(unknowns: Unknowns, letters: np.ndarray, trace: Trace, motion: Motion) -> np.ndarray:

@@ -21,7 +21,7 @@ RECORDINGS = 8  # from which whole recordings are resampled
 DRAWS = 400
 WEAK = 0.05  # half-width from which a coordinate's profile is taken
 PLACES = (0.35, 0.7, 1.0, 1.4, 2.0)  # half-widths either way at which a profile is minimised
-PROFILE_BUDGET = 60  # simulations for each
+PROFILE_BUDGET, PROFILE_GAIN = 30, 1e-6  # simulations for each, and the share of chi^2 below which a step ends one
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Pinned:
     def __init__(self, objective, slopes: np.ndarray, k: int, value: float):
         self._objective, self._slopes, self._k, self._value = objective, np.delete(slopes, k, axis=1), k, value
 
-    def slopes(self, x: np.ndarray) -> np.ndarray:
+    def slopes(self, x: np.ndarray, e: np.ndarray) -> np.ndarray:
         """Slopes (N, r - 1), wherever x is: Broyden's updates see to the rest."""
         return self._slopes
 
@@ -117,7 +117,7 @@ def profile(objective, slopes: np.ndarray, x: np.ndarray, k: int, name: str, hal
         bounds: lower and upper ends of the coordinates (r,).
     """
     lower, upper = bounds
-    least = float(np.sum(objective.residuals(x) ** 2))
+    least, level = float(np.sum(objective.residuals(x) ** 2)), 3.84 * inflation**2
     places, rises, keep = [float(x[k])], [0.0], np.arange(x.size) != k
     for way in (-1.0, 1.0):
         rest = x[keep]
@@ -125,12 +125,15 @@ def profile(objective, slopes: np.ndarray, x: np.ndarray, k: int, name: str, hal
             at = float(np.clip(x[k] + way * share * half * inflation, lower[k], upper[k]))
             if at in places:
                 break
-            found = LS(attempts=1, staged=False, gain=1e-7).minimise(Pinned(objective, slopes, k, at), lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest)
+            held = Pinned(objective, slopes, k, at)
+            found = LS(attempts=1, staged=False, gain=PROFILE_GAIN).minimise(held, lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest)
             places.append(at)
             rises.append(max(found.value - least, 0.0))
             rest = found.x
+            if rises[-1] > level:
+                break
     order = np.argsort(places)
-    at, rise, level = np.array(places)[order], np.array(rises)[order], 3.84 * inflation**2
+    at, rise = np.array(places)[order], np.array(rises)[order]
     return Profile(name, at, rise, level, (_crossing(at, rise, level, float(x[k]), -1), _crossing(at, rise, level, float(x[k]), 1)))
 
 

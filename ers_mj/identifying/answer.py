@@ -1,59 +1,28 @@
-"""From recordings to parameters: what to search, the search, what the data tell, and how surely.
-
-    traces -> unknowns -> structure (rank) -> search of the combinations -> starts -> precision -> rows and model
-"""
+"""The answer: every letter with its interval or why it cannot be told, the combinations that can, the model, and a sentence."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ers_mj.datasheet import LUMPED, Datasheet
-from ers_mj.errors import InputError
-from ers_mj.minimisers import LS, MINIMISERS, Minimum
-from ers_mj.misfit import IN_PROPORTION, STEP, Misfit, Search, Simulator, central, structure_at
-from ers_mj.plants.mechanical import TIMESTEP
-from ers_mj.precision import WEAK, Precision, Profile, precision_of, profile
+from ers_mj.identifying.finding import FOLLOWED, Settings
+from ers_mj.identifying.misfit import IN_PROPORTION, STEP, Misfit, Search, Simulator, central
+from ers_mj.identifying.precision import WEAK, Precision, Profile, precision_of, profile
+from ers_mj.identifying.structure import Structure
+from ers_mj.identifying.unknowns import LETTERS, Unknowns, unit_of_letter
+from ers_mj.minimisers import Minimum
 from ers_mj.recording import Recording
-from ers_mj.rollouts import rollouts
-from ers_mj.starts import with_starts
-from ers_mj.structure import Structure
-from ers_mj.traces import Trace, trace_of
-from ers_mj.unknowns import FACTORS, LETTERS, Unknowns, unit_of_letter, unknowns_of
+from ers_mj.traces import Blocks, Trace
 
-FIRST = 4  # samples that tell whether a recording starts at rest
-BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is asked for
 WIDEST = 3.0  # relative half-width beyond which a profile says no more
 TELLING = 1.0  # relative 95 % half-width from which a number is not told
 WRONG = 1.5  # mean squared residual in sigmas from which the model is said to be wrong
-MOST_PLACES = 8  # beside the reference, at which the rank is looked for
 NEAR_BOUND = 1e-3  # of a coordinate's range
 PRINTED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
-SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
-POLISH_BUDGET, POLISHES, POLISH_WORTH = 200, 4, 1e-4  # the last: share of the value that another polish must have been worth
-
-Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How to identify: minimiser, plant, what is held and bounded (see unknowns.py), evaluations at most, whether ls goes on where
-    another method ends, and MuJoCo's step [s]."""
-
-    method: str = "ls"
-    plant: str = "reduced"
-    fixed: Mapping[str, float] = None
-    bounds: Mapping[str, tuple[float, float]] = None
-    factors: tuple[float, float] = FACTORS
-    budget: int | None = None
-    polish: bool = False
-    seed: int = 0
-    jobs: int = 1
-    timestep: float = TIMESTEP
 
 
 @dataclass(frozen=True)
@@ -83,7 +52,8 @@ class Identified:
         settings: how it was asked.
         rows: the answer.
         fitness: Eq. (13) [output unit^2 s].
-        misfit: mean squared residual in sigmas.
+        misfit: mean squared residual in sigmas; in MuJoCo the median block's, as an observer (see FOLLOWED): its step decides when a lever is met, and
+            a free run carries each such chance on.
         minimum: what the minimiser found, with its trace; ``evaluations`` counts the polish too.
         structure: what the data can tell.
         profiles: of the weak combinations.
@@ -115,127 +85,25 @@ class Identified:
         return self.misfit <= WRONG
 
 
-def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, settings: Settings = Settings(), progress: Progress = lambda text, share: None) -> Identified:
-    """Identify a servo from recordings.
-
-    Args:
-        recordings: one or many, of one unit.
-        datasheet: where the search begins and what bounds it, or None.
-        settings: see there.
-        progress: told what is being done and how far it is.
-
-    Raises:
-        InputError: a method, a name or bounds that do not exist or contradict each other.
-    """
-    began = time.monotonic()
-    if settings.method not in MINIMISERS:
-        raise InputError(f"there is no method {settings.method[:40]!r}; there are {', '.join(MINIMISERS)}")
-    progress("looking at what the recordings can tell", 0.02)
-    inertia = (settings.fixed or {}).get("J") or (datasheet.parameters.get("J") if datasheet is not None else None)
-    traces = tuple(_early(trace_of(r, inertia)) for r in recordings)
-    unknowns = unknowns_of(traces, datasheet, settings.fixed or {}, settings.bounds or {}, settings.factors, recordings[0].output_unit == "rad", settings.jobs)
-    y = np.concatenate([t.y[t.valid] for t in traces])
-    scale = 0.5 * float(np.ptp(y))
-    search = Search(unknowns, _best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(unknowns.reference)
-    progress(f"searching by {settings.method}", 0.1)
-    simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad", settings.timestep) if settings.plant == "mujoco" else None
-    x, search, minimum, used = _found(search, settings, simulate)
-    again = structure_at(unknowns, traces, search.letters(x), scale)
-    if again.rank > search.structure.rank:  # the reference was a place where less can be told
-        before = used
-        x, search, minimum, used = _found(replace(search, structure=again, traces=traces), settings, simulate)
-        used += before
-    else:  # or one where stick and slip forked at a touch: what is told is what the found model says
-        x, search = replace(search, structure=again).coordinates(search.letters(x)), replace(search, structure=again)
-    progress("measuring how sure that is", 0.8)
-    return _told(recordings, datasheet, settings, search, x, simulate, minimum, used, began)
-
-
-def _early(trace: Trace) -> Trace:
-    """The trace with a start at rest, where its first samples do not show a speed: a fast rudder has turned within the 50 ms of make_trace.
-
-    The speed at the first sample by three samples is known to 2.5 sigma / h, and to what their third difference makes of it.
-    """
-    h, y = trace.sample_time, trace.y[: FIRST]
-    if not np.all(np.isfinite(y)):
-        return trace
-    speed = (-3.0 * y[0] + 4.0 * y[1] - y[2]) / (2.0 * h)
-    if abs(speed) > (7.5 * trace.sigma + abs(y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0])) / h:
-        return trace
-    still = trace.y[: int(np.argmax(np.append(np.abs(trace.y - y[0]) > 3.0 * trace.sigma, True)))]
-    return replace(trace, start=(float(np.mean(still)), 0.0))
-
-
-def _best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, seed: int) -> Structure:
-    """The highest rank met at the reference and at places drawn from the bounds, once it has been met twice: where a rudder sticks less can be told."""
-    random, found = np.random.default_rng(seed), [structure_at(unknowns, traces, unknowns.reference, scale)]
-    for _ in range(MOST_PLACES):
-        found.append(structure_at(unknowns, traces, unknowns.drawn(random), scale))
-        best = max(found, key=lambda s: s.rank)
-        if sum(s.rank == best.rank for s in found) > 1 and best.rank:
-            break
-    if not best.rank:
-        raise InputError("no motion that the model can make within these bounds shows any parameter: check units of input and output, or widen --within")
-    return best
-
-
-def _found(search: Search, settings: Settings, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum, int]:
-    """(coordinates, search with the fitted starts, the minimiser's own result, evaluations in all)."""
-    lower, upper = search.bounds
-    by_squares = settings.method == "ls"
-    objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
-    start = np.clip(search.coordinates(search.unknowns.reference), lower, upper)
-    budget = settings.budget or BUDGET["reduced" if by_squares else settings.plant]
-    method = LS(gain=SEARCH_GAIN) if by_squares else MINIMISERS[settings.method]
-    found = method.minimise(objective, lower, upper, seed=settings.seed, budget=budget, start=start)
-    if not np.isfinite(found.value):
-        raise InputError("no motion that the model can make within these bounds resembles the recordings: check units and signs of input and output")
-    x, used = found.x, found.evaluations
-    if by_squares or settings.polish:
-        value = found.value
-        for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
-            x, search, ended = _polished(search, x, None)
-            used += ended.evaluations
-            value, gain = ended.value, value - ended.value
-            if gain < POLISH_WORTH * value:
-                break
-        if simulate is not None:
-            x, search, ended = _polished(search, x, simulate)
-            used += ended.evaluations
-    return x, search, found, used
-
-
-def _polished(search: Search, x: np.ndarray, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum]:
-    """ls from x (r,) with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``."""
-    letters = search.letters(x)
-    traces = search.traces if simulate else tuple(with_starts(search.unknowns.model(letters), search.traces))
-    begun = replace(search, traces=traces, with_starts=True).at_home(letters)
-    lower, upper = begun.bounds
-    own = np.concatenate([x, np.zeros(lower.size - x.size)])
-    found = LS(attempts=1, staged=False, gain=MUJOCO_GAIN if simulate else POLISH_GAIN).minimise(
-        Misfit(begun, simulate=simulate), lower, upper, budget=POLISH_BUDGET, start=own)
-    return found.x[: x.size], replace(begun, traces=begun.started(found.x), with_starts=False), found
-
-
-# -- the answer ---------------------------------------------------------------------------------------------------------
-
-
-def _told(recordings, datasheet, settings, search, x, simulate, minimum, used, began) -> Identified:
+def answer(recordings: Sequence[Recording], datasheet: Datasheet | None, settings: Settings, search: Search, x: np.ndarray, simulate: Simulator | None,
+           minimum: Minimum, used: int) -> Identified:
+    """What was found at the coordinates x (r,) of a search after ``used`` evaluations, judged by what is simulated; ``wall_s`` is left at 0."""
     unknowns, letters = search.unknowns, search.letters(x)
     open_ended = replace(search, with_starts=True)
     x = np.concatenate([x, np.zeros(open_ended.bounds[0].size - x.size)])
-    reduced = Misfit(open_ended)
+    reduced = Misfit(open_ended, FOLLOWED[-1] if simulate else 0.0)
     e, weight = replace(reduced, simulate=simulate).residuals(x), reduced.weight
+    free = replace(reduced, simulate=simulate, rate=0.0).residuals(x) if simulate else e
     slopes = np.nan_to_num(central(reduced.residuals, x, STEP) / weight[:, None])
     precision = precision_of(slopes, e / weight, search.traces, settings.seed)
     seen = np.concatenate([t.seen for t in search.traces])
-    misfit = float(np.sum((e / weight) ** 2)) / int(seen.sum())
+    misfit = float(np.median(Blocks.of(search.traces).misfit(e / weight))) if simulate else float(np.sum((e / weight) ** 2)) / int(seen.sum())
     profiles = () if simulate or misfit > WRONG else _profiles(reduced, open_ended, slopes, x, precision)
     y, u = recordings[0].output_unit, {"pct": "%"}.get(recordings[0].input_unit, recordings[0].input_unit)
     rows = _rows(search, letters, precision, profiles, datasheet, y, u)
-    predicted = _predicted(search, letters, e / weight)
-    return Identified(settings, tuple(rows), float(e @ e), misfit, minimum, used, search.structure, profiles, search.traces, predicted,
-                      _model(unknowns, letters), _sentence(search, misfit, settings), tuple(_warnings(search, x, misfit)), time.monotonic() - began)
+    predicted = _predicted(search, letters, free / weight)
+    return Identified(settings, tuple(rows), float(free @ free), misfit, minimum, used, search.structure, profiles, search.traces, predicted,
+                      _model(unknowns, letters), _sentence(search, misfit, settings), tuple(_warnings(search, x, misfit)), 0.0)
 
 
 def _profiles(objective: Misfit, search: Search, slopes: np.ndarray, x: np.ndarray, precision: Precision) -> tuple[Profile, ...]:
@@ -288,7 +156,8 @@ def _rows(search: Search, letters: np.ndarray, precision: Precision, profiles: S
         if powers is not None and np.count_nonzero(powers) > 1:
             known = [sheet.get(name) for name in unknowns.names]
             told = float(np.prod([p**q for p, q in zip(known, powers) if q])) if all(p for p, q in zip(known, powers) if q) else None
-            rows.append(row(label, lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0])), _unit(unknowns.names, powers, y, u), told, unknowns.names[k]))
+            product = lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0]))  # noqa: E731
+            rows.append(row(label, product, _unit(unknowns.names, powers, y, u), told, unknowns.names[k]))
     return rows
 
 
@@ -361,7 +230,8 @@ def _sentence(search: Search, misfit: float, settings: Settings) -> str:
     what = f"{structure.rank} of {len(structure.names)} parameters can be told" if structure.pivots else f"all {structure.rank} parameters can be told"
     said = f"From {'this recording' if count == 1 else f'these {count} recordings'} {what}{' as combinations' if structure.pivots else ''}"
     if misfit > WRONG and settings.method != "ls" and not settings.polish:
-        return f"{said}, but {settings.method} left {math.sqrt(misfit):.2g} times the noise: it stopped short of the best fit, or the model is wrong (--polish tells)."
+        return (f"{said}, but {settings.method} left {math.sqrt(misfit):.2g} times the noise: it stopped short of the best fit, or the model is wrong "
+                "(--polish tells).")
     if misfit > WRONG:
         return f"{said}, but the model is wrong: what it leaves is {math.sqrt(misfit):.2g} times the noise. `ers diagnose` looks for what is missing."
     return f"{said}; the model explains what was recorded within its noise."

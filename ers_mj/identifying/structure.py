@@ -46,7 +46,7 @@ class Structure:
         out[k] = 1.0
         for row, pivot in zip(self.null, self.pivots):
             power = round(row[k])
-            if abs(row[k] - power) > WHOLE:
+            if abs(row[k] - power) > WHOLE or (power and self.names[pivot] == "theta_0"):
                 return None
             out[pivot] -= power
         return out

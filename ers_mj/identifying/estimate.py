@@ -1,0 +1,84 @@
+"""From recordings to parameters: what to search, the search, what the data tell, and how surely.
+
+    traces -> unknowns -> structure (rank) -> search of the combinations -> starts -> precision -> rows and model
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ers_mj.datasheet import Datasheet
+from ers_mj.errors import InputError
+from ers_mj.identifying.answer import Identified, answer
+from ers_mj.identifying.finding import Settings, best_structure, found_by
+from ers_mj.identifying.misfit import Search, structure_at
+from ers_mj.identifying.rollouts import rollouts
+from ers_mj.identifying.unknowns import unknowns_of
+from ers_mj.minimisers import MINIMISERS
+from ers_mj.recording import Recording
+from ers_mj.traces import Trace, trace_of
+
+FIRST = 4  # samples that tell whether a recording starts at rest
+
+Progress = Callable[[str, float], None]
+
+
+def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, settings: Settings = Settings(),
+             progress: Progress = lambda text, share: None) -> Identified:
+    """Identify a servo from recordings.
+
+    Args:
+        recordings: one or many, of one unit.
+        datasheet: where the search begins and what bounds it, or None.
+        settings: see there.
+        progress: told what is being done and how far it is.
+
+    Raises:
+        InputError: a method, a name or bounds that do not exist or contradict each other.
+    """
+    began = time.monotonic()
+    if settings.method not in MINIMISERS:
+        raise InputError(f"there is no method {settings.method[:40]!r}; there are {', '.join(MINIMISERS)}")
+    progress("looking at what the recordings can tell", 0.02)
+    inertia = (settings.fixed or {}).get("J") or (datasheet.parameters.get("J") if datasheet is not None else None)
+    traces = tuple(_early(trace_of(r, inertia)) for r in recordings)
+    unknowns = unknowns_of(traces, datasheet, settings.fixed or {}, settings.bounds or {}, settings.factors, recordings[0].output_unit == "rad")
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    scale = 0.5 * float(np.ptp(y))
+    search = Search(unknowns, best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(unknowns.reference, surely=False)
+    progress(f"searching by {settings.method}", 0.1)
+    simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad", settings.timestep) if settings.plant == "mujoco" else None
+    x, search, minimum, used = found_by(search, settings, simulate)
+    again = structure_at(unknowns, traces, search.letters(x), scale)
+    if not again.rank:
+        raise InputError("where the model comes nearest to these recordings no parameter shows: check that the input is the one that moved the output")
+    if again.rank > search.structure.rank:  # the reference was a place where less can be told
+        before = used
+        x, search, minimum, used = found_by(replace(search, structure=again, traces=traces), settings, simulate)
+        used += before
+    else:  # or one where stick and slip forked at a touch: what is told is what the found model says
+        letters = search.letters(x)
+        search = replace(search, unknowns=replace(unknowns, reference=letters), structure=again)
+        x = search.coordinates(letters)
+    progress("measuring how sure that is", 0.8)
+    told = answer(recordings, datasheet, settings, search, x, simulate, minimum, used)
+    return replace(told, wall_s=time.monotonic() - began)
+
+
+def _early(trace: Trace) -> Trace:
+    """The trace with a start at rest, where its first samples do not show a speed: a fast rudder has turned within the 50 ms of make_trace.
+
+    The speed at the first sample by three samples is known to 2.5 sigma / h, and to what their third difference makes of it.
+    """
+    h, y = trace.sample_time, trace.y[: FIRST]
+    if not np.all(np.isfinite(y)):
+        return trace
+    speed = (-3.0 * y[0] + 4.0 * y[1] - y[2]) / (2.0 * h)
+    if abs(speed) > (7.5 * trace.sigma + abs(y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0])) / h:
+        return trace
+    still = trace.y[: int(np.argmax(np.append(np.abs(trace.y - y[0]) > 3.0 * trace.sigma, True)))]
+    return replace(trace, start=(float(np.mean(still)), 0.0))

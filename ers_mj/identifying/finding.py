@@ -1,0 +1,91 @@
+"""The search: what of the unknowns can be told, the way to the least misfit, and the polish in which the recordings' starts are free too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.errors import InputError
+from ers_mj.identifying.misfit import Misfit, Search, Simulator, structure_at
+from ers_mj.identifying.structure import Structure
+from ers_mj.identifying.unknowns import FACTORS, Unknowns
+from ers_mj.minimisers import LS, MINIMISERS, Minimum
+from ers_mj.plants.mechanical import TIMESTEP
+from ers_mj.starts import with_starts
+from ers_mj.traces import Trace
+
+BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is asked for
+MOST_PLACES = 8  # beside the reference, at which the rank is looked for
+SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
+FOLLOWED = (60.0, 30.0)  # [1/s] observer rates of the polish in MuJoCo; the answer is judged by the last
+POLISH_BUDGET, POLISHES, POLISH_WORTH = 200, 4, 1e-4  # the last: share of the value that another polish must have been worth
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to identify: minimiser, plant, what is held and bounded (see unknowns.py), evaluations at most, whether ls goes on where
+    another method ends, and MuJoCo's step [s]."""
+
+    method: str = "ls"
+    plant: str = "reduced"
+    fixed: Mapping[str, float] = None
+    bounds: Mapping[str, tuple[float, float]] = None
+    factors: tuple[float, float] = FACTORS
+    budget: int | None = None
+    polish: bool = False
+    seed: int = 0
+    jobs: int = 1
+    timestep: float = TIMESTEP
+
+
+def best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, seed: int) -> Structure:
+    """The highest rank met at the reference and at places drawn from the bounds, once it has been met twice: where a rudder sticks less can be told."""
+    random, found = np.random.default_rng(seed), [structure_at(unknowns, traces, unknowns.reference, scale)]
+    for _ in range(MOST_PLACES):
+        found.append(structure_at(unknowns, traces, unknowns.drawn(random), scale))
+        best = max(found, key=lambda s: s.rank)
+        if sum(s.rank == best.rank for s in found) > 1 and best.rank:
+            break
+    if not best.rank:
+        raise InputError("no motion that the model can make within these bounds shows any parameter: check units of input and output, or widen --within")
+    return best
+
+
+def found_by(search: Search, settings: Settings, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum, int]:
+    """(coordinates, search with the fitted starts, the minimiser's own result, evaluations in all)."""
+    lower, upper = search.bounds
+    by_squares = settings.method == "ls"
+    objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
+    start = np.clip(search.coordinates(search.unknowns.reference), lower, upper)
+    budget = settings.budget or BUDGET["reduced" if by_squares else settings.plant]
+    method = LS(gain=SEARCH_GAIN) if by_squares else MINIMISERS[settings.method]
+    found = method.minimise(objective, lower, upper, seed=settings.seed, budget=budget, start=start)
+    if not np.isfinite(found.value):
+        raise InputError("no motion that the model can make within these bounds resembles the recordings: check units and signs of input and output")
+    x, used = found.x, found.evaluations
+    if by_squares or settings.polish:
+        value = found.value
+        for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
+            x, search, ended = _polished(search, x, None, FOLLOWED[0] if simulate else 0.0)
+            used += ended.evaluations
+            value, gain = ended.value, value - ended.value
+            if gain < POLISH_WORTH * value:
+                break
+        for rate in FOLLOWED if simulate is not None else ():
+            x, search, ended = _polished(search, x, simulate, rate)
+            used += ended.evaluations
+    return x, search, found, used
+
+
+def _polished(search: Search, x: np.ndarray, simulate: Simulator | None, rate: float = 0.0) -> tuple[np.ndarray, Search, Minimum]:
+    """ls from x (r,) with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``, forgiving single blocks."""
+    letters = search.letters(x)
+    traces = search.traces if simulate else tuple(with_starts(search.unknowns.model(letters), search.traces))
+    begun = replace(search, traces=traces, with_starts=True).at_home(letters)
+    lower, upper = begun.bounds
+    own = np.concatenate([x, np.zeros(lower.size - x.size)])
+    found = LS(attempts=1, staged=False, gain=MUJOCO_GAIN if simulate else POLISH_GAIN).minimise(
+        Misfit(begun, rate, simulate=simulate, robust=simulate is not None), lower, upper, budget=POLISH_BUDGET, start=own)
+    return found.x[: x.size], replace(begun, traces=begun.started(found.x), with_starts=False), found
