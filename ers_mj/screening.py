@@ -59,7 +59,7 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
                 found = [p for start in starts if (p := _promise(light, effect, start, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
-                begun = [Begin(_onto(place, model, effect), known) for _, model in found[:effect.tries]]
+                begun = [Begin(_onto(place, model, effect), known) for _, model in _of_each_form(found)[:effect.tries]]
                 if not effect.dear:
                     begins.setdefault(effect.name, []).append(begun)
                 elif found[0][0] > promises.get(effect.name, 0.0):
@@ -84,6 +84,12 @@ def _onto(place: Model, found: Model, effect: Effect) -> Model:
     """The place with the effect as it was found beside fewer others."""
     model = place.with_effect(effect.name, dict(found.effects)[effect.name])
     return replace(model, local={**model.local, effect.name: found.local[effect.name]}) if effect.local else model
+
+
+def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]:
+    """The starts, the best first of each form (which of its parameters are absent), then the others."""
+    forms = [tuple(np.isfinite(model.effects[-1][1])) for _, model in found]
+    return [p for k, p in enumerate(found) if forms[k] not in forms[:k]] + [p for k, p in enumerate(found) if forms[k] in forms[:k]]
 
 
 def _promising(promises: Mapping[str, float], floor: float, most: int) -> list[str]:

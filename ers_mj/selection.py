@@ -34,7 +34,7 @@ LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effec
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
-FOREMOST = 2  # effects of the largest promise, which are refitted from their other starts whatever the first refit's gain
+FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
@@ -131,6 +131,10 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         worth = {*contending(worth, leaders(first)), *(name for name, _ in screened[:FOREMOST])}
         again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth for begin in begins[1:]])
         best = {label: min((ends[label] for ends in (first, again) if label in ends), key=total) for label in first}
+        if bent:
+            labels = contending([(name, 0) for name, _ in screened[:FOREMOST]], best)
+            for label, found in pool.map(finish, [(label, begin) for label in labels for begin in starts[label]]):
+                best[label] = min(best[label], found, key=total)
         if not bent:
             best = {(name, 0): found for name, found in leaders(best).items()}
         running = contending(best, best)
