@@ -93,9 +93,10 @@ def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]
 
 
 def _promising(promises: Mapping[str, float], floor: float, most: int) -> list[str]:
-    """The effects that are refitted, the most promising first."""
+    """The effects that are refitted, the most promising first. A knock's promise, what it gains as it is, is no measure for the others' secants."""
     best = sorted(promises, key=promises.get, reverse=True)[:most]
-    return [name for name in best if promises[name] >= max(floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * promises[best[0]])]
+    bar = max((promises[name] for name in best if not BY_NAME[name].once), default=0.0)
+    return [name for name in best if promises[name] >= max(floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * bar)]
 
 
 def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
