@@ -130,7 +130,7 @@ def _targets(place: Model, left: np.ndarray, traces: Sequence[Trace], tau: float
 def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.ndarray, target: np.ndarray, traces: Sequence[Trace],
             tau: float) -> list[tuple[float, Model]]:
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all for a small one, so that no secant
-    may be scaled. The best start of each side and recording, brought nearer, with what it gains in C as a share of the residual like the others'.
+    may be scaled. The best starts of different side, length or recording, brought nearer, with what they gain in C as a share of the residual.
     """
     ends, best = np.cumsum([0, *(trace.rows for trace in traces)]), {}
     column = [p.name for p in effect.parameters].index("record")

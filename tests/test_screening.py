@@ -49,3 +49,14 @@ def test_a_wider_effect_begins_where_its_limit_ended(pushed):
     apart = np.sqrt(np.mean((one - other) ** 2))
     assert apart < 0.2 * np.sqrt(np.mean((one - residuals(model, traces, 5.0)) ** 2))
     assert not BY_NAME["backlash"].grown("bias_torque", np.array([0.5]), model.scales)
+
+
+def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
+    u = np.where(T < 1.0, INPUTS["multisine"](T), 0.0)
+    knock = np.array([-300.0, 2.24, 0.08, 0.0])
+    y = ReducedModel(lumped(TRUTH), [("load_disturbance", knock)]).simulate(T, u).measured
+    still = trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(9).standard_normal(T.size), name="still"), None)
+    model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}, scales=replace(pushed.fit.model.scales, recordings=1))
+    (begins,) = dict(screen([model], [still], 1.0, (), False, True))["load_disturbance"]
+    size, begin, length, record = dict(begins[0].model.effects)["load_disturbance"]
+    assert size == pytest.approx(-300.0, rel=0.3) and begin == pytest.approx(2.24, abs=0.02) and length == pytest.approx(0.08, rel=0.3) and record == 0
