@@ -13,15 +13,18 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.errors import InputError
 from ers_mj.guess import guesses
-from ers_mj.identification import Fit, descend, fit, hopped, tau_of
+from ers_mj.identification import Fit, cost_of, descend, fit, hopped, tau_of
 from ers_mj.model import Model
 from ers_mj.starts import with_starts, without_spikes
 from ers_mj.traces import Trace
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
 OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
-OPENING_RENEWALS = 3  # Jacobians of a fit that a search goes on from anyhow
+OPENING_TAU = 1e3  # and the misfit at which its cost turns to logarithms
 STARTS = 6  # guesses that are refitted
+OPENED = {"preload": STARTS, "spring": 2, "bare": 2}  # of these in a search that is only opened, in which the first has the most terms
+BEHIND = 0.25  # of C per block, by which a kind is too far behind to be finished
+SPRINGS = {"bare": (), "spring": ("a_1",), "preload": ("a_1", "c_1")}
 VALLEY = 10.0  # of C by which two fits differ that ended in different valleys
 SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
 
@@ -74,8 +77,21 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
 
 
 def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:
-    """Eq. (6)'s letters from recordings alone, with the springs that these support: near enough for a search to begin, not refined."""
-    return dict(_structured(traces, {}, is_angle, ((),), ((),), OPENING_RENEWALS).model.values)
+    """Eq. (6)'s letters from recordings alone, with the springs that these support: near enough for a search to begin, not refined.
+
+    What was found with more terms opens the searches with fewer; a search that is far behind is not finished.
+    """
+    kinds = _Kinds.of(traces, {}, is_angle)
+    best: dict[str, Fit] = {}
+    for kind, count in OPENED.items():
+        places = [*kinds.places(kind), *(kinds.prepared(kind, found.model.values) for found in best.values())]
+        models = [Model(values, _free(values, traces), scales=kinds.scales) for values in places]
+        models.sort(key=lambda model: cost_of(model, traces, OPENING_RATES[0], OPENING_TAU))
+        tries = [descend(model, traces, OPENING_RATES[0], OPENING_TAU, 6, 1.0) for model in models[:count]]
+        best[kind] = min(tries, key=lambda found: found.cost)
+    level = min(found.cost for found in best.values()) + BEHIND * best["bare"].misfit.size
+    finished = {kind: fit(found.model, traces, rate=OPENING_RATES[1], steps=10) for kind, found in best.items() if found.cost <= level}
+    return dict(_simplest(finished).model.values)
 
 
 def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace], list[Mapping[str, float]]]:
@@ -140,47 +156,73 @@ def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle:
     return Start(found, traces, (*((dict(chosen.model.values),) if chosen.model.effects else ()), *others))
 
 
-def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, bare: Scaffolds, sprung: Scaffolds,
-                renewals: float = math.inf) -> Fit:
+def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, bare: Scaffolds, sprung: Scaffolds) -> Fit:
     """The fit from guesses alone without springs, with a spring or with a preload beside it, whichever is the simplest that the data supports.
 
-    ``bare`` and ``sprung`` are the scaffolds, names of effects, under which a search without and with springs is tried; ``renewals`` is that of ``fit``.
+    ``bare`` and ``sprung`` are the scaffolds, names of effects, under which a search without and with springs is tried.
     """
-    if not any(t.u.any() for t in traces):
-        raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
-    opened = any(t.enable is not None and not t.enable.all() for t in traces)
-    shown = opened or any(c.kind == "current" for t in traces for c in t.channels)
-    starts = [{"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known} for g in guesses(traces)]
-    if not starts:
-        raise InputError("the output nowhere moves for long enough to guess parameters from it: a longer or livelier recording, or a datasheet, was expected")
-    scales = scales_of(traces, starts[0], is_angle, None)
+    kinds = _Kinds.of(traces, known, is_angle)
+    scales = kinds.scales
     at = {"end_stop": BY_NAME["end_stop"].starts(scales)[-1], "asymmetric_friction": BY_NAME["asymmetric_friction"].starts(scales)[0]}
-    least = {"a_1": 1e-3 * scales.acceleration / scales.position, "c_1": 0.1 * scales.acceleration}
     bare, sprung = ([tuple((name, at[name]) for name in names) for names in scaffolds] for scaffolds in (bare, sprung))
-    best = {"bare": _searched(traces, starts, scales, (), {}, bare, renewals),
-            "spring": _searched(traces, starts, scales, ("a_1",), least, sprung, renewals),
-            "preload": _searched(traces, starts, scales, ("a_1", "c_1"), least, sprung, renewals)}
-    chosen, price = best["bare"], SUPPORT * best["bare"].misfit.size
-    for kind in ("spring", "preload"):
-        if chosen.cost - best[kind].cost > price:
-            chosen = best[kind]
+    return _simplest({kind: _searched(traces, kinds, kind, sprung if springs else bare) for kind, springs in SPRINGS.items()})
+
+
+def _simplest(found: Mapping[str, Fit]) -> Fit:
+    """The fit with the fewest springs that the data supports."""
+    kinds = [kind for kind in SPRINGS if kind in found]
+    chosen = found[kinds[0]]
+    price = SUPPORT * chosen.misfit.size
+    for kind in kinds[1:]:
+        if chosen.cost - found[kind].cost > price:
+            chosen = found[kind]
     return chosen
 
 
-def _searched(traces, starts, scales, springs, least, scaffolds, renewals) -> Fit:
-    """The best of the guesses with these spring terms, under the scaffold that serves it best: of the two that open best, where there are scaffolds."""
-    def prepared(values):
-        absent = {name: 0.0 for name in ("a_1", "c_1") if name not in springs}
-        if not springs:
-            absent["theta_0"] = 0.5 * (scales.low + scales.high)
-        return {**values, **{name: max(values[name], least[name]) for name in springs}, **absent}
+@dataclass(frozen=True)
+class _Kinds:
+    """Guesses by the spring terms that they have, and the least that these may be."""
 
-    pool = [v for v in starts if (v["c_1"] > 0) == ("c_1" in springs)] or starts
+    starts: Sequence[Mapping[str, float]]
+    scales: Scales
+
+    @classmethod
+    def of(cls, traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> _Kinds:
+        """Those of recordings, beside what is known.
+
+        Raises:
+            InputError: an input of zeros, or too little motion.
+        """
+        if not any(t.u.any() for t in traces):
+            raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
+        opened = any(t.enable is not None and not t.enable.all() for t in traces)
+        shown = opened or any(c.kind == "current" for t in traces for c in t.channels)
+        starts = [{"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known} for g in guesses(traces)]
+        if not starts:
+            raise InputError("the output nowhere moves for long enough to guess parameters from it: a longer or livelier recording, or a datasheet, was expected")
+        return cls(starts, scales_of(traces, starts[0], is_angle, None))
+
+    def prepared(self, kind: str, values: Mapping[str, float]) -> dict[str, float]:
+        """Values with the spring terms of a kind and no others."""
+        least = {"a_1": 1e-3 * self.scales.acceleration / self.scales.position, "c_1": 0.1 * self.scales.acceleration}
+        absent = {name: 0.0 for name in least if name not in SPRINGS[kind]}
+        if kind == "bare":
+            absent["theta_0"] = 0.5 * (self.scales.low + self.scales.high)
+        return {**values, **{name: max(values[name], least[name]) for name in SPRINGS[kind]}, **absent}
+
+    def places(self, kind: str) -> list[dict[str, float]]:
+        """The most promising guesses of a kind, prepared."""
+        pool = [v for v in self.starts if (v["c_1"] > 0) == (kind == "preload")] or self.starts
+        return [self.prepared(kind, values) for values in pool[:STARTS]]
+
+
+def _searched(traces: Sequence[Trace], kinds: _Kinds, kind: str, scaffolds: Sequence[tuple]) -> Fit:
+    """The best of the guesses with these spring terms, under the scaffold that serves it best, of the two that open best."""
     tries = []
-    for values in map(prepared, pool[:STARTS]):
+    for values in kinds.places(kind):
         for effects in scaffolds:
-            model = Model(values, _free(values, traces), effects=effects, scales=scales)
-            tries.append(descend(model, traces, OPENING_RATES[0], 1e3, 6, 1.0))
+            model = Model(values, _free(values, traces), effects=effects, scales=kinds.scales)
+            tries.append(descend(model, traces, OPENING_RATES[0], OPENING_TAU, 6, 1.0))
     tries.sort(key=lambda f: f.cost)
-    finals = [fit(f.model, traces, rate=OPENING_RATES[1], steps=10, renewals=renewals) for f in tries[:2]]
+    finals = [fit(f.model, traces, rate=OPENING_RATES[1], steps=10) for f in tries[:2]]
     return min(finals, key=lambda f: f.cost)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import nnls
 from scipy.signal import savgol_filter
 
 from ers_mj.traces import Trace
@@ -19,6 +19,7 @@ WINDOWS = (0.1, 0.3, 1.0)  # [s], never shorter than SHORTEST samples
 SHORTEST = 16
 EDGE = 0.02  # share of the travel next to its ends that is left out: a stop may act there
 PLACES = np.linspace(0.05, 0.95, 13)  # quantiles of the output at which theta_0 is tried
+SIGNED = [1, 3]  # columns whose coefficients may be negative: b and the constant
 FASTEST = 1e4  # [1/s] acceleration by the largest input over the speeds that are met: what makes more was guessed from no input at all
 
 
@@ -76,11 +77,12 @@ def _solve(right, columns, rows, theta_0, spring, middle):
     if theta_0 is not None:
         design = np.column_stack([design, np.concatenate([r[2](theta_0) for r in rows])])
     size = np.maximum(np.abs(design).max(axis=0), 1e-300)
-    lower = np.zeros(design.shape[1])
-    lower[[1, 3]] = -np.inf
+    signed = np.column_stack([design / size, -design[:, SIGNED] / size[SIGNED]])
     weight = np.ones(right.size)
     for _ in range(4):
-        x = lsq_linear(design / size * weight[:, None], right * weight, bounds=(lower, np.inf)).x / size
+        x = nnls(signed * weight[:, None], right * weight)[0]
+        x[SIGNED] -= x[design.shape[1]:]
+        x = x[: design.shape[1]] / size
         e = right - design @ x
         weight = 1.0 / np.sqrt(1.0 + (e / (2 * np.median(np.abs(e)) + 1e-300)) ** 2)
     a_1 = x[4] if spring else 0.0

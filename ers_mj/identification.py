@@ -67,6 +67,12 @@ def score(misfit: np.ndarray, tau: float) -> np.ndarray:
     return np.log((tau + misfit) / (1.0 + tau))
 
 
+def cost_of(model: Model, traces: Sequence[Trace], rate: float, tau: float) -> float:
+    """C of a model as it stands, without its priors; infinite where the simulation ran away."""
+    cost = float(score(Blocks.of(traces).misfit(residuals(model, traces, rate)), tau).sum())
+    return cost if math.isfinite(cost) else math.inf
+
+
 def tau_of(misfit: np.ndarray) -> float:
     """The misfit at which C turns from squares to logarithms: a tenth of the median, never below the noise."""
     return max(1.0, 0.1 * float(np.median(misfit)))

@@ -26,8 +26,9 @@ def compared(trace: Trace, predicted: np.ndarray, unit: str) -> str:
 
 def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> Figure:
     wide, u = width == WIDE, shown(unit)
-    figure = Figure(figsize=(width, 4.4), layout="constrained")
+    figure = Figure(figsize=(width, 4.4))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.8, 1.0))
+    _margins(figure, top=0.35)
     above.plot(*decimate(trace.t, u.factor * trace.y, POINTS[wide]), color=MEASURED, linewidth=2.6, label="measured")
     above.plot(*decimate(trace.t, u.factor * predicted, POINTS[wide]), color=AFTER, linewidth=1.1, label="identified model, free run")
     below.plot(*decimate(trace.t, u.factor * (trace.y - predicted), POINTS[wide]), color=INK, linewidth=0.7)
@@ -36,7 +37,7 @@ def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> F
     for ax, label in ((above, f"output [{u.label}]"), (below, f"left [{u.label}]")):
         ax.set_ylabel(label)
         ax.margins(x=0)
-    figure.legend(loc="outside upper left", ncols=3, fontsize=8)
+    figure.legend(loc="upper left", ncols=3, fontsize=8, borderaxespad=0.2)
     below.set_xlabel("time [s]")
     return figure
 
@@ -48,8 +49,9 @@ def descent(found: Identified) -> str:
 
 def progress_figure(traces: Mapping[str, Sequence[np.ndarray]], width: float) -> Figure:
     """Median best fitness over evaluations by method, of the traces (T, 2) of its runs."""
-    figure = Figure(figsize=(width, 3.2), layout="constrained")
+    figure = Figure(figsize=(width, 3.2))
     ax = figure.subplots()
+    _margins(figure)
     last = max(run[-1, 0] for runs in traces.values() for run in runs)
     grid = np.unique(np.round(np.geomspace(1, last, 300)))
     for k, (method, runs) in enumerate(traces.items()):
@@ -64,6 +66,12 @@ def progress_figure(traces: Mapping[str, Sequence[np.ndarray]], width: float) ->
     ax.set_ylabel("fitness, Eq. (13) [rad² s]")
     ax.legend(loc="lower left", fontsize=8)
     return figure
+
+
+def _margins(figure: Figure, top: float = 0.1) -> None:
+    """Room for labels, in inches: a layout that measures every text takes longer than the search beside it."""
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(left=0.7 / width, right=1.0 - 0.12 / width, bottom=0.5 / height, top=1.0 - top / height, hspace=0.12)
 
 
 def _power(x: float, place: int) -> str:

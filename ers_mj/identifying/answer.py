@@ -239,6 +239,9 @@ def _sentence(search: Search, misfit: float, settings: Settings) -> str:
 
 def _warnings(search: Search, x: np.ndarray, misfit: float) -> list[str]:
     lower, upper = search.bounds
-    near = [name for name, z, low, high in zip(search.names, x, lower, upper) if min(z - low, high - z) < NEAR_BOUND * (high - low)]
-    out = [f"{name} rests at the end of its bounds: widen them (--bounds) or doubt the model" for name in near]
+    out = []
+    for name, z, low, high in zip(search.names, x, lower, upper):
+        if min(z - low, high - z) < NEAR_BOUND * (high - low):
+            end, wanted = ("lower", "less") if z - low < high - z else ("upper", "more")
+            out.append(f"{name} rests at the {end} end of its bounds: these recordings ask for {wanted} of it; widen them (--bounds) or doubt the model")
     return out + (["the intervals hold for a model that is right, which this one is not"] if misfit > WRONG else []) + search.structure.trades()

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -14,7 +15,7 @@ import numpy as np
 from ers_mj.datasheet import Datasheet
 from ers_mj.errors import InputError
 from ers_mj.identifying.answer import Identified, answer
-from ers_mj.identifying.finding import Settings, best_structure, found_by
+from ers_mj.identifying.finding import Settings, best_structure, found_by, polished
 from ers_mj.identifying.misfit import Search, structure_at
 from ers_mj.identifying.rollouts import rollouts
 from ers_mj.identifying.unknowns import unknowns_of
@@ -62,8 +63,12 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
         used += before
     else:  # or one where stick and slip forked at a touch: what is told is what the found model says
         letters = search.letters(x)
-        search = replace(search, unknowns=replace(unknowns, reference=letters), structure=again)
+        fewer = again.rank < search.structure.rank
+        search = replace(search, unknowns=replace(search.unknowns, reference=letters), structure=again)
         x = search.coordinates(letters)
+        if fewer and (settings.method == "ls" or settings.polish):  # what one coordinate too many had kept apart
+            x, search, more = polished(search, x, math.inf, simulate)
+            used += more
     progress("measuring how sure that is", 0.8)
     told = answer(recordings, datasheet, settings, search, x, simulate, minimum, used)
     return replace(told, wall_s=time.monotonic() - began)

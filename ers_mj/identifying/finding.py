@@ -12,6 +12,7 @@ from ers_mj.identifying.misfit import Misfit, Search, Simulator, structure_at
 from ers_mj.identifying.structure import Structure
 from ers_mj.identifying.unknowns import FACTORS, Unknowns
 from ers_mj.minimisers import LS, MINIMISERS, Minimum
+from ers_mj.minimisers.ls import ATTEMPTS
 from ers_mj.plants.mechanical import TIMESTEP
 from ers_mj.starts import with_starts
 from ers_mj.traces import Trace
@@ -19,7 +20,9 @@ from ers_mj.traces import Trace
 BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is asked for
 MOST_PLACES = 8  # beside the reference, at which the rank is looked for
 SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
+NOISY_GAIN, NOISY = 1e-7, 0.5  # that of a polish where more than this share of the noise's own misfit is left: of chi^2 it is next to nothing
 FOLLOWED = (60.0, 30.0)  # [1/s] observer rates of the polish in MuJoCo; the answer is judged by the last
+AFTER_OPENING = 2  # attempts where the reference is the end of a search from many guesses already
 POLISH_BUDGET, POLISHES, POLISH_WORTH = 200, 4, 1e-4  # the last: share of the value that another polish must have been worth
 
 
@@ -46,7 +49,7 @@ def best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, se
     for _ in range(MOST_PLACES):
         found.append(structure_at(unknowns, traces, unknowns.drawn(random), scale))
         best = max(found, key=lambda s: s.rank)
-        if sum(s.rank == best.rank for s in found) > 1 and best.rank:
+        if best.rank == len(unknowns.names) or sum(s.rank == best.rank for s in found) > 1 and best.rank:
             break
     if not best.rank:
         raise InputError("no motion that the model can make within these bounds shows any parameter: check units of input and output, or widen --within")
@@ -60,32 +63,41 @@ def found_by(search: Search, settings: Settings, simulate: Simulator | None) -> 
     objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
     start = np.clip(search.coordinates(search.unknowns.reference), lower, upper)
     budget = settings.budget or BUDGET["reduced" if by_squares else settings.plant]
-    method = LS(gain=SEARCH_GAIN) if by_squares else MINIMISERS[settings.method]
+    method = LS(gain=SEARCH_GAIN, attempts=AFTER_OPENING if search.unknowns.guessed else ATTEMPTS) if by_squares else MINIMISERS[settings.method]
     found = method.minimise(objective, lower, upper, seed=settings.seed, budget=budget, start=start)
     if not np.isfinite(found.value):
         raise InputError("no motion that the model can make within these bounds resembles the recordings: check units and signs of input and output")
     x, used = found.x, found.evaluations
     if by_squares or settings.polish:
-        value = found.value
-        for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
-            x, search, ended = _polished(search, x, None, FOLLOWED[0] if simulate else 0.0)
-            used += ended.evaluations
-            value, gain = ended.value, value - ended.value
-            if gain < POLISH_WORTH * value:
-                break
-        for rate in FOLLOWED if simulate is not None else ():
-            x, search, ended = _polished(search, x, simulate, rate)
-            used += ended.evaluations
+        search = replace(search, traces=tuple(with_starts(search.unknowns.model(search.letters(x)), search.traces)))
+        x, search, more = polished(search, x, found.value, simulate)
+        used += more
     return x, search, found, used
 
 
-def _polished(search: Search, x: np.ndarray, simulate: Simulator | None, rate: float = 0.0) -> tuple[np.ndarray, Search, Minimum]:
-    """ls from x (r,) with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``, forgiving single blocks."""
+def polished(search: Search, x: np.ndarray, value: float, simulate: Simulator | None) -> tuple[np.ndarray, Search, int]:
+    """ls carried on from x (r,) of a ``value`` with the recordings' starts among the unknowns: where it ends, and evaluations."""
+    used = 0
+    for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
+        x, search, ended = _polished(search, x, value, None, FOLLOWED[0] if simulate else 0.0)
+        used += ended.evaluations
+        value, gain = ended.value, value - ended.value
+        if gain < POLISH_WORTH * value:
+            break
+    for rate in FOLLOWED if simulate is not None else ():
+        x, search, ended = _polished(search, x, value, simulate, rate)
+        used += ended.evaluations
+    return x, search, used
+
+
+def _polished(search: Search, x: np.ndarray, value: float, simulate: Simulator | None, rate: float) -> tuple[np.ndarray, Search, Minimum]:
+    """ls from x (r,) of a ``value`` with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``, forgiving single blocks."""
     letters = search.letters(x)
-    traces = search.traces if simulate else tuple(with_starts(search.unknowns.model(letters), search.traces))
-    begun = replace(search, traces=traces, with_starts=True).at_home(letters)
+    begun = replace(search, unknowns=search.unknowns.around(letters), with_starts=True).at_home(letters)
     lower, upper = begun.bounds
     own = np.concatenate([x, np.zeros(lower.size - x.size)])
-    found = LS(attempts=1, staged=False, gain=MUJOCO_GAIN if simulate else POLISH_GAIN).minimise(
-        Misfit(begun, rate, simulate=simulate, robust=simulate is not None), lower, upper, budget=POLISH_BUDGET, start=own)
-    return found.x[: x.size], replace(begun, traces=begun.started(found.x), with_starts=False), found
+    objective = Misfit(begun, rate, simulate=simulate, robust=simulate is not None)
+    gain = MUJOCO_GAIN if simulate else NOISY_GAIN if value > NOISY * objective.target else POLISH_GAIN
+    found = LS(attempts=1, staged=False, gain=gain).minimise(objective, lower, upper, budget=POLISH_BUDGET, start=own)
+    around = begun.unknowns.around(begun.letters(found.x))
+    return found.x[: x.size], replace(begun, unknowns=around, traces=begun.started(found.x), with_starts=False), found

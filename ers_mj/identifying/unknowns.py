@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,8 @@ class Unknowns:
         known: the letters that are held, n among them.
         fixed: which of these the user fixed.
         is_lumped: whose letters they are.
+        guessed: which letters nothing but the recordings told beforehand, so that no bounds of theirs are known.
+        factors: those of the bounds that were made of the reference.
     """
 
     names: tuple[str, ...]
@@ -48,6 +50,15 @@ class Unknowns:
     known: Mapping[str, float]
     fixed: tuple[str, ...]
     is_lumped: bool
+    guessed: tuple[str, ...] = ()
+    factors: tuple[float, float] = FACTORS
+
+    def around(self, letters: np.ndarray) -> Unknowns:
+        """The same with the bounds of guessed letters moved as far as these letters (k,) allow."""
+        guessed = np.array([name in self.guessed for name in self.names])
+        ends = np.sort(np.outer(self.factors, letters), axis=0)
+        return replace(self, lower=np.where(guessed, np.minimum(self.lower, ends[0]), self.lower),
+                       upper=np.where(guessed, np.maximum(self.upper, ends[1]), self.upper))
 
     def drawn(self, random: np.random.Generator) -> np.ndarray:
         """Letters (k,) drawn from the bounds, evenly by their logarithm where they are positive."""
@@ -104,7 +115,7 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
             why = f"without {', '.join(x for x in NEEDED if x not in sheet)} of a datasheet" if is_lumped else "where a datasheet gives those of Eq. (1)"
             raise InputError(f"{name} cannot be fixed or bounded {why}: these are identified, {', '.join(allowed)}")
     y = np.concatenate([t.y[t.valid] for t in traces])
-    names, ends = [], []
+    names, ends, guessed = [], [], []
     order = [name for name in (BASE if is_lumped else LETTERS) if name in known and name not in fixed]
     springs = known.get("a_1" if is_lumped else "k_s", 0.0) or known.get("c_1" if is_lumped else "T_LH", 0.0)
     for name in order:
@@ -119,12 +130,14 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
         elif known[name] != 0.0 and _matters(name, traces, known, is_lumped):
             names.append(name)
             ends.append(tuple(sorted((factors[0] * known[name], factors[1] * known[name]))))
+            if datasheet is None:
+                guessed.append(name)
     lower, upper = np.array(ends, float).reshape(-1, 2).T.copy()
     reference = np.clip([known[name] for name in names], lower, upper)
     if not names:
         raise InputError("every letter is fixed, there is nothing to identify")
     held = {name: x for name, x in known.items() if name not in names}
-    return Unknowns(tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped)
+    return Unknowns(tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped, tuple(guessed), tuple(factors))
 
 
 def _matters(name: str, traces: Sequence[Trace], known: Mapping[str, float], is_lumped: bool) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from ers_mj.minimisers.base import Meter, Minimiser, Objective
 
 DIFFERENCE = 1e-5  # of the coordinates, or of the box's width where that is less
-LONGEST = 2.0  # step in any coordinate
+LONGEST, DAMPED = 2.0, 20  # step in any coordinate, and how often the damping may be raised for it
 PROMISING = 0.3  # of that share, which a step along fresh slopes must promise to be tried
 KEPT = 0.3  # share of the promised decrease from which a slope is updated, not taken anew
 STAGE_GAIN = 0.01  # share of the value below which a step ends a stage
@@ -123,10 +123,17 @@ def _slopes(meter: Meter, stage: Objective | None, x: np.ndarray, e: np.ndarray,
 
 
 def _step(hessian: np.ndarray, slope: np.ndarray, damping: float, held: np.ndarray) -> np.ndarray:
-    """Marquardt's step (k,), none in what a bound holds."""
+    """Marquardt's step (k,), none in what a bound holds, damped further until it is no longer than LONGEST.
+
+    (Scaled to that length it would crawl in all directions where one is soft.)
+    """
     step, free = np.zeros(slope.size), np.flatnonzero(~held)
     if free.size:
         part = hessian[np.ix_(free, free)]
         scale = np.diag(part) + 1e-9 * np.trace(part) / free.size + 1e-300
-        step[free] = -np.linalg.lstsq(part + damping * np.diag(scale), slope[free], rcond=1e-14)[0]
+        for _ in range(DAMPED):
+            step[free] = -np.linalg.lstsq(part + damping * np.diag(scale), slope[free], rcond=1e-14)[0]
+            if np.abs(step).max() <= LONGEST:
+                break
+            damping *= 4.0
     return step / max(1.0, float(np.abs(step).max()) / LONGEST)
