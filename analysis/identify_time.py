@@ -50,6 +50,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         record, out = Path(folder) / "rec.csv", Path(folder) / "out"
         for title, options, inductance in (("with the datasheet, L in the plant", ["--datasheet", "table1"], True),
+                                           ("with the datasheet, no L in the plant", ["--datasheet", "table1"], False),
                                            ("from scratch, no L in the plant", [], False), ("from scratch, L in the plant: a model that is wrong", [], True)):
             starts, spent = [], []
             for k in range(-1, arguments.runs):

@@ -94,6 +94,23 @@ def test_without_inductance_damping_and_back_emf_are_told_together_only():
     assert any("made up for" in warning for warning in found.warnings)
 
 
+@pytest.mark.parametrize("wave", ["ramp", "square"])
+def test_a_winding_that_the_recording_does_not_show_is_left_out(wave):
+    t, sheet = np.arange(5000) / 1e3, read_datasheet("table1")
+    columns = simulate_recording(sheet, t, INPUTS[wave](t), noise=math.radians(0.01), seed=3)
+    found = identify([from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"])], sheet)
+    told = rows(found)
+    assert found.explains and found.structure.rank == 6 and "L" not in told and any("L was left out" in w for w in found.warnings)
+    assert told["J"].value is None and told["k_s/J"].value == pytest.approx(28.29, rel=0.02) and told["c_1"].value == pytest.approx(148.4, rel=0.02)
+
+
+def test_bounds_of_a_guess_move_with_it():
+    t, sheet = np.arange(10_000) / 1e3, read_datasheet("table1")
+    columns = simulate_recording(sheet, t, INPUTS["square"](t), noise=math.radians(0.01), seed=2704)
+    found = identify([from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"])], None)
+    assert found.explains and not any("rests" in w for w in found.warnings)
+
+
 def test_a_play_makes_the_model_wrong():
     found = identify([record(0.01, inductance=False, gap=math.radians(0.5))], SHEET)
     assert not found.explains and "the model is wrong" in found.sentence

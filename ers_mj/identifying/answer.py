@@ -239,7 +239,8 @@ def _sentence(search: Search, misfit: float, settings: Settings) -> str:
 
 def _warnings(search: Search, x: np.ndarray, misfit: float) -> list[str]:
     lower, upper = search.bounds
-    out = []
+    out = [f"{name} was left out: these recordings ask for less of it than its bounds allow (--bounds {name}=LOW:HIGH forces it in)"
+           for name in search.unknowns.absent]
     for name, z, low, high in zip(search.names, x, lower, upper):
         if min(z - low, high - z) < NEAR_BOUND * (high - low):
             end, wanted = ("lower", "less") if z - low < high - z else ("upper", "more")

@@ -54,7 +54,7 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
     progress(f"searching by {settings.method}", 0.1)
     simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad", settings.timestep) if settings.plant == "mujoco" else None
     x, search, minimum, used = found_by(search, settings, simulate)
-    again = structure_at(unknowns, traces, search.letters(x), scale)
+    again = structure_at(search.unknowns, traces, search.letters(x), scale)
     if not again.rank:
         raise InputError("where the model comes nearest to these recordings no parameter shows: check that the input is the one that moved the output")
     if again.rank > search.structure.rank:  # the reference was a place where less can be told

@@ -57,22 +57,40 @@ def best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, se
 
 
 def found_by(search: Search, settings: Settings, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum, int]:
-    """(coordinates, search with the fitted starts, the minimiser's own result, evaluations in all)."""
-    lower, upper = search.bounds
-    by_squares = settings.method == "ls"
-    objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
-    start = np.clip(search.coordinates(search.unknowns.reference), lower, upper)
-    budget = settings.budget or BUDGET["reduced" if by_squares else settings.plant]
-    method = LS(gain=SEARCH_GAIN, attempts=AFTER_OPENING if search.unknowns.guessed else ATTEMPTS) if by_squares else MINIMISERS[settings.method]
-    found = method.minimise(objective, lower, upper, seed=settings.seed, budget=budget, start=start)
-    if not np.isfinite(found.value):
-        raise InputError("no motion that the model can make within these bounds resembles the recordings: check units and signs of input and output")
-    x, used = found.x, found.evaluations
-    if by_squares or settings.polish:
+    """(coordinates, search with the fitted starts, the minimiser's own result, evaluations in all).
+
+    A winding of which the recordings ask for less than the bounds allow is left out: a vanishing time constant can neither be told nor be run well.
+    """
+    winding = search.unknowns.winding
+    doubted = winding in search.names and winding not in (settings.bounds or {})
+    found = _minimum(search, settings, simulate, 1 if doubted else None)
+    used, letters = found.evaluations, search.letters(found.x)
+    absent = doubted and search.at_lower_end(found.x, winding)
+    if absent:
+        unknowns = search.unknowns.without(winding, letters)
+        search = replace(search, unknowns=unknowns, structure=structure_at(unknowns, search.traces, unknowns.reference, search.scale))
+    if absent or doubted and settings.method == "ls" and found.value > Misfit(search).target:
+        found = _minimum(search, settings, simulate)
+        used += found.evaluations
+    x = found.x
+    if settings.method == "ls" or settings.polish:
         search = replace(search, traces=tuple(with_starts(search.unknowns.model(search.letters(x)), search.traces)))
         x, search, more = polished(search, x, found.value, simulate)
         used += more
     return x, search, found, used
+
+
+def _minimum(search: Search, settings: Settings, simulate: Simulator | None, attempts: int | None = None) -> Minimum:
+    """What the method finds from the reference on, by that many ``attempts`` where it is ls."""
+    by_squares = settings.method == "ls"
+    objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
+    lower, upper = search.bounds
+    method = LS(gain=SEARCH_GAIN, attempts=attempts or (AFTER_OPENING if search.unknowns.guessed else ATTEMPTS)) if by_squares else MINIMISERS[settings.method]
+    found = method.minimise(objective, lower, upper, seed=settings.seed, budget=settings.budget or BUDGET["reduced" if by_squares else settings.plant],
+                            start=np.clip(search.coordinates(search.unknowns.reference), lower, upper))
+    if not np.isfinite(found.value):
+        raise InputError("no motion that the model can make within these bounds resembles the recordings: check units and signs of input and output")
+    return found
 
 
 def polished(search: Search, x: np.ndarray, value: float, simulate: Simulator | None) -> tuple[np.ndarray, Search, int]:

@@ -23,8 +23,9 @@ from ers_mj.identifying.unknowns import Unknowns
 STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone through before the free run
 IN_PROPORTION = ("B",)
 STEP = 1e-5  # of the letters' logarithms, for sensitivities
-COARSER, FORKS, FEWEST = 3.0, 0.01, 0.5  # a second step, the share of a slope's size by which both may differ, and the samples' share that must be left
+COARSER, FORKS, FEWEST = 3.0, (1e-5, 1e-4, 1e-3, 1e-2), 0.3  # a second step, shares of a slope's size by which both may differ, and the samples' share that must be left
 START, HOME = 0.01, 0.02  # half travels by which the angle at the start may be off, and within which of theta_0 a start is at home
+SHY = 0.02  # share of a coordinate's range, within which it rests at its end
 EXPLAINED = 1.3  # mean squared residual in sigmas up to which a fit is good enough for no further start
 
 Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace], float], list[np.ndarray]]
@@ -111,6 +112,12 @@ class Search:
             ends.append((-reach, reach))
         lower, upper = np.array(ends).T
         return lower, upper
+
+    def at_lower_end(self, x: np.ndarray, name: str) -> bool:
+        """Whether a searched letter rests at its lower bound at the coordinates x (r,)."""
+        k = self.names.index(name)
+        lower, upper = self.bounds
+        return x[k] - lower[k] < SHY * (upper[k] - lower[k])
 
     def started(self, x: np.ndarray) -> tuple[Trace, ...]:
         """The traces with the starts of the coordinates x."""
@@ -223,5 +230,9 @@ def structure_at(unknowns: Unknowns, traces: Sequence[Trace], letters: np.ndarra
 
     slopes, coarser = (np.nan_to_num(central(moved, np.zeros(len(letters)), step)) for step in (STEP, COARSER * STEP))
     size = np.abs(slopes).max(axis=0) + 1e-300
-    smooth = np.max(np.abs(slopes - coarser) / size, axis=1) < FORKS  # elsewhere stick and slip fork at a touch
-    return structure_of(slopes[smooth] if smooth.mean() > FEWEST else slopes, unknowns.names)
+    apart = np.max(np.abs(slopes - coarser) / size, axis=1)
+    for forks in FORKS:  # beyond, stick and slip fork at a touch; the smoother the samples, the surer what nothing moves
+        smooth = apart < forks
+        if smooth.mean() > FEWEST:
+            return structure_of(slopes[smooth], unknowns.names)
+    return structure_of(slopes, unknowns.names)

@@ -41,6 +41,7 @@ class Unknowns:
         is_lumped: whose letters they are.
         guessed: which letters nothing but the recordings told beforehand, so that no bounds of theirs are known.
         factors: those of the bounds that were made of the reference.
+        absent: letters that were left out since the recordings ask for none of them.
     """
 
     names: tuple[str, ...]
@@ -52,6 +53,18 @@ class Unknowns:
     is_lumped: bool
     guessed: tuple[str, ...] = ()
     factors: tuple[float, float] = FACTORS
+    absent: tuple[str, ...] = ()
+
+    @property
+    def winding(self) -> str:
+        """The letter that makes the current lag."""
+        return "tau_e" if self.is_lumped else "L"
+
+    def without(self, name: str, letters: np.ndarray) -> Unknowns:
+        """The same without a letter, the reference at the others of these letters (k,)."""
+        kept = np.array([other != name for other in self.names])
+        return replace(self, names=tuple(other for other in self.names if other != name), reference=letters[kept], lower=self.lower[kept],
+                       upper=self.upper[kept], absent=(*self.absent, name))
 
     def around(self, letters: np.ndarray) -> Unknowns:
         """The same with the bounds of guessed letters moved as far as these letters (k,) allow."""
