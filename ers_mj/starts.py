@@ -9,7 +9,7 @@ import numpy as np
 
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.symptoms import excursions
-from ers_mj.traces import Trace, parabola_start, start_samples
+from ers_mj.traces import Trace, start_samples, start_seen
 
 SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
 SPIKE_SAMPLES, SPIKE_TIME = 3, 0.005  # length of a spike at most, and [s]
@@ -39,8 +39,7 @@ def with_starts(model: Model, traces: Sequence[Trace]) -> list[Trace]:
 def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, float]:
     """(output, speed) at the first sample by least squares of a free run on the first 50 ms or 10 samples.
 
-    The search begins at rest and at a parabola's speed; rest is kept unless a speed buys more than 9 sigma^2, where the recording itself
-    shows none (parabola_start) 9 times the mean square that is missed even so: a speed is a poor excuse for a wrong model.
+    A speed is a poor excuse for a wrong model: it starts at rest unless the recording itself shows a speed, and with one that this allows (start_seen).
     """
     n = start_samples(trace.t)
     head = trace.part(0, n)
@@ -60,11 +59,12 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
             if not trial @ trial < e @ e:
                 break
             x, e = x + move, trial
-        return float(e @ e), x
+        return x
 
-    first = float(np.mean(head.y[head.valid][:3])) if head.valid.any() else trace.start[0]
-    at_rest, seen = settle(np.array([first, 0.0]), 0), parabola_start(head.t, head.y)
-    moving = min((settle(np.array(s, float), 1) for s in (trace.start, seen)), key=lambda f: f[0])
-    missed = max(moving[0] / n, 1.0) if seen[1] == 0 else 1.0
-    cost, x = at_rest if at_rest[0] <= moving[0] + 9.0 * missed else moving
-    return float(x[0]), float(x[1])
+    low, high = start_seen(head.t, head.y, head.sigma)
+    begun = np.array([trace.start[0], 0.5 * (low + high)])
+    fitted = settle(begun, moving=low != high)
+    if low <= fitted[1] <= high:
+        return float(fitted[0]), float(fitted[1])
+    speed = min(max(float(fitted[1]), low), high)
+    return float(settle(np.array([begun[0], speed]), moving=False)[0]), speed

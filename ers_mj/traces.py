@@ -15,6 +15,8 @@ from ers_mj.symptoms import at_extreme, converter_step, excursions, frozen_spans
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
 START_SAMPLES = 10
+FEWEST_SEEN = 6  # samples that a start is told from
+SURE_SPEED = 3.0  # standard deviations within which a speed at the start may lie
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,10 @@ def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
 
 def _started(trace: Trace) -> tuple[float, float]:
     n = start_samples(trace.t)
-    return parabola_start(trace.t[:n], trace.y[:n])
+    low, high = start_seen(trace.t[:n], trace.y[:n], trace.sigma)
+    y = trace.y[:n][trace.valid[:n]]
+    still = y[: int(np.argmax(np.append(np.abs(y - y[0]) > 3.0 * trace.sigma, True)))] if y.size else np.zeros(1)
+    return float(np.mean(still)) if low == high else float(y[0]), 0.5 * (low + high)
 
 
 def start_samples(t: np.ndarray) -> int:
@@ -156,19 +161,23 @@ def start_samples(t: np.ndarray) -> int:
     return min(max(START_SAMPLES, int(np.searchsorted(t, t[0] + START))), t.size)
 
 
-def parabola_start(t: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """(output, speed) at the first sample by a parabola through the samples (N,) given; a speed within 3 sigma of 0 is 0."""
+def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float]:
+    """The least and the largest speed at the first of the samples (N,) that they allow, without a model: both 0 where rest is allowed.
+
+    Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no more than their noise.
+    """
     known = np.isfinite(y)
-    if known.sum() < 5:
-        return (float(y[known][0]) if known.any() else 0.0), 0.0
-    s, v = (t[known] - t[0]) / (t[-1] - t[0]), y[known]
-    design = np.vander(s, 3, increasing=True)
-    coefficient, *_ = np.linalg.lstsq(design, v, rcond=None)
-    spread = np.std(v - design @ coefficient, ddof=3)
-    error = spread * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
-    if abs(coefficient[1]) <= 3 * error:
-        return float(np.mean(v)), 0.0
-    return float(coefficient[0]), float(coefficient[1] / (t[-1] - t[0]))
+    t, y = t[known] - t[0], y[known]
+    low, high = (math.inf, -math.inf) if t.size >= FEWEST_SEEN else (0.0, 0.0)
+    for n in {max(t.size // part, FEWEST_SEEN) for part in (1, 2, 4, 8)} if low > high else ():
+        for degree in range(1, min(n - 3, 6)):
+            design = np.vander(t[:n] / t[n - 1], degree + 1, increasing=True)
+            coefficient, *_ = np.linalg.lstsq(design, y[:n], rcond=None)
+            missed = math.sqrt(float(np.sum((y[:n] - design @ coefficient) ** 2)) / (n - degree - 1)) / sigma
+            reach = SURE_SPEED * max(missed, 1.0) * sigma * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+            if missed < 1.0 + 2.0 / math.sqrt(n):
+                low, high = min(low, (coefficient[1] - reach) / t[n - 1]), max(high, (coefficient[1] + reach) / t[n - 1])
+    return (0.0, 0.0) if low > high or low <= 0.0 <= high else (float(low), float(high))
 
 
 def noise_sigma(y: np.ndarray, quantum: float) -> float:

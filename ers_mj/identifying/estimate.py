@@ -21,9 +21,7 @@ from ers_mj.identifying.rollouts import rollouts
 from ers_mj.identifying.unknowns import unknowns_of
 from ers_mj.minimisers import MINIMISERS
 from ers_mj.recording import Recording
-from ers_mj.traces import Trace, trace_of
-
-FIRST = 4  # samples that tell whether a recording starts at rest
+from ers_mj.traces import trace_of
 
 Progress = Callable[[str, float], None]
 
@@ -46,7 +44,7 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
         raise InputError(f"there is no method {settings.method[:40]!r}; there are {', '.join(MINIMISERS)}")
     progress("looking at what the recordings can tell", 0.02)
     inertia = (settings.fixed or {}).get("J") or (datasheet.parameters.get("J") if datasheet is not None else None)
-    traces = tuple(_early(trace_of(r, inertia)) for r in recordings)
+    traces = tuple(trace_of(r, inertia) for r in recordings)
     unknowns = unknowns_of(traces, datasheet, settings.fixed or {}, settings.bounds or {}, settings.factors, recordings[0].output_unit == "rad")
     y = np.concatenate([t.y[t.valid] for t in traces])
     scale = 0.5 * float(np.ptp(y))
@@ -72,18 +70,3 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
     progress("measuring how sure that is", 0.8)
     told = answer(recordings, datasheet, settings, search, x, simulate, minimum, used)
     return replace(told, wall_s=time.monotonic() - began)
-
-
-def _early(trace: Trace) -> Trace:
-    """The trace with a start at rest, where its first samples do not show a speed: a fast rudder has turned within the 50 ms of make_trace.
-
-    The speed at the first sample by three samples is known to 2.5 sigma / h, and to what their third difference makes of it.
-    """
-    h, y = trace.sample_time, trace.y[: FIRST]
-    if not np.all(np.isfinite(y)):
-        return trace
-    speed = (-3.0 * y[0] + 4.0 * y[1] - y[2]) / (2.0 * h)
-    if abs(speed) > (7.5 * trace.sigma + abs(y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0])) / h:
-        return trace
-    still = trace.y[: int(np.argmax(np.append(np.abs(trace.y - y[0]) > 3.0 * trace.sigma, True)))]
-    return replace(trace, start=(float(np.mean(still)), 0.0))

@@ -23,7 +23,7 @@ from ers_mj.identifying.unknowns import Unknowns
 STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone through before the free run
 IN_PROPORTION = ("B",)
 STEP = 1e-5  # of the letters' logarithms, for sensitivities
-COARSER, FORKS, FEWEST = 3.0, (1e-5, 1e-4, 1e-3, 1e-2), 0.3  # a second step, shares of a slope's size by which both may differ, and the samples' share that must be left
+COARSER, FORKS, FEWEST = 3.0, 0.01, 0.5  # a second step, the share of a slope's size by which both may differ, and the samples' share that must be left
 START, HOME = 0.01, 0.02  # half travels by which the angle at the start may be off, and within which of theta_0 a start is at home
 SHY = 0.02  # share of a coordinate's range, within which it rests at its end
 EXPLAINED = 1.3  # mean squared residual in sigmas up to which a fit is good enough for no further start
@@ -230,9 +230,6 @@ def structure_at(unknowns: Unknowns, traces: Sequence[Trace], letters: np.ndarra
 
     slopes, coarser = (np.nan_to_num(central(moved, np.zeros(len(letters)), step)) for step in (STEP, COARSER * STEP))
     size = np.abs(slopes).max(axis=0) + 1e-300
-    apart = np.max(np.abs(slopes - coarser) / size, axis=1)
-    for forks in FORKS:  # beyond, stick and slip fork at a touch; the smoother the samples, the surer what nothing moves
-        smooth = apart < forks
-        if smooth.mean() > FEWEST:
-            return structure_of(slopes[smooth], unknowns.names)
-    return structure_of(slopes, unknowns.names)
+    smooth = np.max(np.abs(slopes - coarser) / size, axis=1) < FORKS  # elsewhere stick and slip fork at a touch
+    smooth = smooth if smooth.mean() > FEWEST else np.ones_like(smooth)
+    return structure_of(slopes[smooth], unknowns.names, slopes[smooth] - coarser[smooth])

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 RANK = 1e-6  # singular value, of columns of length one, over the largest, below which a direction does nothing
+SURE = 3.0  # times what it is off by, which a singular value must be
 WHOLE = 0.02  # from a whole number, within which an exponent is one
 HELD_FIRST = ("J", "R", "B", "K_t", "K_e", "L", "k_s", "T_LH", "F_c", "ampere", "emf_share", "tau_e")  # pivots, as a reader expects them
 
@@ -74,13 +75,14 @@ def _power(name: str, exponent: float) -> str:
     return name if exponent == 1 else f"{name}^{exponent:g}"
 
 
-def structure_of(slopes: np.ndarray, names: Sequence[str]) -> Structure:
-    """From sensitivities (N, k), by the logarithms of the letters."""
+def structure_of(slopes: np.ndarray, names: Sequence[str], doubt: np.ndarray | None = None) -> Structure:
+    """From sensitivities (N, k), by the logarithms of the letters, and what they are off by: a direction in which they say no more than that does nothing."""
     size = np.linalg.norm(slopes, axis=0)
     scale = np.maximum(size, 1e-8 * size.max() + 1e-300)
     _, singular, turn = np.linalg.svd(slopes / scale, full_matrices=len(slopes) < len(names))
     singular = np.concatenate([singular, np.zeros(len(names) - singular.size)])
-    null = turn[singular <= RANK * singular[0]] / scale
+    unsure = np.linalg.norm(doubt / scale @ turn.T, axis=0) if doubt is not None else np.zeros(len(names))
+    null = turn[singular <= np.maximum(RANK * singular[0], SURE * unsure)] / scale
     null, pivots = _reduced(null / np.maximum(np.abs(null).max(axis=1, keepdims=True), 1e-300), names)
     for array in (null, singular):
         array.setflags(write=False)
