@@ -29,9 +29,28 @@ class Begin:
     known: Columns
 
 
-def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str],
-           bent: bool, quiet: bool) -> list[tuple[str, list[list[Begin]]]]:
-    """The promising effects, each with the models to refit: for every place, those of its best starts.
+@dataclass(frozen=True)
+class Screened:
+    """What the screening found: the share that each effect promises, and its models to refit, for every place those of its best starts."""
+
+    promises: Mapping[str, float]
+    begins: Mapping[str, Sequence[Sequence[Begin]]]
+    floor: float
+    most: int
+
+    def promising(self, failed: Sequence[str] = ()) -> list[str]:
+        """The effects that are refitted, the most promising first.
+
+        Neither a knock's promise, what it gains as it is, is a measure for the others' secants, nor that of an effect whose refit ``failed``: where stick and slip
+        fork, a secant may be all chance.
+        """
+        best = sorted(self.promises, key=self.promises.get, reverse=True)[: self.most]
+        bar = max((self.promises[name] for name in best if not BY_NAME[name].once and name not in failed), default=0.0)
+        return [name for name in best if self.promises[name] >= max(self.floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * bar)]
+
+
+def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str], bent: bool, quiet: bool) -> Screened:
+    """The promises of all effects, and the models to refit.
 
     From each place (the refitted baseline first, and where else a fit may start from) the secant e(with effect) - e(without) is taken
     at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
@@ -69,8 +88,8 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         if quiet and not floor:
             floor = 2.0 * LEAST_PROMISE / float(targets[0][2] @ targets[0][2])
         if not bent:
-            names = _promising(promises, floor, most)
-    return [(name, begins[name]) for name in _promising(promises, floor, most)]
+            names = Screened(promises, begins, floor, most).promising()
+    return Screened(promises, begins, floor, most)
 
 
 def _light(place: Model) -> Model:
@@ -90,13 +109,6 @@ def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]
     """The starts, the best first of each form (which of its parameters are absent), then the others."""
     forms = [tuple(np.isfinite(model.effects[-1][1])) for _, model in found]
     return [p for k, p in enumerate(found) if forms[k] not in forms[:k]] + [p for k, p in enumerate(found) if forms[k] in forms[:k]]
-
-
-def _promising(promises: Mapping[str, float], floor: float, most: int) -> list[str]:
-    """The effects that are refitted, the most promising first. A knock's promise, what it gains as it is, is no measure for the others' secants."""
-    best = sorted(promises, key=promises.get, reverse=True)[:most]
-    bar = max((promises[name] for name in best if not BY_NAME[name].once), default=0.0)
-    return [name for name in best if promises[name] >= max(floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * bar)]
 
 
 def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:

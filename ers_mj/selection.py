@@ -34,6 +34,7 @@ LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effec
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
+FAILED = 0.05  # share of the best first refit's gain below which a promise was none
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
@@ -117,22 +118,30 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         lost = -float(np.sum(np.minimum(won, 0.0)))
         return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau), lost, float(won.max()))
 
-    states = [(s, [[Begin(base.model.with_state(s, len(traces)), {})]]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
+    states = [((s, 0), [Begin(base.model.with_state(s, len(traces)), {})]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
         quiet, bent = reference <= QUIET * base.misfit.size, not near_noise(base) or reference > BENT * base.misfit.size
         screened = screen(places, traces, tau, exclude, bent, quiet)
-        if quiet and not screened:
+        if quiet and not screened.promising():
             return []
-        starts = {(name, place): begins for name, per_place in screened + states for place, begins in enumerate(per_place)}
+        starts = dict(states)
         first = refitted([(label, begins[0]) for label, begins in starts.items()])
+        failed: set[str] = set()
+        while new := [name for name in screened.promising(failed) if (name, 0) not in starts]:
+            added = {(name, place): begins for name in new for place, begins in enumerate(screened.begins[name])}
+            starts |= added
+            first |= refitted([(label, begins[0]) for label, begins in added.items()])
+            most = max((reference - total(f) for f in first.values()), default=0.0)
+            failed = {name for name, found in leaders(first).items() if reference - total(found) <= FAILED * max(most, 0.0)}
         most = max((reference - total(f) for f in first.values()), default=0.0)
+        foremost = [name for name in screened.promising(failed) if name not in failed][:FOREMOST]
         worth = {name for name, found in leaders(first).items() if bent or reference - total(found) >= AGAIN * most}
-        worth = {*contending(worth, leaders(first)), *(name for name, _ in screened[:FOREMOST])}
+        worth = {*contending(worth, leaders(first)), *foremost}
         again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth for begin in begins[1:]])
         best = {label: min((ends[label] for ends in (first, again) if label in ends), key=total) for label in first}
         if bent:
-            labels = contending([(name, 0) for name, _ in screened[:FOREMOST]], best)
+            labels = contending([(name, 0) for name in foremost], best)
             for label, found in pool.map(finish, [(label, begin) for label in labels for begin in starts[label]]):
                 best[label] = min(best[label], found, key=total)
         if not bent:

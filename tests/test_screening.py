@@ -12,7 +12,7 @@ from ers_mj.identification import residuals
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
-from ers_mj.screening import screen
+from ers_mj.screening import Screened, screen
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -30,15 +30,17 @@ def pushed():
     return baseline(traces, Datasheet(lumped=TRUTH), True, 1)
 
 
-def names(found):
-    return {name for name, _ in found}
-
-
 def test_a_place_far_from_the_data_takes_no_candidate_from_one_near_it(pushed):
     near, far = pushed.fit.model, replace(pushed.fit.model, values={**pushed.fit.model.values, "b": 60.0})
     alone, both = (screen(places, pushed.traces, 1.0, (), False, False) for places in ([near], [near, far]))
-    assert "bias_torque" in names(alone) and names(alone) <= names(both)
-    assert all(len(begins) == 2 for name, begins in both if not BY_NAME[name].dear)
+    assert "bias_torque" in alone.promising() and set(alone.promising()) <= set(both.promising())
+    assert all(len(both.begins[name]) == 2 for name in both.promising() if not BY_NAME[name].dear)
+
+
+def test_a_promise_that_failed_is_no_measure_for_the_others():
+    found = Screened({"load_disturbance": 3.0, "load_dependent_friction": 0.97, "cogging": 0.4, "input_delay": 0.18, "gravity": 0.02}, {}, 0.0, 4)
+    assert found.promising() == ["load_disturbance", "load_dependent_friction", "cogging"]
+    assert found.promising({"load_dependent_friction"}) == ["load_disturbance", "load_dependent_friction", "cogging", "input_delay"]
 
 
 def test_a_wider_effect_begins_where_its_limit_ended(pushed):
@@ -57,6 +59,6 @@ def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
     y = ReducedModel(lumped(TRUTH), [("load_disturbance", knock)]).simulate(T, u).measured
     still = trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(9).standard_normal(T.size), name="still"), None)
     model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}, scales=replace(pushed.fit.model.scales, recordings=1))
-    (begins,) = dict(screen([model], [still], 1.0, (), False, True))["load_disturbance"]
+    (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
     size, begin, length, record = dict(begins[0].model.effects)["load_disturbance"]
     assert size == pytest.approx(-300.0, rel=0.3) and begin == pytest.approx(2.24, abs=0.02) and length == pytest.approx(0.08, rel=0.3) and record == 0
