@@ -23,6 +23,7 @@ NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
 LEAST_TAU, MOST_TAU = 0.1, 2.0  # of a datasheet's electrical time constant, between which the baseline's is an ordinary one
 FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
+FEWEST_TURNS = 0.8  # periods of a wave over position within the travel: a longer one is no wave but a slope
 CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 
 
@@ -121,7 +122,8 @@ class Model:
 
     def _of_effect(self, name: str, parameter: Parameter, index: int, value: float, local: bool = False) -> Free:
         scale = 1.0 if parameter.positive else CLOCKED.get(parameter.kind, max(abs(value), 1e-12))
-        most = 1.0 / self.scales.sample_time if parameter.kind == "frequency" else np.inf
+        most = {"frequency": 1.0 / self.scales.sample_time, "period": 2.0 * self.scales.position / FEWEST_TURNS}
+        most = most.get(parameter.name if parameter.kind == "position" else parameter.kind, np.inf)
         least = {"position": SMALLEST * self.scales.noise, "frequency": FEWEST_CYCLES / self.scales.duration}.get(parameter.kind, 1e-12)
         lower = max(parameter.lower, least) if parameter.positive else parameter.lower
         ends = self._near_travel() if parameter.on_travel else (lower, min(parameter.upper, most))

@@ -24,6 +24,7 @@ from ers_mj.traces import Blocks, Trace
 LEAST_GAIN = 5.0  # decrease of C that an effect must buy
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
+LATER_Z = 2.5  # and beside an effect, whose law is hardly ever exactly the one that acts
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 8.0  # of C that an effect which acts once must buy
 PEAK = 30.0  # or the factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
@@ -243,7 +244,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
                 base, current, mended = base if current.model.names else again, again, mended + 1
                 continue
         rounds.append(tuple(ranked))
-        if not ranked or not _asked_for(ranked[0], least):
+        if not ranked or not _asked_for(ranked[0], least, LATER_Z if current.model.names else LEAST_Z):
             break
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
@@ -270,7 +271,7 @@ def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
     return fit(replace(model, states={k: v for k, v in model.states.items() if k != candidate.name} or None), traces, tau=tau, steps=12)
 
 
-def _asked_for(candidate: Candidate, least: float) -> bool:
+def _asked_for(candidate: Candidate, least: float, least_z: float) -> bool:
     """Whether the gain matters and is more than chance: over the blocks, or, of what acts in few of them, since hardly any is worse.
 
     A knock must gain ONCE, or take away what no fork of stick and slip makes (PEAK): that is enough where little else is left, so that the
@@ -280,7 +281,7 @@ def _asked_for(candidate: Candidate, least: float) -> bool:
         if candidate.best < math.log(PEAK):
             return candidate.gain >= max(least, ONCE)
         return candidate.gain >= (least if least > LEAST_GAIN else NEAR_LEAST * least)
-    return candidate.gain >= least and (candidate.z >= LEAST_Z or candidate.lost <= LOST * candidate.gain)
+    return candidate.gain >= least and (candidate.z >= least_z or candidate.lost <= LOST * candidate.gain)
 
 
 def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
