@@ -55,6 +55,14 @@ def _svg(figure: Figure, described: str) -> str:
     return re.sub(r"\n\s*", "\n", text)
 
 
+def margins(figure: Figure, top: float = 0.1) -> None:
+    """Room for labels about the axes, in inches: a layout that measures every text takes longer than all the drawing."""
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(left=0.8 / width, right=1.0 - 0.12 / width, bottom=0.5 / height, top=1.0 - top / height, hspace=0.1)
+    for ax in figure.axes:
+        ax.yaxis.set_label_coords(-0.62 / (width - 0.92), 0.5)
+
+
 def decimate(t: np.ndarray, x: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """t and x (N,) thinned to the lowest and the highest value of each of points/2 spans; a span of NaN stays a hole."""
     bins = points // 2
@@ -101,8 +109,9 @@ def worst_span(view: RecordView) -> tuple[float, float] | None:
 
 
 def _traces(view: RecordView, evidence: Evidence, width: float, span: tuple[float, float] | None, labels: tuple[str, str, str]) -> Figure:
-    figure = Figure(figsize=(width, 4.9 if width == WIDE else 4.7), layout="constrained")
+    figure = Figure(figsize=(width, 4.9 if width == WIDE else 4.7))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
+    margins(figure, top=0.35 if width == WIDE else 0.6)
     inside = slice(None) if span is None else slice(*np.searchsorted(view.t, span))
     t, measured, before, after = (x[inside] for x in (view.t, view.measured, view.before, view.after))
     unit = shown(evidence.output_unit, _size(view.measured))
@@ -117,7 +126,7 @@ def _traces(view: RecordView, evidence: Evidence, width: float, span: tuple[floa
     below.set_xlabel("time [s]")
     above.margins(x=0)
     handles, labels = above.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=4 if width == WIDE else 2, handlelength=1.6, columnspacing=1.4)
+    figure.legend(handles, labels, loc="upper left", ncols=4 if width == WIDE else 2, handlelength=1.6, columnspacing=1.4, borderaxespad=0.2)
     return figure
 
 

@@ -11,7 +11,7 @@ from matplotlib.ticker import NullFormatter
 
 from ers_mj.display import SUPERSCRIPT, shown
 from ers_mj.identifying.answer import Identified
-from ers_mj.figures import AFTER, BEFORE, FAINT, INK, MEASURED, WIDE, both_widths, decimate
+from ers_mj.figures import AFTER, BEFORE, FAINT, INK, MEASURED, WIDE, both_widths, decimate, margins
 from ers_mj.identifying.precision import Profile
 from ers_mj.traces import Trace
 
@@ -28,7 +28,7 @@ def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> F
     wide, u = width == WIDE, shown(unit)
     figure = Figure(figsize=(width, 4.4))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.8, 1.0))
-    _margins(figure, top=0.35)
+    margins(figure, top=0.35)
     above.plot(*decimate(trace.t, u.factor * trace.y, POINTS[wide]), color=MEASURED, linewidth=2.6, label="measured")
     above.plot(*decimate(trace.t, u.factor * predicted, POINTS[wide]), color=AFTER, linewidth=1.1, label="identified model, free run")
     below.plot(*decimate(trace.t, u.factor * (trace.y - predicted), POINTS[wide]), color=INK, linewidth=0.7)
@@ -51,7 +51,7 @@ def progress_figure(traces: Mapping[str, Sequence[np.ndarray]], width: float) ->
     """Median best fitness over evaluations by method, of the traces (T, 2) of its runs."""
     figure = Figure(figsize=(width, 3.2))
     ax = figure.subplots()
-    _margins(figure)
+    margins(figure)
     last = max(run[-1, 0] for runs in traces.values() for run in runs)
     grid = np.unique(np.round(np.geomspace(1, last, 300)))
     for k, (method, runs) in enumerate(traces.items()):
@@ -66,12 +66,6 @@ def progress_figure(traces: Mapping[str, Sequence[np.ndarray]], width: float) ->
     ax.set_ylabel("fitness, Eq. (13) [rad² s]")
     ax.legend(loc="lower left", fontsize=8)
     return figure
-
-
-def _margins(figure: Figure, top: float = 0.1) -> None:
-    """Room for labels, in inches: a layout that measures every text takes longer than the search beside it."""
-    width, height = figure.get_size_inches()
-    figure.subplots_adjust(left=0.7 / width, right=1.0 - 0.12 / width, bottom=0.5 / height, top=1.0 - top / height, hspace=0.12)
 
 
 def _power(x: float, place: int) -> str:
