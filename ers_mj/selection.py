@@ -137,14 +137,13 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             failed = {name for name, found in leaders(first).items() if reference - total(found) <= FAILED * max(most, 0.0)}
         most = max((reference - total(f) for f in first.values()), default=0.0)
         foremost = [name for name in screened.promising(failed) if name not in failed][:FOREMOST]
-        worth = {name for name, found in leaders(first).items() if bent or reference - total(found) >= AGAIN * most}
-        worth = {*contending(worth, leaders(first)), *foremost}
-        again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth for begin in begins[1:]])
-        best = {label: min((ends[label] for ends in (first, again) if label in ends), key=total) for label in first}
-        if bent:
-            labels = contending([(name, 0) for name in foremost], best)
-            for label, found in pool.map(finish, [(label, begin) for label in labels for begin in starts[label]]):
-                best[label] = min(best[label], found, key=total)
+        best, ahead = dict(first), [(name, 0) for name in foremost] if bent else []
+        for label, found in pool.map(finish, [(label, begin) for label in ahead for begin in starts[label]]):
+            best[label] = min(best[label], found, key=total)
+        worth = {name for name, found in leaders(best).items() if bent or reference - total(found) >= AGAIN * most}
+        worth = {*contending(worth, leaders(best)), *foremost}
+        again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth and label not in ahead for begin in begins[1:]])
+        best |= {label: min(best[label], found, key=total) for label, found in again.items()}
         if not bent:
             best = {(name, 0): found for name, found in leaders(best).items()}
         running = contending(best, best)
