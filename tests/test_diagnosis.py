@@ -1,6 +1,7 @@
 """The whole way on recordings with known truth: from a wrong datasheet to the right name, number and verdict."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,12 @@ import pytest
 from ers_mj.commands.output import plain
 from ers_mj.datasheet import Datasheet, read_datasheet, write_model
 from ers_mj.diagnosis import diagnose
+from ers_mj.document import Case
+from ers_mj.evaluation import Fold, Score
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
+from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 4.0, 1e-3)
 TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625, "tau_e": 9e-4, "emf_share": 0.94}
@@ -141,3 +145,12 @@ def test_dropouts_are_found_in_the_data_and_left_out(lose):
     document = diagnose(recordings(sensor=sensor), read_datasheet("table1")).document
     assert [m["effect"] for m in document["missing"]] == ["sensor_dropout"]
     assert document["fit"]["heldout_rmse_before_rad"] < (3 if lose == "spikes" else 10) * NOISE  # a hold at rest may pass unseen
+
+
+@pytest.mark.parametrize("errors, lost", [((0.5, 0.4), True), ((0.5, 0.002), False)])
+def test_where_every_free_run_is_lost_the_parameters_are_not_all_that_was_off(errors, lost):
+    n = 100
+    trace = trace_of(from_arrays(np.arange(n) / 1e3, np.zeros(n), 1e-3 * np.random.default_rng(0).standard_normal(n)), None)
+    scores = [Score(n * e**2, n, np.ones(1)) for e in errors]
+    case = SimpleNamespace(confirmed=SimpleNamespace(before=scores, parts=[Fold(trace, None)] * len(errors)))
+    assert Case._astray(case) is lost
