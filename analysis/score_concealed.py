@@ -1,4 +1,5 @@
-"""Diagnose concealed cases blind and score the answers: `python analysis/score_concealed.py FOLDER [--half tuning|reporting|all] [--out FILE]`.
+"""Diagnose concealed cases blind and score the answers: `python analysis/score_concealed.py FOLDER [--half tuning|reporting|all] [--out FILE]
+[--jobs N]`.
 
 FOLDER holds case-NNN/ (recordings and datasheet) and truth/case-NNN.json, as ../shared/concealed does and concealed_cases.py
 writes. Each case is handed to `ers diagnose` as files; its truth is opened only after its answer has been printed. Lines go to FILE as they
@@ -9,11 +10,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
+import os
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -30,13 +34,26 @@ def class_of(name: str) -> frozenset[str]:
 
 
 def answer(folder: Path, limit: float) -> dict:
-    """diagnosis.json of one case, with the wall and processor time [s]."""
+    """diagnosis.json of one case, with the wall and processor time [s].
+
+    Raises:
+        subprocess.SubprocessError: no answer within ``limit`` seconds, or a failure.
+    """
     recordings = sorted(map(str, folder.glob("rec*.csv")))
-    begin, spent = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    done = subprocess.run([sys.executable, "-m", "ers_mj", "diagnose", *recordings, "--datasheet", str(folder / "datasheet.toml"), "--json"],
-                          capture_output=True, text=True, timeout=limit, check=True)
-    return {**json.loads(done.stdout), "wall_s": time.perf_counter() - begin,
-            "cpu_s": resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - spent}
+    command = [sys.executable, "-m", "ers_mj", "diagnose", *recordings, "--datasheet", str(folder / "datasheet.toml"), "--json", "--jobs", "1"]
+    begin = time.perf_counter()
+    with tempfile.TemporaryFile() as said:
+        process = subprocess.Popen(command, stdout=said, stderr=subprocess.DEVNULL)
+        watch = threading.Timer(limit, process.kill)
+        watch.start()
+        _, status, usage = os.wait4(process.pid, 0)
+        watch.cancel()
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            raise subprocess.CalledProcessError(process.returncode, command[:4])
+        said.seek(0)
+        document = json.loads(said.read())
+    return {**document, "wall_s": time.perf_counter() - begin, "cpu_s": usage.ru_utime + usage.ru_stime}
 
 
 def halves(truths: dict[str, dict]) -> dict[str, str]:
@@ -92,28 +109,31 @@ def main() -> None:
     parser.add_argument("--library", action="store_true", help="only nulls and singles whose effect the library has")
     parser.add_argument("--out", type=Path, default=None)
     parser.add_argument("--limit", type=float, default=300.0, help="seconds a case")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="cases at once, each on one core")
     arguments = parser.parse_args()
     truths = {p.stem: json.loads(p.read_text()) for p in sorted((arguments.folder / "truth").glob("*.json"))}
     half = halves(truths)
     rows = [json.loads(x) for x in arguments.out.read_text().splitlines() if x.startswith("{")] if arguments.out and arguments.out.exists() else []
     done = {r["case"] for r in rows}
-    for case, truth in truths.items():
-        skipped = arguments.half != "all" and half[case] != arguments.half
-        outside = arguments.library and (len(truth["labels"]) > 1 or not set(truth["labels"]) <= LIBRARY)
-        if case in done or skipped or outside:
-            continue
+    wanted = [case for case, truth in truths.items() if case not in done and arguments.half in ("all", half[case])
+              and not (arguments.library and (len(truth["labels"]) > 1 or not set(truth["labels"]) <= LIBRARY))]
+
+    def row(case: str) -> dict:
         try:
-            rows.append(line(case, answer(arguments.folder / case, arguments.limit), truth))
+            return line(case, answer(arguments.folder / case, arguments.limit), truths[case])
         except (subprocess.SubprocessError, json.JSONDecodeError) as error:
             print(f"{case}: no answer ({str(error)[-200:]})", file=sys.stderr)
-            rows.append({"case": case, "labels": truth["labels"], "named": [], "verdict": "no answer", "wall_s": arguments.limit, "cpu_s": arguments.limit,
-                         "visibility": truth.get("visibility_after_refit_sigma"), "where": [], "before": None, "after": None, "floor": None,
-                         "significant": False})
-        text = json.dumps(rows[-1])
-        print(text, flush=True)
-        if arguments.out:
-            with arguments.out.open("a") as log:
-                log.write(text + "\n")
+            return {"case": case, "labels": truths[case]["labels"], "named": [], "verdict": "no answer", "wall_s": arguments.limit, "cpu_s": arguments.limit,
+                    "visibility": truths[case].get("visibility_after_refit_sigma"), "where": [], "before": None, "after": None, "floor": None, "significant": False}
+
+    with ThreadPoolExecutor(arguments.jobs) as pool:
+        for found in pool.map(row, wanted):
+            rows.append(found)
+            text = json.dumps(found)
+            print(text, flush=True)
+            if arguments.out:
+                with arguments.out.open("a") as log:
+                    log.write(text + "\n")
     print(summary(rows))
 
 
