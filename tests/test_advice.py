@@ -36,12 +36,15 @@ def traces_of(effects, names=("ramp", "steps")):
 
 
 def explained(traces, *starts):
-    """The traces, at rest when they begin, and a fit for each effect begun at a start."""
+    """The traces, at rest when they begin, and the best fit of each effect begun at a start, beside the baseline's letters and beside the servo's own."""
     sheet = Datasheet(lumped={k: TRUTH[k] for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")},
                       baseline={k: TRUTH[k] for k in ("tau_e", "emf_share")})
     start = baseline(traces, sheet, True, 1)
     traces = [replace(t, start=(TRUTH["theta_0"], 0.0)) for t in start.traces]
-    return traces, {name: fit(start.fit.model.with_effect(name, np.array(at)), traces, steps=40) for name, *at in starts}
+    base = start.fit.model
+    models = base, replace(base, values={**base.values, **{k: TRUTH[k] for k in sheet.lumped}})
+    return traces, {name: min((fit(m.with_effect(name, np.array(at)), traces, steps=40) for m in models), key=lambda found: found.cost)
+                    for name, *at in starts}
 
 
 @pytest.fixture(scope="module")

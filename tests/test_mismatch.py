@@ -111,7 +111,8 @@ def located(effects=(), plant="reduced"):
 
 
 @pytest.mark.parametrize(("effect", "kind"), [
-    (("sensor_lag", {"T": 0.003}), "linear"), (("shaft_compliance", {"f_shaft": 20.0, "zeta": 0.1, "rho": 0.55, "phi": 0.15}), "linear"),
+    (("sensor_lag", {"T": 0.003}), "linear"), (("input_delay", {"T_d": 0.003}), "linear"),
+    (("shaft_compliance", {"f_shaft": 20.0, "zeta": 0.1, "rho": 0.55, "phi": 0.15}), "both"),
     (("stribeck", {"dF_s": 0.08, "v_s": 0.15}), "distortion"), (("backlash", {"gap": 0.008, "rho": 0.6, "f_contact": 80.0, "zeta": 0.3}), "distortion"),
 ])
 def test_a_concealed_effect_is_linear_or_a_distortion(effect, kind):
