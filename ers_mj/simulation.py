@@ -162,7 +162,7 @@ def _values(datasheet: Datasheet, inductance: bool) -> dict[str, float]:
     if "b" not in values:
         raise InputError(f"{datasheet.name or 'the datasheet'}: cannot be simulated, "
                          "it needs b, or J, K_t and R from which b follows")
-    if inductance and "tau_e" not in values:
+    if inductance and not values.get("tau_e"):
         raise InputError(f"{datasheet.name or 'the datasheet'}: has no L and R, --inductance on needs both")
     return values if inductance else values | {"tau_e": 0.0}
 
