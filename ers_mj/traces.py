@@ -164,20 +164,24 @@ def start_samples(t: np.ndarray) -> int:
 def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float]:
     """The least and the largest speed at the first of the samples (N,) that they allow, without a model: both 0 where rest is allowed.
 
-    Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no more than their noise.
+    Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no more than their noise; the best one
+    where none does.
     """
     known = np.isfinite(y)
     t, y = t[known] - t[0], y[known]
-    low, high = (math.inf, -math.inf) if t.size >= FEWEST_SEEN else (0.0, 0.0)
-    for n in {max(t.size // part, FEWEST_SEEN) for part in (1, 2, 4, 8)} if low > high else ():
+    if t.size < FEWEST_SEEN:
+        return 0.0, 0.0
+    found = []
+    for n in {max(t.size // part, FEWEST_SEEN) for part in (1, 2, 4, 8)}:
         for degree in range(1, min(n - 3, 6)):
             design = np.vander(t[:n] / t[n - 1], degree + 1, increasing=True)
             coefficient, *_ = np.linalg.lstsq(design, y[:n], rcond=None)
             missed = math.sqrt(float(np.sum((y[:n] - design @ coefficient) ** 2)) / (n - degree - 1)) / sigma
             reach = SURE_SPEED * max(missed, 1.0) * sigma * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
-            if missed < 1.0 + 2.0 / math.sqrt(n):
-                low, high = min(low, (coefficient[1] - reach) / t[n - 1]), max(high, (coefficient[1] + reach) / t[n - 1])
-    return (0.0, 0.0) if low > high or low <= 0.0 <= high else (float(low), float(high))
+            found.append((missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1]))
+    enough = max(1.0, min(missed for missed, *_ in found))
+    low, high = (pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:]))
+    return (0.0, 0.0) if low <= 0.0 <= high else (float(low), float(high))
 
 
 def noise_sigma(y: np.ndarray, quantum: float) -> float:

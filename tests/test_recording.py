@@ -12,6 +12,7 @@ import pytest
 from ers_mj.errors import InputError
 from ers_mj.recording import converter_step, from_arrays, read_recording, write_recording
 from ers_mj.symptoms import leapt_spans
+from ers_mj.traces import start_seen
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 N = 400
@@ -500,3 +501,12 @@ def test_concealed_cases_are_read_without_false_problems(case):
 def test_a_sensor_that_drops_out_is_told():
     words = problem(read_recording(shared("concealed/case-052/rec1.csv")), "stuck")
     assert 8 <= int(words.split(" spans")[0].split()[-1]) <= 14
+
+
+@pytest.mark.parametrize("motion, speed", [
+    (lambda t: 0.0 * t, 0.0), (lambda t: 400.0 * t**2, 0.0), (lambda t: 2e4 * t**3, 0.0), (lambda t: np.where(t > 0.02, 300.0 * (t - 0.02) ** 2, 0.0), 0.0),
+    (lambda t: 3.0 * t, 3.0), (lambda t: 3.0 * t - 100.0 * t**2, 3.0), (lambda t: np.sin(60.0 * t) / 20.0 + 2e-4 * np.sin(9e2 * t), 3.18)])
+def test_the_speed_at_the_start_is_what_the_samples_show(motion, speed):
+    t = np.arange(50) / 1e3
+    low, high = start_seen(t, motion(t) + 1e-4 * np.random.default_rng(3).standard_normal(t.size), 1e-4)
+    assert low <= speed <= high and high - low < 2.0 and (low == high == 0.0) == (speed == 0.0)
