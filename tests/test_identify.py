@@ -104,6 +104,13 @@ def test_a_winding_that_the_recording_does_not_show_is_left_out(wave):
     assert told["J"].value is None and told["k_s/J"].value == pytest.approx(28.29, rel=0.02) and told["c_1"].value == pytest.approx(148.4, rel=0.02)
 
 
+def test_a_winding_may_be_bounded_by_nothing():
+    t, sheet = np.arange(1000) / 1e3, read_datasheet("table1")
+    columns = simulate_recording(sheet, t, INPUTS["multisine"](t), noise=math.radians(0.01), seed=3)
+    recording = from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"])
+    assert identify([recording], sheet, Settings(bounds={"L": (0.0, 1.0)})).explains
+
+
 def test_bounds_of_a_guess_move_with_it():
     t, sheet = np.arange(10_000) / 1e3, read_datasheet("table1")
     columns = simulate_recording(sheet, t, INPUTS["square"](t), noise=math.radians(0.01), seed=2704)

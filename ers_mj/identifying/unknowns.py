@@ -17,6 +17,7 @@ from ers_mj.traces import Trace
 LETTERS = ("L", "R", "k_s", "T_LH", "F_c", "J", "B", "K_t", "K_e", "theta_0")  # Eq. (1), in the paper's order
 NEEDED = ("J", "B", "K_t", "K_e", "R")  # without them Eq. (1) cannot run
 FACTORS = (0.2, 3.0)  # of what is known beforehand, between which a positive one is searched
+QUICKEST = 0.03  # of the sample time: a winding that is quicker moves no sample, and takes a simulation that many times as long
 REST = {"a_1": 0.0, "a_2": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0}
 UNITS = {"J": "kg m^2", "B": "N m s/rad", "K_t": "N m/A", "K_e": "V s/rad", "k_s": "N m/rad", "T_LH": "N m", "F_c": "N m", "R": "ohm", "L": "H", "n": "-"}
 
@@ -134,7 +135,8 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
     for name in order:
         if name in bounds:
             names.append(name)
-            ends.append(bounds[name])
+            least = QUICKEST * min(t.sample_time for t in traces) * (known["R"] if name == "L" else 1.0) if name in ("L", "tau_e") else -math.inf
+            ends.append((max(bounds[name][0], least), max(bounds[name][1], 2.0 * least)))
         elif name == "theta_0":
             if springs:
                 names.append(name)
