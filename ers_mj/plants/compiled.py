@@ -8,6 +8,8 @@ import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
+import numba
+
 
 def cache_folder() -> Path:
     """A writable folder named after the sources that are compiled (effects and plants)."""
@@ -25,11 +27,23 @@ def cache_folder() -> Path:
     return folder
 
 
+def part(function):
+    """Compile a function that compiled ones call, and that makes no arrays of its own.
+
+    Numba counts who holds an array at every call, in atomic additions that cost more than the arithmetic of a small function: a simulation
+    without them takes a half to a third of the time.
+    """
+    return numba.njit(nogil=True, _nrt=False)(function)
+
+
+def inlined(function):
+    """As ``part``, put into its callers: for what is small or called in one place."""
+    return numba.njit(nogil=True, _nrt=False, forceinline=True)(function)
+
+
 @contextmanager
 def compiled_cache():
     """Numba keeps what is decorated inside this block in :func:`cache_folder`."""
-    import numba
-
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_folder())
     try:

@@ -26,7 +26,7 @@ from numba import njit, types
 
 from ers_mj.effects import EFFECTS
 from ers_mj.effects.base import Coefficients
-from ers_mj.plants.compiled import compiled_cache
+from ers_mj.plants.compiled import compiled_cache, inlined, part
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
@@ -91,7 +91,7 @@ _torque_of = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if 
 _friction_of = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
 
 
-@njit(nogil=True)
+@inlined
 def _torque(on, p, theta, w, j, t):
     """Sum of the torques of the effects that are on."""
     a = 0.0
@@ -101,7 +101,7 @@ def _torque(on, p, theta, w, j, t):
     return a
 
 
-@njit(nogil=True)
+@inlined
 def _friction(on, p, level, theta, w, j, direction):
     """The friction level after every effect that is on."""
     for i in range(on[1, 0]):
@@ -119,7 +119,7 @@ def rows_of(names):
     return on
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _stop_force(c, stop, theta, w):
     """Acceleration of the touched stop (0 where none is)."""
     if stop == 0:
@@ -128,7 +128,7 @@ def _stop_force(c, stop, theta, w):
     return -c[K_STOP] * (theta - wall) - c[D_STOP] * w
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _twist_force(c, twist, theta, w, theta_m, w_m):
     """Acceleration (per total inertia) that the motor's side exerts on the rudder through the contact."""
     if twist == 0:
@@ -136,25 +136,25 @@ def _twist_force(c, twist, theta, w, theta_m, w_m):
     return c[K_TWIST] * (theta_m - theta - twist * c[GAP]) + c[D_TWIST] * (w_m - w)
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _has_bristle(c):
     """Whether the second body is the foot of a bristle, which has no inertia."""
     return c[TWO] > 0 and c[RHO] <= 0
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _never_sticks(c, on):
     """Whether the rudder has no dry friction, and the same damping both ways: its slip s then stays 1, whichever way it moves."""
     return c[C_PLUS] <= 0 and c[C_MINUS] <= 0 and c[C_1] <= 0 and on[1, 0] == 0 and c[A_PLUS] == c[A_MINUS] and not _has_bristle(c)
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _drive_speed(c, x):
     """Speed of the body that the drive acts on, which makes the back-EMF."""
     return x[4] if c[TWO] > 0 and c[RHO] > 0 else x[1]
 
 
-@njit(nogil=True)
+@part
 def _level(c, on, p, lawful, x, direction):
     """Level of friction on a bristle in one direction, per total inertia."""
     level = c[C_PLUS] if direction > 0 else c[C_MINUS]
@@ -163,7 +163,7 @@ def _level(c, on, p, lawful, x, direction):
     return max(level, LEAST_LEVEL * 0.5 * (c[C_PLUS] + c[C_MINUS]))
 
 
-@njit(nogil=True)
+@part
 def _bristle(c, on, p, lawful, x, s_m):
     """(force of the bristle on the rudder, per total inertia; the speed of its foot)."""
     if s_m != 0:
@@ -174,13 +174,13 @@ def _bristle(c, on, p, lawful, x, s_m):
     return -pull - c[D_TWIST] * math.exp(-(x[1] / c[FADE]) ** 2) * (x[1] - speed), speed
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _viscous(c, s_m, w):
     """Mechanical damping of a rudder on a bristle."""
     return c[A_PLUS] if s_m > 0 or (s_m == 0 and w > 0) else c[A_MINUS]
 
 
-@njit(nogil=True)
+@inlined
 def _held(c, on, p, lawful, t, x, m):
     """(net acceleration without friction on the rudder at rest, its friction up, down), per total inertia."""
     theta, w, j, theta_m, w_m = x
@@ -204,13 +204,13 @@ def _held(c, on, p, lawful, t, x, m):
     return a, up, down
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _motor_friction(c):
     """Friction of the motor's side, per total inertia. Without any it never sticks: its slip s_m stays 1."""
     return c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS])
 
 
-@njit(nogil=True)
+@inlined
 def _held_motor(c, x, m):
     """(net acceleration without friction on the motor's side at rest, its friction), per total inertia."""
     theta, w, j, theta_m, w_m = x
@@ -218,7 +218,7 @@ def _held_motor(c, x, m):
     return a, _motor_friction(c)
 
 
-@njit(nogil=True)
+@inlined
 def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
     """d/dt of (theta, w, j, theta_m, w_m) within a mode."""
     theta, w, j, theta_m, w_m = x
@@ -258,12 +258,12 @@ def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
     return w, dw, dj, w_m, dw_m
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _plus(x, h, d):
     return (x[0] + h * d[0], x[1] + h * d[1], x[2] + h * d[2], x[3] + h * d[3], x[4] + h * d[4])
 
 
-@njit(nogil=True)
+@part
 def _runge_kutta(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     """One classical fourth-order step of length dt."""
     k1 = _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)
@@ -278,7 +278,7 @@ def _runge_kutta(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     return x
 
 
-@njit(nogil=True)
+@part
 def _linear(c, x, m, drive, tau, a_emf, dt, scale):
     """The flow within a mode without laws, exact: Taylor series in steps of about one time constant.
 
@@ -347,19 +347,19 @@ def _linear(c, x, m, drive, tau, a_emf, dt, scale):
     return theta, w, j, theta_m, w_m
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _push(depth, rate, stiffness, damping):
     """A contact's force over its stiffness: the contact pushes where this is positive, and never pulls."""
     return depth + damping / stiffness * rate if stiffness > 0 else depth
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _touch(depth, rate, stiffness, damping):
     """Positive where two bodies that are apart touch: one is inside the other and does not leave it faster than the spring follows."""
     return min(depth, _push(depth, rate, stiffness, damping))
 
 
-@njit(nogil=True)
+@inlined
 def _bristle_violation(e, c, on, p, lawful, x, m):
     """Event function of the bristle: 4, a reversal, ends its slip; 6, bent to the full, begins it."""
     if e == 5 or (e == 4) != (m[3] != 0):
@@ -372,7 +372,7 @@ def _bristle_violation(e, c, on, p, lawful, x, m):
     return abs(pull) - FULL * _level(c, on, p, lawful, x, 1.0 if x[1] > 0 else -1.0)
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _violation(e, c, on, p, lawful, t, x, m):
     """Event function e: positive where the mode's inequality fails."""
     theta, w, j, theta_m, w_m = x
@@ -409,7 +409,7 @@ def _violation(e, c, on, p, lawful, t, x, m):
     return abs(a) - level
 
 
-@njit(nogil=True)
+@inlined
 def _direction(a, up, down):
     """Slip direction of a body at rest: 0 within its friction."""
     if a > up:
@@ -417,7 +417,7 @@ def _direction(a, up, down):
     return -1 if a < -down else 0
 
 
-@njit(nogil=True)
+@part
 def _switch(e, c, on, p, lawful, t, x, m, corner):
     """State and mode just after event e."""
     theta, w, j, theta_m, w_m = x
@@ -464,7 +464,7 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
     return x, (s, side, stop, s_m, twist)
 
 
-@njit(nogil=True)
+@part
 def _rate(c, m, w, tau, a_emf):
     """An upper bound [1/s] of the fastest rate in a mode."""
     rate = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
@@ -483,7 +483,7 @@ def _rate(c, m, w, tau, a_emf):
     return rate
 
 
-@njit(nogil=True)
+@part
 def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     """The state dt later within the mode."""
     bends = _has_bristle(c) and m[3] == 0
@@ -495,7 +495,7 @@ def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     return x
 
 
-@njit(nogil=True)
+@part
 def _locate(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, g1):
     """First instant in (0, dt] where event function e vanishes (Illinois method on the flow), and the state there.
 
@@ -530,13 +530,13 @@ def _locate(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, g1):
     return te, z
 
 
-@njit(nogil=True)
+@inlined
 def _bounded(x):
     """Whether the motion has not run away."""
     return abs(x[0]) < RUNAWAY and abs(x[1]) < RUNAWAY
 
 
-@njit(nogil=True)
+@part
 def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
     """Integrate over dt under a constant drive, through every event on the way. Returns (x, m, number of events)."""
     if tau <= 0:
@@ -578,7 +578,7 @@ def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
     return x, m, events
 
 
-@njit(nogil=True)
+@part
 def _start_mode(c, on, p, lawful, t, x):
     """The mode that fits an initial state."""
     theta, w = x[0], x[1]
@@ -600,7 +600,7 @@ def _start_mode(c, on, p, lawful, t, x):
     return s, side, stop, s_m, twist
 
 
-@njit(nogil=True)
+@inlined
 def _corrected(c, on, p, lawful, t, x, m, jump):
     """The state after the observer has moved the angle by ``jump`` (both bodies), unless the corner holds it."""
     theta = x[0] + jump
@@ -617,13 +617,13 @@ def _corrected(c, on, p, lawful, t, x, m, jump):
     return z, m_new
 
 
-@njit(nogil=True)
+@inlined
 def _unit(k):
     return (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0, 1.0 if k == 3 else 0.0,
             1.0 if k == 4 else 0.0)
 
 
-@njit(nogil=True)
+@part
 def _fill_map(e, c, m, tau, a_emf, h):
     """The exact map over h in a mode with side 0: e (5, 11), columns x (5), constant, drive, side, force 1, s, s^2 (s = t/h)."""
     for k in range(5):
@@ -665,13 +665,13 @@ def _maps(c, tau, a_emf, h):
     return e
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _row(e, i, x, drive, side, f0, f1, f2):
     return (e[i, 0] * x[0] + e[i, 1] * x[1] + e[i, 2] * x[2] + e[i, 5] + e[i, 6] * drive + e[i, 7] * side
             + e[i, 8] * f0 + e[i, 9] * f1 + e[i, 10] * f2)
 
 
-@njit(nogil=True, inline="always")
+@inlined
 def _mapped(e, two, x, drive, side, f0, f1, f2):
     """The state after a map, under the force f0 + f1 s + f2 s^2 (s from 0 to 1) on the rudder."""
     if not two:
@@ -684,7 +684,7 @@ def _mapped(e, two, x, drive, side, f0, f1, f2):
             _row(e, 4, x, drive, side, f0, f1, f2) + e[4, 3] * x[3] + e[4, 4] * x[4])
 
 
-@njit(nogil=True)
+@inlined
 def _extra(c, on, p, t, x, s):
     """What the laws of effects add to the force on a slipping rudder, per total inertia."""
     level = c[C_PLUS] if s > 0 else c[C_MINUS]
@@ -692,7 +692,7 @@ def _extra(c, on, p, t, x, s):
     return _torque(on, p, x[0], x[1], x[2], t) - s * share * (_friction(on, p, level, x[0], x[1], x[2], float(s)) - level)
 
 
-@njit(nogil=True)
+@inlined
 def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
     """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they add now (NaN: unknown)."""
     two = c[TWO] > 0
@@ -712,7 +712,7 @@ def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
     return _mapped(whole, two, x, drive, m[1], g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0)), end
 
 
-@njit(nogil=True)
+@inlined
 def _grazes(c, x, z, m, h):
     """True where a rudder on a bristle may have crossed theta_0 and come back between x and z."""
     inwards, outwards = -m[1] * x[1], m[1] * z[1]
@@ -721,7 +721,7 @@ def _grazes(c, x, z, m, h):
     return m[1] * (x[0] - c[THETA_0]) < inwards * h * inwards / (inwards + outwards)
 
 
-@njit(nogil=True)
+@inlined
 def _still(c, on, p, lawful, t, x, m, drive, tau, a_emf):
     """Whether a rudder on a bent bristle rests: in the corner, or within STILL of the bristle's whole bend from where it would."""
     if m[0] == 0:
@@ -731,7 +731,7 @@ def _still(c, on, p, lawful, t, x, m, drive, tau, a_emf):
             and abs(_derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1]) < small)
 
 
-@njit(nogil=True)
+@inlined
 def _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
     """True where a slipping body may have stopped and gone on within the step from x to z: it brakes first, speeds up last."""
     if _has_bristle(c):
@@ -770,7 +770,7 @@ def _cuts(c, h0, tau, a_emf, lawful, refine):
     return ends, fresh, skip
 
 
-@njit(nogil=True)
+@inlined
 def _clean(c, on, p, lawful, t, x, z, m, tau, load, h):
     """Whether the state z, h after x, lies within the mode of two bodies."""
     bias = c[BIAS]
@@ -784,36 +784,31 @@ def _clean(c, on, p, lawful, t, x, z, m, tau, load, h):
     return clean
 
 
-@njit(nogil=True)
+@inlined
 def _calm(c, x, h):
     """Whether the twist of two bodies is further from the ends of the play than it moves within h."""
     return c[GAP] <= 0 or abs(x[4] - x[1]) * h <= CALM * abs(abs(x[3] - x[0]) - c[GAP])
 
 
-@njit(nogil=True)
+@inlined
 def _steady(x, z):
     """Whether neither body comes near rest between the states x and z."""
     return abs(z[1]) >= CALM * abs(x[1]) and abs(z[4]) >= CALM * abs(x[4])
 
 
-def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
-    """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
+@inlined
+def _last(ends):
+    """Length of a sample's last segment [s]."""
+    return ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
 
-    ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
-    hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
-    holds the rows of the effects with a law (see rows_of), ``p`` (effects, N_PARAMETERS) their constants; ``refine`` divides the
-    segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
-    """
+
+@inlined
+def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out):
+    """See ``_simulate``: through the samples, by maps over segments (late, early, the first of a sample) or, if it ``leaps``, over a whole sample."""
     n = t.size
     lawful, two, bristle, slips = on[0, 0] + on[1, 0] > 0, c[TWO] > 0, _has_bristle(c), _never_sticks(c, on)
-    h0 = t[1] - t[0]
+    h0, last = t[1] - t[0], _last(ends)
     tau, a_emf, bias = c[TAU], c[A_EMF], c[BIAS]
-    ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
-    first = ends[0]
-    last = ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
-    late, early = _maps(c, tau, a_emf, last), _maps(c, tau, a_emf, first)
-    leaps = two and not bristle and not lawful and ends.size > 1 and fresh[0] == 1
-    whole = _maps(c, tau, a_emf, h0) if leaps else early
     h_max = np.inf
     if c[UPPER] < np.inf or c[LOWER] > -np.inf:
         h_max = CONTACT_STEP / (math.sqrt(c[K_STOP]) + c[D_STOP])
@@ -910,6 +905,23 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
         if not _bounded(x) or budget < 0:
             out[k + 1:, :] = np.nan
             return
+
+
+def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
+    """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
+
+    ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
+    hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
+    holds the rows of the effects with a law (see rows_of), ``p`` (effects, N_PARAMETERS) their constants; ``refine`` divides the
+    segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
+    """
+    lawful, h0 = on[0, 0] + on[1, 0] > 0, t[1] - t[0]
+    tau, a_emf = c[TAU], c[A_EMF]
+    ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
+    late, early = _maps(c, tau, a_emf, _last(ends)), _maps(c, tau, a_emf, ends[0])
+    leaps = c[TWO] > 0 and not _has_bristle(c) and not lawful and ends.size > 1 and fresh[0] == 1
+    whole = _maps(c, tau, a_emf, h0) if leaps else early
+    _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out)
 
 
 READ, READ_BOOL = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.bool_, 1, "C", readonly=True)

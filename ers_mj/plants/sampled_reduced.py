@@ -10,7 +10,7 @@ from numba import njit, types
 from ers_mj.effects import BY_NAME
 from ers_mj.plants.compiled import compiled_cache
 from ers_mj.plants.events import (A_EMF, B, BRISTLE_CORNER, C_1, C_PLUS, CONTACT_STEP, CORNER, D_STOP, DELAY, K_STOP, K_TWIST, LOWER, RHO, TAU, TWO, UPPER,
-                                  _advance, _bounded, _cuts, _has_bristle, _start_mode)
+                                  _advance, _bounded, _cuts, _has_bristle, _last, _start_mode)
 from ers_mj.plants.reduced import ReducedModel
 
 
@@ -36,7 +36,7 @@ def _sample(t, h0, before, now, c, on, p, refine, x, m):
     lawful, two, bristle = on[0, 0] + on[1, 0] > 0, c[TWO] > 0, _has_bristle(c)
     tau, a_emf = c[TAU], c[A_EMF]
     ends, fresh, _ = _cuts(c, h0, tau, a_emf, lawful, refine)
-    last = ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
+    last = _last(ends)
     h_max = np.inf
     if c[UPPER] < np.inf or c[LOWER] > -np.inf:
         h_max = CONTACT_STEP / (math.sqrt(c[K_STOP]) + c[D_STOP])

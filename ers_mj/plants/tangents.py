@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-from ers_mj.plants.compiled import compiled_cache
+from ers_mj.plants.compiled import compiled_cache, inlined
 from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, READ, READ_BOOL, ROWS, LAWS, TAU, THETA_0, VECTOR,
                                   _derivative, _extra, _maps)
 
@@ -29,7 +29,7 @@ MOST = 10.0  # times the motion's extent and largest speed by which a unit of ch
 CORNER = 1e-12  # [output unit] within which a rudder at rest is held in the corner
 
 
-@njit(nogil=True)
+@inlined
 def _acceleration(c, on, p, lawful, t, x, s, side, drive, tau, a_emf, load):
     """Acceleration of a slipping rudder in the state x."""
     bias = c[BIAS]
@@ -39,7 +39,7 @@ def _acceleration(c, on, p, lawful, t, x, s, side, drive, tau, a_emf, load):
     return a
 
 
-@njit(nogil=True)
+@inlined
 def _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, t, x, s, side):
     """What the changed model adds to the force on a rudder that slips in direction s, per unit of the change."""
     a_mech, level = (dc[A_PLUS], dc[C_PLUS]) if s > 0 else (dc[A_MINUS], dc[C_MINUS])
@@ -78,18 +78,12 @@ def _prepare(t, path, c, on, p, maps, out):
         out[k, 2] = (_extra(c, on, p, t[k], (x[0], x[1], x[2] + step, x[3], 0.0), s) - here) / step
 
 
-def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, scale, out):
-    """Fill out (N, 3) with the change of (theta, w, j) per unit of the change that made c_2, on_2, p_2 of c, on, p, times ``scale``.
-
-    ``du`` (N,) is the change of the input per unit. The rest as in simulate_kernel, which has made ``path`` (N, >= 3) of it.
-    """
+@inlined
+def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
+    """See ``_tangent``; ``dc`` is the change of c per unit."""
     h = t[1] - t[0]
     tau, a_emf = c[TAU], c[A_EMF]
     lawful = on[0, 0] + on[1, 0] > 0
-    dc = np.zeros(c.size)
-    for i in range(c.size):
-        if c[i] != c_2[i]:
-            dc[i] = (c_2[i] - c[i]) * scale
     laws = on[1, 0] > 0 and (dc[C_PLUS] != 0.0 or dc[C_MINUS] != 0.0)
     for i in range(p.shape[0]):
         for k in range(p.shape[1]):
@@ -177,6 +171,18 @@ def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, 
             else:
                 a_1, b_1 = dc[THETA_0], 0.0
         a, b, d = min(max(a_1, -MOST * (high - low)), MOST * (high - low)), min(max(b_1, -MOST * fastest), MOST * fastest), d_1
+
+
+def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, scale, out):
+    """Fill out (N, 3) with the change of (theta, w, j) per unit of the change that made c_2, on_2, p_2 of c, on, p, times ``scale``.
+
+    ``du`` (N,) is the change of the input per unit. The rest as in simulate_kernel, which has made ``path`` (N, >= 3) of it.
+    """
+    dc = np.zeros(c.size)
+    for i in range(c.size):
+        if c[i] != c_2[i]:
+            dc[i] = (c_2[i] - c[i]) * scale
+    _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
 
 
 TABLE, MAPS = types.float64[:, ::1], types.float64[:, :, :, ::1]
