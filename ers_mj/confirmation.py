@@ -10,13 +10,14 @@ import numpy as np
 
 from ers_mj.baseline import Start
 from ers_mj.effects import BY_NAME
-from ers_mj.evaluation import Fold, Score, folds, paired_p, pooled, recalibrated, refits, scored
-from ers_mj.identification import Fit, fit, polished, score
-from ers_mj.model import Model
+from ers_mj.evaluation import Fold, Score, folds, halves, paired_p, pooled, recalibrated, refits, scored
+from ers_mj.identification import Fit, fit, polished, residuals_in, score
+from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.selection import Selection
-from ers_mj.traces import Trace
+from ers_mj.traces import Blocks, Trace
 
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
+ALONE = 0.6  # share of an effect's gain in one recording, from which it is judged within that one as well
 CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
 WORSE = 1.3  # times the raw error that an effect which only recalibration confirms may make of it
 HALF = 0.5  # share of the squared error that must go
@@ -46,13 +47,12 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         after = _scores(after_models, parts)
         without, p, lesser_models = {}, {}, {}
         for name in model.names:
-            if len(model.names) > 1:
-                less = _without(name, model, start, selection.tau).model
-                lesser_models[name] = refits(less, parts, selection.tau, jobs)
-            else:
-                lesser_models[name] = base_models
+            less = _without(name, model, start, selection.tau).model if len(model.names) > 1 else start.fit.model
+            lesser_models[name] = refits(less, parts, selection.tau, jobs) if len(model.names) > 1 else base_models
             without[name] = pooled(_scores(lesser_models[name], parts))
             p[name] = paired_p(pooled(after).misfit, without[name].misfit, BY_NAME[name].once)
+            if p[name] > LARGEST_P and not held and len(start.traces) > 1:
+                p[name] = min(p[name], _p_within(model, less, start, selection.tau, jobs))
         failed = [n for n in model.names if (p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse)
                   and not _halves(pooled(after), without[n], parts)
                   and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))]
@@ -61,6 +61,24 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         worst = max(failed, key=lambda n: p[n])
         reduced = _without(worst, model, start, selection.tau)
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
+
+
+def _p_within(model: Model, less: Model, start: Start, tau: float, jobs: int) -> float:
+    """The p-value of an effect that one recording shows, within it: left out as a whole, it leaves nothing to learn the effect from.
+
+    Either half of that recording is held out in turn. 1 where no recording holds ALONE of the gain, or where the halves' free runs do not improve.
+    """
+    traces = list(start.traces)
+    won = np.array([float(np.sum(score(_misfit(less, t, k), tau) - score(_misfit(model, t, k), tau))) for k, t in enumerate(traces)])
+    if not won.max() >= ALONE * np.maximum(won, 0.0).sum() > 0.0:
+        return 1.0
+    parts = halves(traces, int(np.argmax(won)))
+    after, before = (pooled(_scores(refits(some, parts, tau, jobs), parts)) for some in (model, less))
+    return paired_p(after.misfit, before.misfit) if after.rmse < before.rmse else 1.0
+
+
+def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:
+    return Blocks.of([trace]).misfit(residuals_in(model, trace, record, OBSERVER_RATE))
 
 
 def _without(name: str, model: Model, start: Start, tau: float) -> Fit:

@@ -23,7 +23,7 @@ from ers_mj.starts import with_starts
 from ers_mj.intervals import half_widths
 from ers_mj.isolability import isolability, probabilities
 from ers_mj.localisation import Place, gather, over_frequency, places, residual_map, shaded
-from ers_mj.multibody import Rig
+from ers_mj.multibody import Rig, run_in_mujoco
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.recording import Recording
 from ers_mj.selection import Candidate, Selection
@@ -124,6 +124,7 @@ class Case:
                 "recalibrated_rmse_before_rad": pooled(again[0]).rmse, "recalibrated_rmse_after_rad": pooled(again[1]).rmse,
                 "mujoco_heldout_rmse_before_rad": self.multibody[0], "mujoco_heldout_rmse_after_rad": self.multibody[1],
                 "noise_floor_rad": self.noise, "heldout_from": c.sentence,
+                "mujoco_heldout_from": f"the MuJoCo plant ran {', '.join(fold.held_out.name for fold in run_in_mujoco(c.parts))} of what was held out",
                 "selection_cost_before": self.start.fit.cost, "selection_cost_after": self.selection.chosen.cost}
 
     def _explained(self, fits: dict) -> float:

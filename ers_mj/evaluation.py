@@ -87,12 +87,18 @@ def _strange(model: Model) -> Model:
 class Fold:
     """A held-out recording, and the training ones where the model must be refitted without it (None: it never saw it).
 
-    ``record`` is the held-out one's place among all training recordings where it is one of them.
+    ``record`` is the held-out one's place among all training recordings where it is one of them, or where, ``halved``, its other part is.
     """
 
     held_out: Trace
     training: tuple[Trace, ...] | None
     record: int = 0
+    halved: bool = False
+
+    @property
+    def known(self) -> list[int]:
+        """The places of the training ones among all recordings."""
+        return [k for k in range(len(self.training) + (not self.halved)) if self.halved or k != self.record]
 
 
 def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold], str]:
@@ -103,8 +109,15 @@ def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold]
         return ([Fold(out, tuple(t for t in traces if t is not out), k) for k, out in enumerate(traces)],
                 "each recording was held out in turn while the parameters were refitted to the others; the structure was chosen on all")
     cut = int(LAST_PART * traces[0].t.size)
-    return ([Fold(traces[0].part(cut, traces[0].t.size), (traces[0].part(0, cut),))],
+    return ([Fold(traces[0].part(cut, traces[0].t.size), (traces[0].part(0, cut),), halved=True)],
             "the last 30 % of the only recording was held out while the parameters were refitted; the structure was chosen on all of it")
+
+
+def halves(traces: Sequence[Trace], record: int) -> list[Fold]:
+    """Either half of one recording held out, the other half and the other recordings left to fit to."""
+    cut = traces[record].t.size // 2
+    both = traces[record].part(0, cut), traces[record].part(cut, traces[record].t.size)
+    return [Fold(out, (*traces[:record], left, *traces[record + 1:]), record, halved=True) for out, left in (both, both[::-1])]
 
 
 def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int, steps: int = 6) -> list[Model]:
@@ -112,8 +125,7 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int, steps: in
     def one(fold: Fold) -> Model:
         if fold.training is None:
             return settled(_strange(model), fold.held_out, tau)
-        others = [k for k in range(len(fold.training) + 1) if k != fold.record] if len(parts) > 1 else [0]
-        found = fit(model.of_records(others), fold.training, tau=tau, steps=steps).model
+        found = fit(model.of_records(fold.known), fold.training, tau=tau, steps=steps).model
         mine = {name: rows[[fold.record]] for name, rows in (model.local or {}).items()}
         return settled(replace(found, local=mine or None), fold.held_out, tau)
 

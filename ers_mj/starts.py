@@ -8,16 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from ers_mj.model import OBSERVER_RATE, Model
-from ers_mj.symptoms import excursions
+from ers_mj.symptoms import excursions, held_spans
 from ers_mj.traces import Trace, start_samples, start_seen
 
 SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
 SPIKE_SAMPLES, SPIKE_TIME = 3, 0.005  # length of a spike at most, and [s]
+HELD_SIGMAS, HELD_STEPS, HELD_LEAP = 6.0, 2.0, (0.6, 1.6)  # noise levels and converter steps of a model's motion during a hold; share of it in the leap after
 FEWEST_SPIKES = 3  # that the recordings must show by themselves before the model's error is searched
 
 
 def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
-    """The traces without the spikes that stand out of the model's error, where the recordings themselves show that their sensor has some.
+    """The traces without the spikes and holds that only a model's motion betrays, where the recordings themselves show that their sensor has some.
 
     Within SPIKE_TIME a rudder's own error is smooth, but for the blows of a play or a stop, which look like a spike.
     """
@@ -25,9 +26,25 @@ def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
         return list(traces)
     out = []
     for k, trace in enumerate(traces):
-        e = np.where(trace.valid, (trace.y - model.predict(trace, k, OBSERVER_RATE)) / trace.sigma, np.nan)
-        longest = min(SPIKE_SAMPLES, int(SPIKE_TIME / trace.sample_time + 1e-6))
-        out.append(trace.without(excursions(e, 1.0, *SPIKE, longest)) if longest and np.isfinite(e[trace.valid]).all() else trace)
+        simulated = model.predict(trace, k, OBSERVER_RATE)
+        if np.isfinite(simulated).all():
+            trace = trace.without(_held(trace, simulated))
+            e = np.where(trace.valid, (trace.y - simulated) / trace.sigma, np.nan)
+            longest = min(SPIKE_SAMPLES, int(SPIKE_TIME / trace.sample_time + 1e-6))
+            trace = trace.without(excursions(e, 1.0, *SPIKE, longest)) if longest else trace
+        out.append(trace)
+    return out
+
+
+def _held(trace: Trace, simulated: np.ndarray) -> list[slice]:
+    """Repeats of the output while the model moves, after which it leaps to where the model is: a rudder that sticks has no such leap."""
+    y, out = trace.y, []
+    for s in held_spans(y, 2):
+        if s.stop < y.size and trace.valid[s.start:s.stop + 1].all():
+            moved, leap = simulated[s.stop - 1] - simulated[s.start], y[s.stop] - y[s.start]
+            way = simulated[s.stop] - simulated[s.start]
+            if abs(moved) > max(HELD_SIGMAS * trace.sigma, HELD_STEPS * trace.quantum) and HELD_LEAP[0] * abs(way) < leap * np.sign(way) < HELD_LEAP[1] * abs(way):
+                out.append(slice(s.start + 1, s.stop))
     return out
 
 
