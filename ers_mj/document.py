@@ -20,7 +20,7 @@ from ers_mj.evidence import Evidence, RecordView, Rung
 from ers_mj.identification import Fit, residuals, score
 from ers_mj.model import BASE, STATES, Model
 from ers_mj.starts import with_starts
-from ers_mj.intervals import half_widths
+from ers_mj.intervals import half_widths, unseen_widths
 from ers_mj.isolability import isolability, probabilities
 from ers_mj.localisation import Place, gather, over_frequency, places, residual_map, shaded
 from ers_mj.multibody import Rig, run_in_mujoco
@@ -266,7 +266,8 @@ class Case:
             left_out = self.confirmed.models if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2 else []
             layout = model.layout()
             z, out = model.vector(layout), {}
-            for f, q, e in zip(layout, z, half_widths(model, self.start.traces, left_out, self.selection.tau)):
+            traces, tau = self.start.traces, self.selection.tau
+            for f, q, e in zip(layout, z, np.hypot(half_widths(model, traces, left_out, tau), unseen_widths(model, traces, tau))):
                 if (f.owner, f.name) in out:  # of a further recording
                     continue
                 ends = f.ends(q, e)

@@ -1,5 +1,7 @@
 """Intervals that survive model error: a jackknife over recordings and a sandwich over blocks.
 
+What is too small to be found moves the parameters as well, further than the noise does: ``unseen_widths`` tells how far.
+
 (J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what differs between
 recordings, but a refit may rest in the dent of the cost where it begins, and then says nothing; the sandwich only sees
 the scatter within them.
@@ -12,10 +14,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
+from ers_mj.effects import BY_NAME
 from ers_mj.identification import central_jacobian, residuals
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.traces import Blocks, Trace
 
+UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (selection.LEAST_GAIN is what it must)
+UNSEEN = 1.0  # effects of that size that act, on average
 FEWEST_RECORDS = 3
 RUN = 4  # neighbouring blocks that are resampled together
 
@@ -49,3 +54,30 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
     n = slopes.shape[0]
     covariance = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
     return student.ppf(0.975, max(n - len(layout), 1)) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def unseen_widths(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
+    """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move to make up for them.
+
+    Each effect's secant, at a size that would gain UNSEEN_GAIN beside the model and never larger than its start, shifts the numbers by what a fit
+    makes of it; any effect is as likely as the next, UNSEEN of them act.
+    """
+    layout, blocks = model.layout(), Blocks.of(traces)
+    e = residuals(model, traces, OBSERVER_RATE)
+    jacobian = central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
+    weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
+    hessian = jacobian.T @ (weight[:, None] * jacobian)
+    inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
+    known = (*model.names, *(("inductance",) if model.values["tau_e"] > 0 else ()))
+    shifts = []
+    for effect in (effect for name, effect in BY_NAME.items() if name not in known and not effect.once):
+        found = []
+        for start in (starts := effect.starts(model.scales))[:1] + starts[1:][-1:]:
+            secant = residuals(model.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
+            if np.all(np.isfinite(secant)):
+                pull = jacobian.T @ (weight * secant)
+                apart = float(secant @ (weight * secant) - pull @ inverse @ pull)
+                found.append(inverse @ pull * min(1.0, np.sqrt(2.0 * UNSEEN_GAIN / max(apart, 1e-12))))
+        if found:
+            shifts.append(np.mean(np.square(found), axis=0))
+    return 1.96 * np.sqrt(UNSEEN * np.mean(shifts, axis=0)) if shifts else np.zeros(len(layout))

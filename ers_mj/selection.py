@@ -256,10 +256,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
 
 
 def _most_rounds(current: Fit) -> int:
-    """How many rounds there are at most: one where what is dear to simulate leaves the model wrong, since beside it every refit is."""
-    if near_noise(current):
-        return MOST_ROUNDS
-    return 1 if any(BY_NAME[name].dear for name in current.model.names) else FEWER_ROUNDS
+    """How many rounds there are at most: fewer where the model itself stays wrong."""
+    return MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS
 
 
 def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
