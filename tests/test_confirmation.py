@@ -1,0 +1,95 @@
+"""What held-out data confirms, what a model betrays of its sensor, and how far the unseen moves the numbers."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ers_mj.baseline import baseline
+from ers_mj.confirmation import _p_within
+from ers_mj.datasheet import Datasheet
+from ers_mj.evaluation import folds, halves
+from ers_mj.identification import fit
+from ers_mj.intervals import half_widths, unseen_widths
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.recording import from_arrays
+from ers_mj.screening import screen
+from ers_mj.starts import without_spikes
+from ers_mj.traces import trace_of
+
+T = np.arange(0.0, 3.0, 1e-3)
+TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625}
+NOISE = 1.5e-4
+
+
+def trace(name, effects=(), sensor=lambda y: y, gain=1.0, seed=0):
+    u = gain * INPUTS[name](T)
+    y = ReducedModel(lumped(TRUTH), effects).simulate(T, u).measured + NOISE * np.random.default_rng(seed).standard_normal(T.size)
+    return trace_of(from_arrays(T, u, sensor(y), name=name), None)
+
+
+def started(traces):
+    return baseline(traces, Datasheet(lumped=TRUTH), True, 1)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """A servo without missing physics."""
+    return started([trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
+
+
+def holding(y, begins, length=12):
+    y = y.copy()
+    for begin in begins:
+        y[begin:begin + length] = y[begin]
+    return y
+
+
+def test_a_hold_behind_a_coarse_converter_is_betrayed_by_the_model(plain):
+    begins = np.arange(150, 2900, 125)
+    step = 2.5 * NOISE
+    coarse = trace("multisine", sensor=lambda y: step * np.round(holding(y, begins) / step))
+    found = without_spikes(plain.fit.model, [coarse])[0]
+    moving = [b for b in begins if abs(coarse.y[b + 12] - coarse.y[b]) > 6 * step]
+    masked = [b for b in moving if not found.valid[b + 1:b + 12].any()]
+    assert len(coarse.lost) >= 3 and len(moving) >= 8 and len(masked) >= 0.8 * len(moving)
+
+
+def test_a_rudder_that_sticks_is_not_held(plain):
+    whole = trace("multisine", sensor=lambda y: 2.5 * NOISE * np.round(y / (2.5 * NOISE)))
+    whole = replace(whole, lost=(slice(5, 6),) * 3)  # as where its sensor had been seen to hang
+    assert np.array_equal(without_spikes(plain.fit.model, [whole])[0].valid, whole.valid)
+
+
+def test_what_cannot_be_scaled_begins_nearest_to_what_it_explains(plain):
+    peak = max(float(np.abs(t.u).max()) for t in plain.traces)
+    clipped = [trace(name, [("voltage_saturation", np.array([0.93 * peak]))], seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))]
+    start = started(clipped)
+    begins = screen([start.fit.model], clipped, 1.0, (), False, False).begins["voltage_saturation"][0]
+    assert dict(begins[0].model.effects)["voltage_saturation"][0] == pytest.approx(0.95 * peak)
+
+
+def test_an_effect_that_one_recording_shows_is_judged_within_it():
+    calm, wide = trace("multisine", gain=0.5), trace("multisine", gain=1.0)
+    upper = float(np.nanquantile(wide.y, 0.97))
+    stop = np.array([-math.inf, upper, 3e5, 50.0])
+    assert np.nanmax(calm.y) < upper
+    traces = [trace("multisine", [("end_stop", stop)], gain=0.5), trace("steps", gain=0.5, seed=1), trace("multisine", [("end_stop", stop)], seed=2)]
+    start = started(traces)
+    chosen = fit(start.fit.model.with_effect("end_stop", stop), start.traces)
+    assert _p_within(chosen.model, start.fit.model, start, 1.0, 1) < 0.05
+    nowhere = chosen.model.without_effect("end_stop").with_effect("end_stop", stop + 1.0)
+    assert _p_within(nowhere, start.fit.model, start, 1.0, 1) > 0.5
+    first, second = halves(start.traces, 2)
+    assert first.known == second.known == [0, 1, 2] and first.held_out.t[-1] < second.held_out.t[0]
+    assert [fold.known for fold in folds(start.traces, [])[0]] == [[1, 2], [0, 2], [0, 1]]
+
+
+def test_what_is_too_small_to_be_found_widens_the_intervals(plain):
+    faint = started([trace(name, [("quadratic_drag", np.array([0.02]))], seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
+    model, layout = faint.fit.model, faint.fit.model.layout()
+    noise, unseen = half_widths(model, faint.traces, (), 1.0), unseen_widths(model, faint.traces, 1.0)
+    off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))
+    assert np.all(unseen > 0) and np.all(off < 2.0 * np.hypot(noise, unseen))
