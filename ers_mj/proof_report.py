@@ -12,7 +12,8 @@ from ers_mj.proving.scoring import NOTHING, first
 TOLD = {
     "top1": "single effects named right, by name", "top1_class": "single effects named right, by class",
     "top1_class_visible": "of these visible from 1 sigma on", "false_alarm_rate": "null cases with a named effect",
-    "pair_recall": "effects found, of several at once", "pair_spurious": "names too many, for an effect of several",
+    "pair_recall": "effects found, of several at once", "pair_recall_visible": "of these visible from 1 sigma on by themselves",
+    "pair_spurious": "names too many, for an effect of several",
     "unexplained_recall": "effects outside the library flagged", "false_flag_rate": "all others flagged",
     "subsystem_recall": "single effects with the right subsystem first",
 }

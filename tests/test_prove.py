@@ -231,8 +231,9 @@ def test_a_real_child_fails_in_one_sentence(tmp_path):
 # -- scores ----------------------------------------------------------------------------------------------------
 
 
-def truth_and_answer(kind, labels, named, visibility=10.0, significant=False, verdict="missing_physics", where="load", alternatives=()):
-    truth = {"case": "case-001", "kind": kind, "labels": labels, "visibility_after_refit_sigma": visibility, "linkage": "constant"}
+def truth_and_answer(kind, labels, named, visibility=10.0, significant=False, verdict="missing_physics", where="load", alternatives=(), each={}):
+    truth = {"case": "case-001", "kind": kind, "labels": labels, "visibility_after_refit_sigma": visibility, "linkage": "constant",
+             "effects": [{"label": label, "strength": None, "shape": {}, "quick_visibility_sigma": sigma} for label, sigma in each.items()]}
     missing = [{"effect": n, "alternatives": [dict(zip(("effect", "probability"), a)) for a in alternatives]} for n in named]
     document = {"verdict": verdict, "missing": missing, "remainder": {"significant": significant}, "where": [{"axis": "subsystem", "label": where}],
                 "fit": {"heldout_rmse_after_rad": 2.0, "noise_floor_rad": 1.0}}
@@ -246,7 +247,7 @@ def test_shares_are_those_of_the_contract():
         truth_and_answer("single", ["stribeck"], ["stribeck", "backlash"], alternatives=[("presliding", 0.25)]),
         truth_and_answer("single", ["bias_torque"], ["asymmetric_friction"], visibility=0.6),
         truth_and_answer("single", ["backlash"], [], verdict="unexplained", significant=True, where="transmission"),
-        truth_and_answer("several", ["cogging", "stribeck"], ["transmission_ripple", "end_stop"]),
+        truth_and_answer("several", ["cogging", "stribeck"], ["transmission_ripple", "end_stop"], each={"cogging": 3.0, "stribeck": 0.4}),
         truth_and_answer("outside", ["second_resonance"], [], significant=True, verdict="unexplained"),
         truth_and_answer("outside", ["brush_drop"], ["stribeck"]),
     ]
@@ -256,6 +257,7 @@ def test_shares_are_those_of_the_contract():
                                           "unexplained_recall", "false_flag_rate", "subsystem_recall")} == {
         "top1": [1, 3], "top1_class": [2, 3], "top1_class_visible": [1, 2], "false_alarm_rate": [1, 2], "pair_recall": [1, 2],
         "pair_spurious": [1, 2], "unexplained_recall": [1, 2], "false_flag_rate": [2, 6], "subsystem_recall": [3, 3]}
+    assert results["of"]["pair_recall_visible"] == [1, 1]
     assert results["confusion"]["backlash"] == {"unexplained": 1} and results["confusion"]["nothing"] == {"nothing": 1, "stribeck": 1}
     assert sum(b["of"] for b in results["reliability"]) == 6 and results["error_over_floor"]["median"] == 2.0
 

@@ -46,6 +46,7 @@ def row_of(truth: Mapping, answer: Mapping) -> dict:
     return {"case": truth["case"], "kind": truth["kind"], "labels": truth["labels"], "linkage": truth.get("linkage"),
             "clutter": [e["label"] for e in truth.get("clutter", [])], "rig": truth.get("rig"), "size": truth.get("size"),
             "strength": truth["effects"][0]["strength"] if truth.get("effects") else None, "visibility": _or_nan(truth["visibility_after_refit_sigma"]),
+            "each": {e["label"]: e.get("quick_visibility_sigma") for e in truth.get("effects", [])},
             "named": [m["effect"] for m in missing], "verdict": document.get("verdict") or NO_ANSWER, "error": answer.get("error"),
             "significant": bool(remainder.get("significant")), "where": where[:1], "beliefs": beliefs(missing),
             "before": fit.get("heldout_rmse_before_rad"), "after": fit.get("heldout_rmse_after_rad"), "floor": fit.get("noise_floor_rad"),
@@ -83,12 +84,13 @@ def scored(rows: Sequence[Mapping]) -> dict:
     by = {kind: [r for r in rows if r["kind"] == kind] for kind in ("null", "single", SEVERAL, OUTSIDE)}
     singles, visible = by["single"], [r for r in by["single"] if r["visibility"] >= VISIBLE]
     concealed, found, spurious = _several(by[SEVERAL])
+    seen = [hit for r in by[SEVERAL] for sigma, hit in _hits(r) if sigma >= VISIBLE]
     counted = {
         "top1": (sum(right(r, str) for r in singles), len(singles)),
         "top1_class": (sum(map(right, singles)), len(singles)),
         "top1_class_visible": (sum(map(right, visible)), len(visible)),
         "false_alarm_rate": (sum(bool(r["named"]) for r in by["null"]), len(by["null"])),
-        "pair_recall": (found, concealed),
+        "pair_recall": (found, concealed), "pair_recall_visible": (sum(seen), len(seen)),
         "pair_spurious": (spurious, concealed),
         "unexplained_recall": (sum(r["significant"] for r in by[OUTSIDE]), len(by[OUTSIDE])),
         "false_flag_rate": (sum(r["significant"] for r in rows if r["kind"] != OUTSIDE), len(rows) - len(by[OUTSIDE])),
@@ -112,6 +114,15 @@ def _several(rows: Iterable[Mapping]) -> tuple[int, int, int]:
         hit = sum((truth & named).values())
         concealed, found, spurious = concealed + len(row["labels"]), found + hit, spurious + len(row["named"]) - hit
     return concealed, found, spurious
+
+
+def _hits(row: Mapping) -> list[tuple[float, bool]]:
+    """(visibility of its own [sigma], whether it is named by class) of each effect of several; a linkage, which has no such number, is seen."""
+    named, own, out = Counter(map(class_of, row["named"])), row.get("each") or {}, []
+    for label in sorted(row["labels"], key=lambda label: -(own.get(label) or np.inf)):
+        out.append((own.get(label) or np.inf, named[class_of(label)] > 0))
+        named[class_of(label)] -= 1
+    return out
 
 
 def confusion(rows: Iterable[Mapping]) -> dict[str, dict[str, int]]:
