@@ -195,9 +195,8 @@ def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitat
     if channel:
         sigmas = min(c["channels_sigmas"][channel] for c in told.values() if c["cost"] < SETTLED)
         words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas." + ("" if hopeful else f" {asked(excitation)}"))
-    elif never:
-        most = max(max(told[n]["channels_sigmas"].values()) for n in never)
-        words.append(f"Nor would {_listed(CALLED.values(), 'or')}, {most:.1g} sigmas at most.")
+    elif most := [max(told[n]["channels_sigmas"].values()) for n in never if told[n]["channels_sigmas"]]:
+        words.append(f"Nor would {_listed(CALLED.values(), 'or')}, {max(most):.1g} sigmas at most.")
     return words
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ers_mj.advice import _widened, next_recording
+from ers_mj.advice import _said, _widened, next_recording
 from ers_mj.baseline import baseline
 from ers_mj.commands.diagnose import _input_table
 from ers_mj.datasheet import Datasheet
@@ -173,3 +173,9 @@ def test_the_input_is_written_as_a_table(late):
     t, u = signal(excitation)
     assert lines[0] == "t_s,u_V" and len(lines) == t.size + 1
     assert np.allclose([float(line.split(",")[1]) for line in lines[1:]], u, rtol=1e-5, atol=1e-9)
+
+
+def test_a_richer_rival_that_further_numbers_alone_set_apart_is_told():
+    told = {"backlash": {"recordings_needed": None, "channels_sigmas": {}, "rms_over_left": 0.3, "cost": 2.0 * SETTLED}}
+    (words,) = _said("shaft_compliance", told, None, {}, 50, "the noise")
+    assert "tells shaft compliance and backlash apart" in words
