@@ -122,7 +122,7 @@ class ReducedModel:
     def tangents(self, t, u, path, others, scale, *, enable=None, load=None, y=None, gain=0.0, every=1) -> list[np.ndarray]:
         """First-order changes (N, 3) of theta, omega and drive acceleration along a ``path``, towards each of the ``others``.
 
-        Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect. A tenth of a simulation.
+        Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect.
         """
         c, on, p = self._lowered
         enable = np.ones(t.size, np.bool_) if enable is None else enable
