@@ -77,15 +77,14 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
                 starts = _hopeful(light, effect, effect.starts(scales), targets, traces)
                 found = [p for start in starts if (p := _promise(light, effect, start, e, targets, traces))]
             if found:
-                promise = max(share for share, _, _ in found)
-                found.sort(key=lambda p: -p[1])
-                begun = [Begin(_onto(place, model, effect), known) for _, _, model in _of_each_form(found)[:effect.tries]]
+                found.sort(key=lambda p: -p[0])
+                begun = [Begin(_onto(place, model, effect), known) for _, model in _of_each_form(found)[:effect.tries]]
                 if not effect.dear:
                     begins.setdefault(effect.name, []).append(begun)
-                elif promise > promises.get(effect.name, 0.0):
+                elif found[0][0] > promises.get(effect.name, 0.0):
                     begins[effect.name] = [begun]
                 if bent or place is places[0]:
-                    promises[effect.name] = max(promises.get(effect.name, 0.0), promise)
+                    promises[effect.name] = max(promises.get(effect.name, 0.0), found[0][0])
         if quiet and not floor:
             floor = 2.0 * LEAST_PROMISE / float(targets[0][2] @ targets[0][2])
         if not bent:
@@ -106,9 +105,9 @@ def _onto(place: Model, found: Model, effect: Effect) -> Model:
     return replace(model, local={**model.local, effect.name: found.local[effect.name]}) if effect.local else model
 
 
-def _of_each_form(found: list[tuple[float, float, Model]]) -> list[tuple[float, float, Model]]:
+def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]:
     """The starts, the best first of each form (which of its parameters are absent), then the others."""
-    forms = [tuple(np.isfinite(model.effects[-1][1])) for _, _, model in found]
+    forms = [tuple(np.isfinite(model.effects[-1][1])) for _, model in found]
     return [p for k, p in enumerate(found) if forms[k] not in forms[:k]] + [p for k, p in enumerate(found) if forms[k] in forms[:k]]
 
 
@@ -141,7 +140,7 @@ def _targets(place: Model, left: np.ndarray, traces: Sequence[Trace], tau: float
 
 
 def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.ndarray, target: np.ndarray, traces: Sequence[Trace],
-            tau: float) -> list[tuple[float, float, Model]]:
+            tau: float) -> list[tuple[float, Model]]:
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all for a small one, so that no secant
     may be scaled. The best starts of different side, length or recording, brought nearer, with what they gain in C as a share of the residual.
     """
@@ -158,8 +157,7 @@ def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.nd
         kind = int(start[column]), start[0] > 0, start[2]
         best[kind] = max(best.get(kind, (0.0, start)), (gain(start), start), key=lambda found: found[0])
     nearer = [_nearer(gain, start) for won, start in sorted(best.values(), key=lambda found: -found[0])[:effect.tries] if won > 0]
-    shares = [2.0 * won / float(target @ target) for won, _ in nearer]
-    return [(share, share, place.with_effect(effect.name, start)) for share, (_, start) in zip(shares, nearer)]
+    return [(2.0 * won / float(target @ target), place.with_effect(effect.name, start)) for won, start in nearer]
 
 
 def _nearer(gain: Callable[[np.ndarray], float], start: np.ndarray) -> tuple[float, np.ndarray]:
@@ -169,11 +167,10 @@ def _nearer(gain: Callable[[np.ndarray], float], start: np.ndarray) -> tuple[flo
     return -float(found.fun), np.append(found.x, start[3:])
 
 
-def _promise(place, effect, start, e, targets, traces) -> tuple[float, float, Model] | None:
-    """Share of the residual that the start's secant explains at its best multiple, the share that the model explains to first order, and this: the start
-    as large as the secant asks for, where the effect is proportional to its leading parameters, else as it is.
+def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
+    """Share of the residual that the start's secant explains, and the model with the start as large as the secant asks for.
 
-    A secant across a large step bends; where it may be scaled it is taken again at that size.
+    A secant across a large step bends; where the effect is proportional to its leading parameters it is taken again at that size.
     """
     if effect.wave and np.isfinite(start[effect.wave[1]]):
         return _promise_of_wave(place, effect, start, e, targets, traces)
@@ -183,13 +180,13 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, float, Mo
         if not np.all(np.isfinite(secant)):
             break
         share, factor = max(_explained(secant, target, effect.signed) for target in targets)
-        start, near = _resized(start, effect.sized, factor), share if effect.sized else share * (2.0 * factor - 1.0) / factor**2
+        start = _resized(start, effect.sized, factor)
         if best is None or share > best[0]:
-            best = share, near, place.with_effect(effect.name, start)
+            best = share, place.with_effect(effect.name, start)
     return best
 
 
-def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, float, Model] | None:
+def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
     """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local."""
     amplitude, phase = effect.wave
     secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
@@ -205,7 +202,7 @@ def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, f
     model = place.with_effect(effect.name, found)
     if effect.local:
         model.local[effect.name][:, effect.local_columns.index(phase)] = start[phase] + turns
-    return share, share, model
+    return share, model
 
 
 def _mixed(columns: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[float, np.ndarray]:

@@ -34,7 +34,7 @@ RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
 LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
-AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well
+AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well; what cannot be scaled is in any case
 FAILED = 0.05  # share of the best first refit's gain below which a promise was none
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
@@ -141,7 +141,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         for label, found in pool.map(finish, [(label, begin) for label in ahead for begin in starts[label]]):
             best[label] = min(best[label], found, key=total)
         worth = {name for name, found in leaders(best).items() if bent or reference - total(found) >= AGAIN * most}
-        worth = {*contending(worth, leaders(best)), *foremost}
+        worth = {*contending(worth, leaders(best)), *foremost, *(name for name in screened.promising(failed) if not BY_NAME[name].sized)}
         again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth and label not in ahead for begin in begins[1:]])
         best |= {label: min(best[label], found, key=total) for label, found in again.items()}
         if not bent:
