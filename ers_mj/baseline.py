@@ -12,7 +12,6 @@ from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.errors import InputError
-from ers_mj.guess import guesses
 from ers_mj.identification import Fit, cost_of, descend, fit, hopped, tau_of
 from ers_mj.model import Model
 from ers_mj.starts import with_starts, without_spikes
@@ -193,6 +192,8 @@ class _Kinds:
         Raises:
             InputError: an input of zeros, or too little motion.
         """
+        from ers_mj.guess import guesses  # brings scipy.signal, which takes a second to import and is needed here alone
+
         if not any(t.u.any() for t in traces):
             raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
         opened = any(t.enable is not None and not t.enable.all() for t in traces)

@@ -137,11 +137,7 @@ class Bench:
         """What CHANNELS would read (N,): the motor's torque for the current, the motor's side, and the share of the supply that is left."""
         self.simulations += 1
         plant, run = model.staged(trace, 1, OBSERVER_RATE, None)
-        path = plant.path(trace.t, trace.u, **run)
-        added = plant.read(trace.t, path[:, 0]) - path[:, 0]
-        if np.any(added):
-            path = plant.path(trace.t, trace.u, **{**run, "y": run["y"] - added})
-        theta, omega, drive, theta_m = path.T
+        theta, omega, drive, theta_m = plant.outputs(trace.t, trace.u, **run)[1].T
         current, supply = drive.copy(), np.ones(theta.size)
         for name, values in plant.effects:
             if _electric(name):

@@ -22,7 +22,7 @@ from ers_mj.datasheet import Datasheet
 from ers_mj.design import VAGUE
 from ers_mj.errors import InputError
 from ers_mj.excitation import GENTLE, MARGIN, SHARES, TOP, Limits, excitations, signal
-from ers_mj.identification import SQUARES, descend, fit, jacobian_of, residuals
+from ers_mj.identification import SQUARES, descend, fit, jacobian_of, residuals, run_of
 from ers_mj.known import model_of
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.inputs import DURATION, INPUTS
@@ -133,8 +133,8 @@ class Question:
         if not np.all(np.isfinite(trace.y)) or (within and not self.rig.limits.holds(trace.y)):
             return None
         layout = self.model.layout()
-        z, e = self.model.vector(layout), residuals(self.model, [trace], OBSERVER_RATE)
-        jacobian = jacobian_of(self.model, layout, z, e, [trace], OBSERVER_RATE, by_tangents=False)
+        z = self.model.vector(layout)
+        jacobian = jacobian_of(run_of(self.model, [trace], OBSERVER_RATE), [trace], OBSERVER_RATE, by_tangents=False)
         for _ in range(SECANTS):
             size, axes = np.linalg.eigh(_inverse(self._trimmed(self._blocks(jacobian))))
             reach = axes * np.sqrt(size)

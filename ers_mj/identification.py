@@ -40,7 +40,6 @@ class Fit:
     cost: float
     misfit: np.ndarray
     hessian: np.ndarray
-    simulations: int
 
     @property
     def size(self) -> int:
@@ -48,18 +47,38 @@ class Fit:
         return self.hessian.shape[0]
 
 
+@dataclass(frozen=True)
+class Run:
+    """A model run along recordings: y - y_hat in sigmas over all traces and their channels (N,), 0 where a sample is missing, NaN where the
+    simulation ran away; and the motion (n, 4) in each trace."""
+
+    model: Model
+    left: np.ndarray
+    motions: tuple[np.ndarray, ...]
+
+
+def run_of(model: Model, traces: Sequence[Trace], rate: float) -> Run:
+    """The model's run along the traces, in observer form where ``rate`` [1/s] > 0."""
+    parts, motions = zip(*(_run_in(model, trace, k, rate) for k, trace in enumerate(traces)))
+    return Run(model, np.concatenate(parts), motions)
+
+
 def residuals(model: Model, traces: Sequence[Trace], rate: float) -> np.ndarray:
-    """y - y_hat over all traces and their channels, in sigmas of each, 0 where a sample is missing; NaN where the simulation ran away."""
-    return np.concatenate([residuals_in(model, trace, k, rate) for k, trace in enumerate(traces)])
+    """What the run leaves (N,) (see Run)."""
+    return run_of(model, traces, rate).left
 
 
 def residuals_in(model: Model, trace: Trace, record: int, rate: float) -> np.ndarray:
     """The same (rows,) in one recording."""
-    theta, *others = model.observed(trace, record, rate)
+    return _run_in(model, trace, record, rate)[0]
+
+
+def _run_in(model, trace, record, rate):
+    (theta, *others), motion = model.observed(trace, record, rate)
     parts = [np.where(trace.valid, (trace.y - theta) / trace.sigma, 0.0)]
     for channel, seen in zip(trace.channels, others):
         parts.append(np.where(np.isfinite(channel.values), (channel.values - seen) / channel.sigma, 0.0))
-    return np.concatenate(parts)
+    return np.concatenate(parts), motion
 
 
 def score(misfit: np.ndarray, tau: float) -> np.ndarray:
@@ -91,21 +110,23 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
     mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
     more of a search that begins near the data: one bad block would send it back to the sum of squares.)
     """
-    now, jacobian = math.inf, None
-    if known is not None:
-        layout = model.layout()
-        jacobian = jacobian_of(model, layout, model.vector(layout), residuals(model, traces, rate), traces, rate, known)
+    run = _begun(model, traces, rate)
+    now, jacobian, blocks = math.inf, jacobian_of(run, traces, rate, known) if known is not None else None, Blocks.of(traces)
     while True:
-        misfit = Blocks.of(traces).misfit(residuals(model, traces, rate))
+        misfit = blocks.misfit(run.left)
         sound = np.all(np.isfinite(misfit))  # a runaway has one descent to find a motion
         level = float(np.exp(np.mean(np.log(misfit + tau)))) if sound else 0.0
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
-        found, jacobian, renewals = _descend(model, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, jacobian, renewals,
-                                               by_tangents)
+        found, run, jacobian, renewals = _descend(run, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, jacobian, renewals, by_tangents)
         if last or (ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size):
             return found
-        model = found.model
+
+
+def _begun(model: Model, traces: Sequence[Trace], rate: float) -> Run:
+    """The run of a model whose numbers lie within their bounds."""
+    layout = model.layout()
+    return run_of(model.at(layout, model.vector(layout)), traces, rate)
 
 
 def converged(found: Fit, rival: Fit, traces: Sequence[Trace], tau: float) -> Fit:
@@ -171,48 +192,47 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
 
 def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float) -> Fit:
     """Levenberg-Marquardt on C at one ``tau``, until a step along a fresh Jacobian gains less than ``tolerance``."""
-    return _descend(model, traces, rate, tau, steps, tolerance, None, math.inf)[0]
+    return _descend(_begun(model, traces, rate), traces, rate, tau, steps, tolerance, None, math.inf)[0]
 
 
-def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, jacobian: np.ndarray | None,
-             renewals: float, by_tangents: bool = True) -> tuple[Fit, np.ndarray | None, float]:
-    """See ``descend``: the fit, the Jacobian that it ended with, and how many it may still take.
+def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, jacobian: np.ndarray | None,
+             renewals: float, by_tangents: bool = True) -> tuple[Fit, Run, np.ndarray | None, float]:
+    """See ``descend``: the fit, its run, the Jacobian that it ended with, and how many it may still take.
 
-    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised.
+    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised; ``jacobian`` is changed by it.
     """
-    layout, blocks = model.layout(), Blocks.of(traces)
-    z = model.vector(layout)
-    damping, calls, fresh = 1e-3, 1, False
-    final = not by_tangents or math.isfinite(renewals) or not _has_tangents(model, traces)
+    layout, blocks = run.model.layout(), Blocks.of(traces)
+    z, damping, fresh = run.model.vector(layout), 1e-3, False
+    final = not by_tangents or math.isfinite(renewals) or not _has_tangents(run.model, traces)
 
-    def evaluate(z):
-        e = residuals(model.at(layout, z), traces, rate)
-        if not np.all(np.isfinite(e)):
-            return e, None, np.inf
-        m = blocks.misfit(e)
-        return e, m, float(score(m, tau).sum()) + _prior_cost(layout, z)
+    def judged(run, z):
+        """(run, misfits (B,), cost), the last two None and infinite of a runaway."""
+        if not np.all(np.isfinite(run.left)):
+            return run, None, np.inf
+        m = blocks.misfit(run.left)
+        return run, m, float(score(m, tau).sum()) + _prior_cost(layout, z)
 
-    e, m, cost = evaluate(z)
+    run, m, cost = judged(run, z)
     if m is None:
-        e, m = np.full(blocks.index.size, 1e6), np.full(blocks.counts.size, 1e12)
+        run, m = replace(run, left=np.full(blocks.index.size, 1e6)), np.full(blocks.counts.size, 1e12)
     hessian = np.eye(z.size)
     for _ in range(steps):
         if jacobian is None:
             if renewals <= 0:
                 break
-            jacobian, fresh = jacobian_of(model, layout, z, e, traces, rate, by_tangents=by_tangents), True
-            calls, renewals = calls + z.size, renewals - 1
+            jacobian, fresh = jacobian_of(run, traces, rate, by_tangents=by_tangents), True
+            renewals -= 1
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
         weighted = jacobian * weight[:, None]
-        hessian, slope = weighted.T @ jacobian, weighted.T @ e
+        hessian, slope = weighted.T @ jacobian, weighted.T @ run.left
         _add_prior(layout, z, hessian, slope)
         step = None
         for _ in range(6 if fresh else 2):
             scale = np.diag(hessian) + 1e-9 * np.trace(hessian) / z.size + 1e-12
             step = np.clip(-np.linalg.solve(hessian + damping * np.diag(scale), slope), -1.0, 1.0)
-            goal = model.at(layout, z + step).vector(layout)
-            trial = evaluate(goal)
-            calls += 1
+            there = run.model.at(layout, z + step)
+            goal = there.vector(layout)
+            trial = judged(run_of(there, traces, rate), goal)
             if trial[2] < cost:
                 break
             damping = max(damping * 8, 1e-6)
@@ -227,10 +247,11 @@ def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, ste
         moved, gain, was_fresh = goal - z, cost - trial[2], fresh
         promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
         if gain > 0.3 * promised and moved @ moved > 0:
-            jacobian, fresh = jacobian + np.outer(trial[0] - e - jacobian @ moved, moved / (moved @ moved)), False
+            jacobian.T[...] += np.outer(moved / (moved @ moved), trial[0].left - run.left - jacobian @ moved)
+            fresh = False
         else:
             jacobian = None
-        z, (e, m, cost) = goal, trial
+        z, (run, m, cost) = goal, trial
         damping = max(damping / 8, 1e-9)
         if gain < tolerance:
             if (was_fresh and final) or renewals <= 0:
@@ -238,29 +259,31 @@ def _descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, ste
             if was_fresh:
                 by_tangents, final = False, True
             jacobian = None
-    return Fit(model.at(layout, z), cost, m, hessian, calls), jacobian, renewals
+    return Fit(run.model, cost, m, hessian), run, jacobian, renewals
 
 
 def _has_tangents(model: Model, traces: Sequence[Trace]) -> bool:
     return model.has_tangents and all(t.is_uniform for t in traces)
 
 
-def jacobian_of(model, layout, z, e, traces, rate, known: Columns | None = None, by_tangents: bool = True):
-    """Slopes of the residuals e (N,) by the fitted numbers, but for the ``known`` ones: (N, k).
+def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns | None = None, by_tangents: bool = True) -> np.ndarray:
+    """Slopes (N, k) of what a run leaves by the numbers fitted of its model, but for the ``known`` ones.
 
     By tangents of the motion where the model has them, else by finite differences of simulations. Where stick and slip fork
     the two lead elsewhere, and either may be the better.
     """
-    jacobian = np.empty((e.size, z.size))
+    model, layout = run.model, run.model.layout()
+    z = model.vector(layout)
+    jacobian = np.empty((z.size, run.left.size)).T  # a column's numbers side by side
     wanted = [k for k in range(z.size) if not (known and layout[k].key in known)]
     for k in set(range(z.size)) - set(wanted):
         jacobian[:, k] = known[layout[k].key]
     others = [model.at(layout, z + DIFFERENCE * (np.arange(z.size) == k)) for k in wanted]
     if by_tangents and _has_tangents(model, traces):
-        jacobian[:, wanted] = -model.at(layout, z).changes(traces, rate, others, 1.0 / DIFFERENCE)
+        jacobian[:, wanted] = -model.changes(traces, rate, others, 1.0 / DIFFERENCE, run.motions)
     else:
         for k, other in zip(wanted, others):
-            jacobian[:, k] = (residuals(other, traces, rate) - e) / DIFFERENCE
+            jacobian[:, k] = (residuals(other, traces, rate) - run.left) / DIFFERENCE
     jacobian[~np.isfinite(jacobian)] = 0.0
     return jacobian
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import central_jacobian, residuals
@@ -36,7 +36,7 @@ def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model]
     if len(left_out) >= FEWEST_RECORDS and not any(f.local for f in layout):
         z = np.array([m.vector(layout) for m in left_out])
         n = len(left_out)
-        widths = np.hypot(widths, student.ppf(0.975, n - 1) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0)))
+        widths = np.hypot(widths, stdtrit(n - 1, 0.975) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0)))
     return widths
 
 
@@ -53,7 +53,7 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
     n = slopes.shape[0]
     covariance = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
-    return student.ppf(0.975, max(n - len(layout), 1)) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return stdtrit(max(n - len(layout), 1), 0.975) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
 def unseen_widths(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:

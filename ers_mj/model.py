@@ -230,11 +230,11 @@ class Model:
         plant, run = self.staged(trace, record, rate, start)
         return plant.theta(trace.t, trace.u, **run) + self.offset(record)
 
-    def observed(self, trace: Trace, record: int, rate: float) -> list[np.ndarray]:
-        """What ``predict`` gives, and behind it what each further channel of the recording would show, (N,) each."""
+    def observed(self, trace: Trace, record: int, rate: float) -> tuple[list[np.ndarray], np.ndarray]:
+        """What ``predict`` gives, and behind it what each further channel of the recording would show, (N,) each; the motion (N, 4)."""
         plant, run = self.staged(trace, record, rate, None)
         theta, motion = plant.outputs(trace.t, trace.u, **run)
-        return [theta + self.offset(record), *self.shown(trace, plant, motion)]
+        return [theta + self.offset(record), *self.shown(trace, plant, motion)], motion
 
     def shown(self, trace: Trace, plant: ReducedModel, motion: np.ndarray) -> list[np.ndarray]:
         """What each further channel of a recording would show (N,) along a motion (N, 4)."""
@@ -247,31 +247,32 @@ class Model:
         """Whether ``changes`` can tell the first-order changes of this model's outputs."""
         return ReducedModel(lumped(self.values), self.effects).has_tangents
 
-    def changes(self, traces: Sequence[Trace], rate: float, others: Sequence[Model], scale: float) -> np.ndarray:
+    def changes(self, traces: Sequence[Trace], rate: float, others: Sequence[Model], scale: float, motions: Sequence[np.ndarray]) -> np.ndarray:
         """First-order changes (rows of all traces, others) of the predicted outputs, in sigmas, 0 where a sample is missing.
 
-        They point from this model towards each other one, times ``scale`` (see ReducedModel.tangents).
+        They point from this model towards each other one, times ``scale`` (see ReducedModel.tangents), along the ``motions`` (N, 4) that
+        ``observed`` made of it.
         """
-        columns = []
+        changes, ends = np.empty((len(others), sum(trace.rows for trace in traces))), np.cumsum([0, *(trace.rows for trace in traces)])
         for k, trace in enumerate(traces):
             plant, run = self.staged(trace, k, rate, None)
-            path, clock = plant.path(trace.t, trace.u, **run), {key: v for key, v in run.items() if key != "start"}
+            path, clock = motions[k], {key: v for key, v in run.items() if key != "start"}
             plants = [other.plant(k) for other in others]
             moved = plant.tangents(trace.t, trace.u, path, plants, scale, **clock)
-            here = self.shown(trace, plant, path)
-            columns.append(np.empty((trace.rows, len(others))))
-            for i, (other, its, move) in enumerate(zip(others, plants, moved)):
-                parts = [np.where(trace.valid, move[:, 0] + (other.offset(k) - self.offset(k)) * scale, 0.0) / trace.sigma]
+            here, unseen = self.shown(trace, plant, path), np.flatnonzero(~trace.valid)
+            for other, its, move, row in zip(others, plants, moved, changes[:, ends[k]:ends[k + 1]]):
+                np.divide(move[:, 0] + (other.offset(k) - self.offset(k)) * scale, trace.sigma, out=row[:trace.t.size])
+                row[unseen] = 0.0
                 if trace.channels:
                     there = other.shown(trace, its, path + np.column_stack([move, move[:, 0]]) / scale)
-                    parts += [np.where(np.isfinite(c.values), (b - a) * scale, 0.0) / c.sigma for c, a, b in zip(trace.channels, here, there)]
-                columns[-1][:, i] = np.concatenate(parts)
-        return np.concatenate(columns)
+                    row[trace.t.size:] = np.concatenate([np.where(np.isfinite(c.values), (b - a) * scale, 0.0) / c.sigma
+                                                         for c, a, b in zip(trace.channels, here, there)])
+        return changes.T
 
     def staged(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
-        """The plant of a recording, and how it is run along it."""
+        """The plant of a recording, and how it is run along it; ``start`` is the (reading, speed) it begins with, the trace's own if None."""
         (gain, every), shift, plant = observer_gain(rate, trace.sample_time), self.offset(record), self.plant(record)
         theta, omega = trace.start if start is None else start
         drive = 0.0 if omega == 0 else plant.coefficients.b * trace.u[0] - plant.coefficients.a_emf * omega
-        return plant, {"start": (theta - shift, omega, drive), "enable": trace.enable, "load": trace.load,
+        return plant, {"start": (plant.behind(theta - shift), omega, drive), "enable": trace.enable, "load": trace.load,
                        "y": trace.y - shift if gain > 0 else None, "gain": gain, "every": every}

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ers_mj.effects import BY_NAME, Effect
-from ers_mj.identification import central_jacobian, residuals, residuals_in, score
+from ers_mj.identification import Run, central_jacobian, residuals, residuals_in, run_of, score
 from ers_mj.model import OBSERVER_RATE, Columns, Model
 from ers_mj.traces import BLOCK, Blocks, Trace
 
@@ -65,8 +65,9 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     names, floor, most = [name for name in BY_NAME if name not in exclude], 0.0, LATER if places[0].names else MOST_BENT if bent else MOST_SENT
     promises, begins = {}, {}
     for place in places:
-        left, light = residuals(place, traces, OBSERVER_RATE), _light(place)
-        e = left if light is place else residuals(light, traces, OBSERVER_RATE)
+        run, light = run_of(place, traces, OBSERVER_RATE), _light(place)
+        alone = run if light is place else run_of(light, traces, OBSERVER_RATE)
+        left, e = run.left, alone.left
         if not np.all(np.isfinite((left, e))):
             continue
         (known, targets), scales = _targets(light, left, traces, tau), replace(place.scales, hot=_hot(left, traces, tau))
@@ -74,7 +75,7 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
             if effect.once:
                 found = _knocks(light, effect, effect.starts(scales), e, targets[0][2], traces, tau)
             else:
-                starts = _hopeful(light, effect, effect.starts(scales), targets, traces)
+                starts = _hopeful(alone, effect, effect.starts(scales), targets, traces)
                 found = [p for start in starts if (p := _promise(light, effect, start, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
@@ -111,16 +112,16 @@ def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]
     return [p for k, p in enumerate(found) if forms[k] not in forms[:k]] + [p for k, p in enumerate(found) if forms[k] in forms[:k]]
 
 
-def _hopeful(place: Model, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
-    """Of many starts of a law, those that promise most to first order along the place's own motion."""
+def _hopeful(alone: Run, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
+    """Of many starts of a law, those that promise most to first order along a place's own motion."""
+    place = alone.model
     if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or not place.has_tangents:
         return starts
-    groups = _groups(effect, traces)
     waves = 2 if effect.wave else 1
     every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
-    changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0).T
-    shares = [max(_mixed(_split(changes[i:i + waves], groups), target)[0] if effect.signed else _explained(changes[i], target, False)[0]
-                  for target in targets) for i in range(0, len(every), waves)]
+    changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, alone.motions).T
+    ends = _ends(effect, traces)
+    shares = np.max([_shares(changes, waves, ends, target, effect.signed)[0] for target in targets], axis=0)
     best = sorted(np.argsort(shares)[::-1][:effect.tries])
     return [starts[i] for i in best]
 
@@ -174,12 +175,13 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
     """
     if effect.wave and np.isfinite(start[effect.wave[1]]):
         return _promise_of_wave(place, effect, start, e, targets, traces)
-    best = None
+    best, ends = None, _ends(effect, traces)
     for _ in range(2 if effect.sized else 1):
         secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
         if not np.all(np.isfinite(secant)):
             break
-        share, factor = max(_explained(secant, target, effect.signed) for target in targets)
+        share, factor = max((float(part[0]), float(size[0, 0, 0])) for part, size in
+                            (_shares(secant[None], 1, ends, target, effect.signed) for target in targets))
         start = _resized(start, effect.sized, factor)
         if best is None or share > best[0]:
             best = share, place.with_effect(effect.name, start)
@@ -192,9 +194,7 @@ def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, M
     secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
     if not np.all(np.isfinite(secants)):
         return None
-    columns = _split(secants, _groups(effect, traces))
-    share, mixture = max((_mixed(columns, target) for target in targets), key=lambda found: found[0])
-    mixture = mixture.reshape(-1, 2)
+    (share,), (mixture,) = max((_shares(np.array(secants), 2, _ends(effect, traces), target, True) for target in targets), key=lambda found: found[0][0])
     sizes, turns = np.hypot(*mixture.T), np.arctan2(mixture[:, 1], mixture[:, 0])
     found = start.copy()
     found[amplitude] *= min(max(math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
@@ -202,17 +202,33 @@ def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, M
     model = place.with_effect(effect.name, found)
     if effect.local:
         model.local[effect.name][:, effect.local_columns.index(phase)] = start[phase] + turns
-    return share, model
+    return float(share), model
 
 
-def _mixed(columns: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[float, np.ndarray]:
-    """Share of a target that the columns (N, 2 g) explain together, and the multiples (2 g,) of them that do."""
+def _shares(changes: np.ndarray, waves: int, ends: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray],
+            signed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (S,) of a target that every ``waves`` rows of changes (S waves, N) explain together, and the multiples of them that do.
+
+    The multiples (S, G, waves) are their own in each of the G spans that ``ends`` (G + 1,) bound; where the effect is not ``signed`` they are positive.
+    """
     root, basis, residual = target
-    weighted = root[:, None] * columns
-    known = basis.T @ weighted
-    pull = -(weighted.T @ residual)
-    multiples = np.linalg.lstsq(weighted.T @ weighted - known.T @ known, pull, rcond=1e-12)[0]
-    return float(pull @ multiples) / float(residual @ residual), multiples
+    weighted = root * changes
+    spans = [slice(a, b) for a, b in zip(ends, ends[1:])]
+    known = np.stack([weighted[:, s] @ basis[s] for s in spans], axis=1)
+    pulls = -np.stack([weighted[:, s] @ residual[s] for s in spans], axis=1)
+    shares, multiples = np.zeros(len(changes) // waves), np.zeros((len(changes) // waves, len(spans), waves))
+    for k in range(shares.size):
+        rows = slice(k * waves, (k + 1) * waves)
+        columns = known[rows].transpose(1, 0, 2).reshape(len(spans) * waves, -1)
+        gram, pull = -columns @ columns.T, pulls[rows].T.ravel()
+        for g, s in enumerate(spans):
+            own = weighted[rows, s]
+            gram[g * waves:(g + 1) * waves, g * waves:(g + 1) * waves] += own @ own.T
+        if np.trace(gram) <= 1e-12 or (pull[0] <= 0 and not signed):
+            continue
+        found = np.linalg.lstsq(gram, pull, rcond=1e-12)[0]
+        shares[k], multiples[k] = float(pull @ found) / float(residual @ residual), found.reshape(len(spans), waves)
+    return shares, multiples
 
 
 def _quarter(effect: Effect, start: np.ndarray) -> np.ndarray:
@@ -222,14 +238,10 @@ def _quarter(effect: Effect, start: np.ndarray) -> np.ndarray:
     return turned
 
 
-def _groups(effect: Effect, traces: Sequence[Trace]) -> np.ndarray:
-    """For each sample (N,) the number of what may have a phase of its own: its recording, or 0 for all."""
-    return np.repeat(np.arange(len(traces)) if effect.local and effect.wave else np.zeros(len(traces), int), [t.rows for t in traces])
-
-
-def _split(changes, groups: np.ndarray) -> np.ndarray:
-    """Columns (N, groups x changes): each change (N,) within each group."""
-    return np.column_stack([np.where(groups == g, s, 0.0) for g in range(groups[-1] + 1) for s in changes])
+def _ends(effect: Effect, traces: Sequence[Trace]) -> np.ndarray:
+    """Ends (G + 1,) of the spans of samples in which a wave may have a phase of its own: each recording, or all of them together."""
+    ends = np.cumsum([0, *(t.rows for t in traces)])
+    return ends if effect.local and effect.wave else ends[[0, -1]]
 
 
 def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int, float, float], ...]:
@@ -239,17 +251,6 @@ def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int,
     within = np.concatenate([np.tile(np.arange(t.counts.size), 1 + len(t.channels)) for t in traces])
     worst = np.argsort(-score(blocks.misfit(e), tau), kind="stable")[:HOTTEST]
     return tuple((int(record[b]), float(traces[record[b]].t[0] + within[b] * BLOCK), length) for b in worst for length in KNOCKS)
-
-
-def _explained(secant: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray], signed: bool) -> tuple[float, float]:
-    """Share of a target that a secant (N,) explains, and the multiple of the secant that does."""
-    root, basis, residual = target
-    weighted = root * secant
-    known = basis.T @ weighted
-    size, pull = float(weighted @ weighted) - float(known @ known), -float(weighted @ residual)
-    if size <= 1e-12 or (pull <= 0 and not signed):
-        return 0.0, LEAST_SIZE
-    return pull**2 / size / float(residual @ residual), pull / size
 
 
 def _resized(start: np.ndarray, sized: int, factor: float) -> np.ndarray:

@@ -30,7 +30,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Trace:
-    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the state it starts in, and the spans that its sensor lost.
+    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the (reading, speed) it starts with, and the spans that its sensor lost.
 
     ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output.
     """
@@ -198,7 +198,7 @@ def noise_sigma(y: np.ndarray, quantum: float) -> float:
 
 @dataclass(frozen=True)
 class Blocks:
-    """Block bookkeeping over several traces: index of each sample (N,), samples in each block (B,)."""
+    """Block bookkeeping over several traces: index of each sample (N,), which rises, samples in each block (B,)."""
 
     index: np.ndarray
     counts: np.ndarray
@@ -216,4 +216,13 @@ class Blocks:
 
     def misfit(self, e: np.ndarray) -> np.ndarray:
         """Mean squared residual (in sigmas) of each block."""
-        return np.bincount(self.index, e * e, self.counts.size) / self.counts
+        begins, empty = self._begins
+        sums = np.add.reduceat(e * e, begins)
+        sums[empty] = 0.0
+        return sums / self.counts
+
+    @cached_property
+    def _begins(self) -> tuple[np.ndarray, np.ndarray]:
+        """(B,) the first sample of each block, and whether it has none."""
+        begins = np.searchsorted(self.index, np.arange(self.counts.size + 1))
+        return np.minimum(begins[:-1], self.index.size - 1), begins[:-1] == begins[1:]

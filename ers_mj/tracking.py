@@ -22,7 +22,7 @@ import numpy as np
 
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import LUMPED, Datasheet
-from ers_mj.identification import fit, jacobian_of
+from ers_mj.identification import Run, fit, jacobian_of
 from ers_mj.known import model_of
 from ers_mj.model import OBSERVER_RATE, Free, Model
 from ers_mj.recording import GAP
@@ -257,7 +257,7 @@ def fitted(model: Model, trace: Trace) -> _Window:
     is_near = _misfit(m, blocks.counts) <= EXPLAINED
     tau = TAU if is_near else max(TAU, float(np.exp(np.mean(np.log(m + TAU)))))
     for _ in range(1 if is_near else STEPS):
-        jacobian = _slopes(at, evaluate, x, e)
+        jacobian = _slopes(at, evaluate, x, e, motion)
         weighted = jacobian * ((1 + tau) / (tau + m))[blocks.index][:, None]
         hessian, slope, now, gain = weighted.T @ jacobian + np.diag(stiff), weighted.T @ e + stiff * x, cost(x, m, tau), 0.0
         for _ in range(TRIALS):
@@ -285,11 +285,10 @@ def _misfit(m: np.ndarray, counts: np.ndarray) -> float:
     return (1 + TAU) * math.exp(min(2 * _cost(m, counts, TAU) / ((1 + TAU) * counts.sum()), 60.0)) - TAU
 
 
-def _slopes(at: Callable, evaluate: Callable, x: np.ndarray, e: np.ndarray) -> np.ndarray:
+def _slopes(at: Callable, evaluate: Callable, x: np.ndarray, e: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Slopes (N, k + 2) of the residuals e (N,) by x: tangents of the motion for the parameters, differences for the first state."""
     model, trace = at(x)
-    layout = model.layout()
-    columns = [DRIFT * jacobian_of(model, layout, model.vector(layout), e, [trace], OBSERVER_RATE)]
+    columns = [DRIFT * jacobian_of(Run(model, e, (motion,)), [trace], OBSERVER_RATE)]
     for k in (-2, -1):
         nudged = x.copy()
         nudged[k] += NUDGE

@@ -20,9 +20,9 @@ LAWS = [e for e in EFFECTS if e.starts(SCALES) and ReducedModel(lumped(VALUES), 
 def agree(plant, up, down, scale, u, **options):
     """Relative RMS distance between tangent and central difference, the worst samples left out."""
     run = {"start": (VALUES["theta_0"], 0.0), **options}
-    path = plant.path(T, u, **run)
+    path = plant.outputs(T, u, **run)[1]
     found = plant.tangents(T, u, path, [up], scale, **{k: v for k, v in run.items() if k != "start"})[0][:, 0]
-    true = 0.5 * scale * (up.path(T, u, **run)[:, 0] - down.path(T, u, **run)[:, 0])
+    true = 0.5 * scale * (up.outputs(T, u, **run)[1][:, 0] - down.outputs(T, u, **run)[1][:, 0])
     apart = np.sort(np.abs(found - true))[:int((1 - FORKS) * T.size)]
     return np.sqrt(np.mean(apart**2)) / np.sqrt(np.mean(true**2))
 

@@ -30,7 +30,7 @@ def stream(*parts, noise=NOISE, seed=0):
     for seconds, values, gap in parts:
         t = np.arange(at, at + round(seconds * RATE) + 1) / RATE
         c = lumped({**TRUTH, **values})
-        path = ReducedModel(stiff_play(c, gap) if gap else c).path(t, INPUTS["multisine"](t), state)
+        path = ReducedModel(stiff_play(c, gap) if gap else c).outputs(t, INPUTS["multisine"](t), state)[1]
         angles.append(path[:-1, 0])
         state, at = (*path[-1, :2], 0.0), at + t.size - 1
     y = np.concatenate(angles)

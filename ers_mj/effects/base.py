@@ -135,7 +135,8 @@ class Twin:
 class Effect:
     """Abstract base: a piece of physics that the reduced model of Eq. (6) leaves out.
 
-    ``torque(p, theta, w, j, t)`` and ``friction(p, level, theta, w, j, direction)`` are compiled laws (or None);
+    ``torque(p, theta, w, j, t)``, ``friction(p, level, theta, w, j, direction)`` and ``inertia(p, theta)``, which gives the inertia over that of
+    the plain plant and half its slope by theta, are compiled laws (or None); an inertia acts beside a torque or a friction, of one body;
     ``coefficients``, ``command`` and ``measure`` act outside the integrator. All are the identity unless overridden.
     ``mjcf`` says in a sentence how a MuJoCo model shows the effect; ``edit_spec`` does it. What acts through
     ``coefficients`` needs no more: the model is written from them. A law without a twin is applied step by step.
@@ -152,8 +153,10 @@ class Effect:
     dear: ClassVar[bool] = False  # a simulation takes many times as long as others: refitted only where it promises most
     sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
     follows_current: ClassVar[bool] = False  # its law changes as fast as the current, or within a small angle: half the segment length
+    instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
+    inertia: ClassVar[Callable | None] = None
 
     @property
     def local(self) -> bool:
@@ -192,7 +195,7 @@ class Effect:
         return c
 
     def constants(self, p: np.ndarray, c: Coefficients) -> np.ndarray:
-        """What the compiled law receives as its ``p`` (at most 4 numbers)."""
+        """What the compiled law receives as its ``p`` (at most 5 numbers)."""
         return p
 
     def command(self, p: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -201,6 +204,10 @@ class Effect:
 
     def measure(self, p: np.ndarray, t: np.ndarray, y: np.ndarray) -> np.ndarray:
         """What the sensor reads (N,) at times t (N,) of the true output y (N,)."""
+        return y
+
+    def behind(self, p: np.ndarray, y):
+        """The output, a number or (N,), at which a sensor at rest reads y."""
         return y
 
     def winding(self, p: np.ndarray, c: Coefficients, t: np.ndarray, motion: np.ndarray, j: np.ndarray) -> np.ndarray:
@@ -212,7 +219,7 @@ class Effect:
 
         ``p`` is what the law receives (``constants``), ``c`` the coefficients with every effect in place.
         """
-        return not (self.torque or self.friction)
+        return not (self.torque or self.friction or self.inertia)
 
     def describe(self, values: dict[str, str]) -> str:
         """The sentence with its numbers; ``values`` holds name -> formatted value with unit."""

@@ -4,6 +4,7 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Sensor
 
+SETTLED = 20  # corrections until a sensor's error, whose slope is small, is taken off a reading
 ORDERS = (0.5, 1, 2, 3, 4, 6, 8)  # periods within the travel from which a fit is begun
 
 
@@ -25,6 +26,7 @@ class SensorNonlinearity(Sensor):
     )
     tries = 2
     wave = (2, 4)
+    instant = True
 
     def starts(self, scales):
         travel = scales.high - scales.low
@@ -37,6 +39,12 @@ class SensorNonlinearity(Sensor):
         if np.isfinite(period):
             return y + amplitude * np.sin(2 * np.pi / period * y + phase)
         return y + (bend * y**2 if np.isfinite(bend) else 0.0) + (twist * y**3 if np.isfinite(twist) else 0.0)
+
+    def behind(self, p, y):
+        theta = y
+        for _ in range(SETTLED):
+            theta = theta + y - self.measure(p, None, theta)
+        return theta
 
     def describe(self, values):
         if values["period"] == "none":

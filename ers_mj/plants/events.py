@@ -87,8 +87,28 @@ def _chain_friction(laws):
     return pick
 
 
+def _chain_inertia(laws):
+    """One compiled function that evaluates the inertia of the effect in one row."""
+    if not laws:
+        @njit(nogil=True, inline="always")
+        def pick(k, p, theta):
+            return 1.0, 0.0
+        return pick
+    (row, law), rest = laws[0], _chain_inertia(laws[1:])
+
+    @njit(nogil=True, inline="always")
+    def pick(k, p, theta):
+        if k == row:
+            a = law(p, theta)
+        else:
+            a = rest(k, p, theta)
+        return a
+    return pick
+
+
 _torque_of = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
 _friction_of = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
+_inertia_of = _chain_inertia([(row, e.inertia) for row, e in enumerate(EFFECTS) if e.inertia])
 
 
 @inlined
@@ -97,7 +117,7 @@ def _torque(on, p, theta, w, j, t):
     a = 0.0
     for i in range(on[0, 0]):
         k = on[0, i + 1]
-        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3]), theta, w, j, t)
+        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, t)
     return a
 
 
@@ -106,14 +126,24 @@ def _friction(on, p, level, theta, w, j, direction):
     """The friction level after every effect that is on."""
     for i in range(on[1, 0]):
         k = on[1, i + 1]
-        level = _friction_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3]), level, theta, w, j, direction)
+        level = _friction_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), level, theta, w, j, direction)
     return level
 
 
+@inlined
+def _moved(on, p, theta, w, a):
+    """The acceleration that is left of ``a``, per total inertia, where effects change the inertia along the travel."""
+    for i in range(on[2, 0]):
+        k = on[2, i + 1]
+        inertia, half_slope = _inertia_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta)
+        a = (a - half_slope * w * w) / inertia
+    return a
+
+
 def rows_of(names):
-    """Effects as the laws are called: (2, 1 + effects) their number and rows, of torques and of frictions."""
-    on = np.zeros((2, 1 + len(EFFECTS)), np.int64)
-    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS])):
+    """Effects as the laws are called: (3, 1 + effects) their number and rows, of torques, of frictions and of inertias."""
+    on = np.zeros((3, 1 + len(EFFECTS)), np.int64)
+    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS], [e.inertia for e in EFFECTS])):
         rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and laws[row]]
         on[kind, 0], on[kind, 1:1 + len(rows)] = len(rows), rows
     return on
@@ -250,6 +280,8 @@ def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
             dw = force + j + push - _viscous(c, m[3], w) * w
         else:
             dw = force + j - a_mech * w - level * m[0]
+            if lawful:
+                dw = _moved(on, p, theta, w, dw)
     dw_m = 0.0
     if two and m[3] != 0:
         a_mech = c[A_PLUS] if w_m > 0 else c[A_MINUS]
@@ -685,11 +717,17 @@ def _mapped(e, two, x, drive, side, f0, f1, f2):
 
 
 @inlined
-def _extra(c, on, p, t, x, s):
-    """What the laws of effects add to the force on a slipping rudder, per total inertia."""
+def _extra(c, on, p, load, t, x, s):
+    """What the laws of effects add to the force on a slipping rudder under a known ``load``, per total inertia; what they take of its inertia of one body only."""
     level = c[C_PLUS] if s > 0 else c[C_MINUS]
     share = 1.0 - c[PHI] if c[TWO] > 0 else 1.0
-    return _torque(on, p, x[0], x[1], x[2], t) - s * share * (_friction(on, p, level, x[0], x[1], x[2], float(s)) - level)
+    force = _torque(on, p, x[0], x[1], x[2], t) - s * share * (_friction(on, p, level, x[0], x[1], x[2], float(s)) - level)
+    if on[2, 0] > 0 and c[TWO] <= 0:
+        side = 1.0 if x[0] > c[THETA_0] else -1.0
+        rest = (c[BIAS] + load + c[A_1] * (c[THETA_0] - x[0]) - c[C_1] * side + x[2]
+                - (c[A_PLUS] if s > 0 else c[A_MINUS]) * x[1] - s * level)
+        force = _moved(on, p, x[0], x[1], rest + force) - rest
+    return force
 
 
 @inlined
@@ -705,9 +743,9 @@ def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
     whole, half = e[0, m[0] + 1, m[3] + 1, m[4] + 1], e[1, m[0] + 1, m[3] + 1, m[4] + 1]
     if not lawful or m[0] == 0:
         return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0), np.nan
-    g0 = load + (extra if extra == extra else _extra(c, on, p, t, x, m[0]))
-    ga = load + _extra(c, on, p, t + 0.5 * h, _mapped(half, two, x, drive, m[1], g0, 0.0, 0.0), m[0])
-    end = _extra(c, on, p, t + h, _mapped(whole, two, x, drive, m[1], g0, 2.0 * (ga - g0), 0.0), m[0])
+    g0 = load + (extra if extra == extra else _extra(c, on, p, load, t, x, m[0]))
+    ga = load + _extra(c, on, p, load, t + 0.5 * h, _mapped(half, two, x, drive, m[1], g0, 0.0, 0.0), m[0])
+    end = _extra(c, on, p, load, t + h, _mapped(whole, two, x, drive, m[1], g0, 2.0 * (ga - g0), 0.0), m[0])
     gb = load + end
     return _mapped(whole, two, x, drive, m[1], g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0)), end
 

@@ -57,7 +57,7 @@ class ReducedModel:
         for name, values in self.effects:
             effect = BY_NAME[name]
             c = effect.coefficients(values, c)
-            if effect.torque or effect.friction:
+            if effect.torque or effect.friction or effect.inertia:
                 constants = effect.constants(values, c)
                 p[ROW[name], :len(constants)] = constants
         object.__setattr__(self, "_lowered", (np.array(c, float), rows_of([name for name, _ in self.effects]), p))
@@ -87,17 +87,17 @@ class ReducedModel:
         """What the sensor reads (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see events.simulate_kernel).
 
         ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool. An observer beside a
-        sensor effect runs twice: what the sensor adds on the first way is taken off the measurement on the second.
+        sensor effect that is not ``instant`` runs twice: what the sensor adds on the first way is taken off the measurement on the second.
         """
         return self.outputs(t, u, start, enable=enable, load=load, y=y, gain=gain, every=every)[0]
 
     def outputs(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> tuple[np.ndarray, np.ndarray]:
         """As ``theta``, with the motion (N, 4) beside it: theta, omega, drive acceleration and motor side's angle."""
-        motion = self._run(t, u, start, enable, load, y, gain, every, 1)
-        theta = motion[:, 0]
-        read = self.read(t, theta)
-        if read is not theta and gain > 0:
-            motion = self._run(t, u, start, enable, load, y - (read - theta), gain, every, 1)
+        instant = all(BY_NAME[name].instant for name, _ in self.effects if type(BY_NAME[name]).measure is not Effect.measure)
+        motion = self._run(t, u, start, enable, load, self.behind(y) if gain > 0 and instant else y, gain, every, 1)
+        read = self.read(t, motion[:, 0])
+        if gain > 0 and not instant:
+            motion = self._run(t, u, start, enable, load, y - (read - motion[:, 0]), gain, every, 1)
             read = self.read(t, motion[:, 0])
         return read, motion
 
@@ -108,10 +108,6 @@ class ReducedModel:
             j = BY_NAME[name].winding(values, self.coefficients, t, motion, j)
         return j
 
-    def path(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
-        """(N, 4): theta, omega, drive acceleration and motor side's angle of the run that ``theta`` makes."""
-        return self._run(t, u, start, enable, load, y, gain, every, 1)
-
     @property
     def has_tangents(self) -> bool:
         """Whether ``tangents`` can tell how the output changes: of one body that meets no stop, without delay, read by a plain sensor."""
@@ -120,7 +116,7 @@ class ReducedModel:
                 and all(type(BY_NAME[name]).measure is Effect.measure for name, _ in self.effects))
 
     def tangents(self, t, u, path, others, scale, *, enable=None, load=None, y=None, gain=0.0, every=1) -> list[np.ndarray]:
-        """First-order changes (N, 3) of theta, omega and drive acceleration along a ``path``, towards each of the ``others``.
+        """First-order changes (N, 3) of theta, omega and drive acceleration along a ``path`` (see ``outputs``), towards each of the ``others``.
 
         Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect.
         """
@@ -128,7 +124,7 @@ class ReducedModel:
         enable = np.ones(t.size, np.bool_) if enable is None else enable
         load = np.zeros(t.size) if load is None else load
         maps, slopes, terminal, out = np.empty((2, 3, 5, 11)), np.zeros((t.size, 3)), self.terminal(u), []
-        prepare_kernel(t, path, c.copy(), on, p, maps, slopes)
+        prepare_kernel(t, load, path, c.copy(), on, p, maps, slopes)
         for other in others:
             c_2, on_2, p_2 = other._lowered
             change = np.empty((t.size, 3))
@@ -142,6 +138,12 @@ class ReducedModel:
         for name, values in self.effects:
             theta = BY_NAME[name].measure(values, t, theta)
         return theta
+
+    def behind(self, reading):
+        """The output, a number or (N,), at which the sensor at rest shows this reading."""
+        for name, values in reversed(self.effects):
+            reading = BY_NAME[name].behind(values, reading)
+        return reading
 
     def simulate(self, t, u, start=None, *, enable=None, load=None, refine=1) -> Motion:
         """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples."""

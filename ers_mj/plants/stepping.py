@@ -20,12 +20,13 @@ LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dyn
 
 @dataclass(frozen=True)
 class Law:
-    """A law that the stepping evaluates: an effect's torque or friction (see effects/base.py) and its constants p."""
+    """A law that the stepping evaluates: an effect's torque, friction or inertia (see effects/base.py) and its constants p."""
 
     name: str
     p: np.ndarray
     torque: Callable | None
     friction: Callable | None
+    inertia: Callable | None = None
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,9 @@ class Stepper:
         self.bristle = self.model.actuator("bristle").id if self.c.has_bristle else None
         self.torques = [(law.torque, law.p) for law in self.laws if law.torque]
         self.frictions = [(law.friction, law.p) for law in self.laws if law.friction]
+        self.inertias = [(law.inertia, law.p) for law in self.laws if law.inertia and not self.c.has_motor_side]
+        self.turning = self.model.joint("rocker").dofadr[0]
+        self.armature = float(self.model.dof_armature[self.turning])
 
     def _address(self, joint: str) -> int:
         return int(self.model.jnt_qposadr[self.model.joint(joint).id])
@@ -162,10 +166,14 @@ class Stepper:
         return theta, omega, theta, v[self.rotor] / self.ratio, self.drive
 
     def _apply_laws(self, v: float, load: float) -> None:
-        """Set load torque and frictionloss from the laws at the present state, per step."""
+        """Set load torque, frictionloss and armature from the laws at the present state, per step."""
         theta, w, _, _, _ = self._observe()
         j, t, c = self._drive(v), self.data.time, self.c
         force = load + sum(torque(p, theta, w, j, t) for torque, p in self.torques)
+        for inertia, p in self.inertias:
+            relative, half_slope = inertia(p, theta)
+            self.model.dof_armature[self.turning] = self.armature + self.inertia * (relative - 1.0)
+            force -= half_slope * w * w
         if self.frictions:
             share = 1.0 - c.phi if c.has_motor_side else 1.0
             up, down = c.c_2_plus, c.c_2_minus

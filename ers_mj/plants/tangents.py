@@ -40,16 +40,16 @@ def _acceleration(c, on, p, lawful, t, x, s, side, drive, tau, a_emf, load):
 
 
 @inlined
-def _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, t, x, s, side):
+def _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, load, t, x, s, side):
     """What the changed model adds to the force on a rudder that slips in direction s, per unit of the change."""
     a_mech, level = (dc[A_PLUS], dc[C_PLUS]) if s > 0 else (dc[A_MINUS], dc[C_MINUS])
     force = dc[BIAS] + dc[A_1] * (c[THETA_0] - x[0]) + c[A_1] * dc[THETA_0] - dc[C_1] * side - a_mech * x[1] - s * level
     if laws:
-        force += (_extra(c_2, on_2, p_2, t, x, s) - _extra(c, on, p, t, x, s)) * scale
+        force += (_extra(c_2, on_2, p_2, load, t, x, s) - _extra(c, on, p, load, t, x, s)) * scale
     return force
 
 
-def _prepare(t, path, c, on, p, maps, out):
+def _prepare(t, load, path, c, on, p, maps, out):
     """Fill maps (2, 3, 5, 11) for a closed and an open circuit, by slip (see events), and out (N, 3) with the slopes of the laws' force
     by theta, w and j along the motion."""
     h = t[1] - t[0]
@@ -69,13 +69,13 @@ def _prepare(t, path, c, on, p, maps, out):
             continue
         s = 1 if w > 0 else -1
         x = (path[k, 0], w, path[k, 2], path[k, 0], 0.0)
-        here = _extra(c, on, p, t[k], x, s)
+        here = _extra(c, on, p, load[k], t[k], x, s)
         step = NUDGE * size[0]
-        out[k, 0] = (_extra(c, on, p, t[k], (x[0] + step, x[1], x[2], x[3], 0.0), s) - here) / step
+        out[k, 0] = (_extra(c, on, p, load[k], t[k], (x[0] + step, x[1], x[2], x[3], 0.0), s) - here) / step
         step = NUDGE * size[1]
-        out[k, 1] = (_extra(c, on, p, t[k], (x[0], x[1] + s * step, x[2], x[3], 0.0), s) - here) / (s * step)
+        out[k, 1] = (_extra(c, on, p, load[k], t[k], (x[0], x[1] + s * step, x[2], x[3], 0.0), s) - here) / (s * step)
         step = NUDGE * max(size[2], 1e-9)
-        out[k, 2] = (_extra(c, on, p, t[k], (x[0], x[1], x[2] + step, x[3], 0.0), s) - here) / step
+        out[k, 2] = (_extra(c, on, p, load[k], t[k], (x[0], x[1], x[2] + step, x[3], 0.0), s) - here) / step
 
 
 @inlined
@@ -84,11 +84,11 @@ def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p,
     h = t[1] - t[0]
     tau, a_emf = c[TAU], c[A_EMF]
     lawful = on[0, 0] + on[1, 0] > 0
-    laws = on[1, 0] > 0 and (dc[C_PLUS] != 0.0 or dc[C_MINUS] != 0.0)
+    laws = on[2, 0] > 0 or on[1, 0] > 0 and (dc[C_PLUS] != 0.0 or dc[C_MINUS] != 0.0)
     for i in range(p.shape[0]):
         for k in range(p.shape[1]):
             laws = laws or p[i, k] != p_2[i, k]
-    for i in range(2):
+    for i in range(on.shape[0]):
         for k in range(on.shape[1]):
             laws = laws or on[i, k] != on_2[i, k]
     known, at, towards = 0.0, -1, 0  # the force at the end of the last sample, that sample, and its slip
@@ -145,8 +145,8 @@ def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p,
         if at == k and towards == m and mean_side == side:
             force = known
         else:
-            force = _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, t[k], x, m, mean_side)
-        force_1 = _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, t[k + 1], x_1, m, mean_side)
+            force = _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, load[k], t[k], x, m, mean_side)
+        force_1 = _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, load[k], t[k + 1], x_1, m, mean_side)
         if mean_side == side_1:
             known, at, towards = force_1, k + 1, m
         e = maps[circuit, m + 1]
@@ -188,6 +188,6 @@ def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, 
 TABLE, MAPS = types.float64[:, ::1], types.float64[:, :, :, ::1]
 
 with compiled_cache():
-    prepare_kernel = njit(types.void(READ, TABLE, VECTOR, ROWS, LAWS, MAPS, TABLE), nogil=True, cache=True)(_prepare)
+    prepare_kernel = njit(types.void(READ, READ, TABLE, VECTOR, ROWS, LAWS, MAPS, TABLE), nogil=True, cache=True)(_prepare)
     tangent_kernel = njit(types.void(READ, READ, READ, READ_BOOL, READ, READ, TABLE, MAPS, TABLE, types.float64, types.int64, VECTOR, ROWS, LAWS,
                                      VECTOR, ROWS, LAWS, types.float64, TABLE), nogil=True, cache=True)(_tangent)
