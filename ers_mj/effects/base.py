@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Callable, ClassVar, NamedTuple
 
 import numpy as np
+from scipy.linalg.blas import dtbsv
 
 if TYPE_CHECKING:
     import mujoco
@@ -136,7 +137,8 @@ class Effect:
     """Abstract base: a piece of physics that the reduced model of Eq. (6) leaves out.
 
     ``torque(p, theta, w, j, t)``, ``friction(p, level, theta, w, j, direction)`` and ``inertia(p, theta)``, which gives the inertia over that of
-    the plain plant and half its slope by theta, are compiled laws (or None); an inertia acts beside a torque or a friction, of one body;
+    the plain plant and half its slope by theta, are compiled laws (or None); an inertia acts beside a torque or a friction, of one body.
+    ``memory(p, theta, w, j, h)`` is what the last of five constants becomes within a sample of length h, and begins at 0;
     ``coefficients``, ``command`` and ``measure`` act outside the integrator. All are the identity unless overridden.
     ``mjcf`` says in a sentence how a MuJoCo model shows the effect; ``edit_spec`` does it. What acts through
     ``coefficients`` needs no more: the model is written from them. A law without a twin is applied step by step.
@@ -157,6 +159,7 @@ class Effect:
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
     inertia: ClassVar[Callable | None] = None
+    memory: ClassVar[Callable | None] = None
 
     @property
     def local(self) -> bool:
@@ -266,6 +269,12 @@ def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap:
     if c.has_motor_side and c.k_twist > 0:
         k, d = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist)
     return c._replace(two_body=1.0, gap=c.gap + gap, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d)
+
+
+def recursive(decay: np.ndarray, driven: np.ndarray) -> np.ndarray:
+    """z (N,) of z[k] = decay[k] z[k - 1] + driven[k], from z[0] = driven[0]: a triangular system of two diagonals."""
+    band = np.vstack([np.ones(driven.size), np.append(-decay[1:], 0.0)])
+    return dtbsv(1, band, driven, lower=1)
 
 
 def law(function: Callable) -> staticmethod:

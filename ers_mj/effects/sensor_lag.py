@@ -1,9 +1,8 @@
 """A sensor that follows late."""
 
 import numpy as np
-from scipy.linalg.blas import dtbsv
 
-from ers_mj.effects.base import Parameter, Sensor
+from ers_mj.effects.base import Parameter, Sensor, recursive
 
 
 class SensorLag(Sensor):
@@ -24,7 +23,6 @@ class SensorLag(Sensor):
             return y
         decay = np.exp(-1.0 / ratio)
         now, before = 1.0 - ratio * (1.0 - decay), ratio * (1.0 - decay) - decay
-        band = np.vstack([np.ones(y.size), np.full(y.size, -decay)])  # the recursion, as a triangular system (an import of scipy.signal takes a second)
         driven = now * (y - y[0])
         driven[1:] += before * (y[:-1] - y[0])
-        return dtbsv(1, band, driven, lower=1) + y[0]
+        return recursive(np.full(y.size, decay), driven) + y[0]

@@ -4,31 +4,45 @@ import math
 
 import numpy as np
 
-from ers_mj.effects.base import Drive, Parameter, law
+from ers_mj.effects.base import Drive, Parameter, law, recursive
+
+COLDEST = -0.9  # of the resistance, by which it may fall at most
 
 
 class ThermalDrift(Drive):
-    """R(t) = R (1 + rise (1 - exp(-t / T_w))): the winding's resistance creeps from its cold to its warm value in every recording.
+    """R(t) = R (1 + rise q), T_w q' = (j / j_stall)^2 - q: the winding's heat, one node that is cold where a recording begins.
 
-    A negative rise is a drive that gains with time. Time counts from the zero of the recording's own clock.
+    j_stall is the drive acceleration under the largest input at a standstill, so that ``rise`` is what the resistance gains in the long run
+    there. A negative rise is a drive that gains as it warms.
     """
 
     name = "thermal_drift"
-    sentence = "the motor's resistance drifts by {rise} of itself as it warms up within {T_w}"
-    mjcf = "none: the torque is set step by step (the thermal of a dcmotor follows the current's heat, this one the clock)"
+    sentence = "the motor's resistance drifts by {rise} of itself as it warms up within {T_w} (at a standstill under {u})"
+    mjcf = "none: the torque is set step by step (the thermal of a dcmotor knows heat in watts, which no recording of an angle tells)"
     parameters = (
-        Parameter("rise", "ratio", "relative rise of the resistance once warm", positive=False, lower=-0.8, upper=10.0),
+        Parameter("rise", "ratio", "relative rise of the resistance, once warm at a standstill under the largest input", positive=False, lower=-3.0, upper=30.0),
         Parameter("T_w", "time", "time constant of the warm-up", upper=1e4),
+        Parameter("u", "input", "largest input", fitted=False, absent=1.0),
     )
     sized, tries = 1, 2
 
     def starts(self, scales):
-        return [np.array([0.1, part * scales.duration]) for part in (0.3, 1.5, 0.06)]
+        return [np.array([0.3, part * scales.duration, scales.input]) for part in (0.3, 1.5, 0.06)]
+
+    def constants(self, p, c):
+        return np.array([p[0], p[1], abs(c.b) * p[2], 0.0, 0.0])
+
+    @law
+    def memory(p, theta, w, j, h):
+        heat = (j / p[2]) ** 2
+        return heat + (p[4] - heat) * math.exp(-h / p[1])
 
     @law
     def torque(p, theta, w, j, t):
-        drift = -p[0] * math.expm1(-t / p[1])
+        drift = max(p[0] * p[4], COLDEST)
         return -j * drift / (1.0 + drift)
 
     def winding(self, p, c, t, motion, j):
-        return j / (1.0 - p[0] * np.expm1(-t / p[1]))
+        heat, decay = (motion[:-1, 2] / (c.b * p[2])) ** 2, np.exp(-np.diff(t) / p[1])
+        warmth = recursive(np.append(1.0, decay), np.append(0.0, heat * (1.0 - decay)))
+        return j / (1.0 + np.maximum(p[0] * warmth, COLDEST))

@@ -31,7 +31,8 @@ from ers_mj.plants.compiled import compiled_cache, inlined, part
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
  BETA, PHI, K_TWIST, D_TWIST, GAP, FADE) = range(len(Coefficients._fields))
-N_PARAMETERS = max(4, max(len(effect.parameters) for effect in EFFECTS))
+MEMORY = 4  # the last constant of a law, which may be a memory
+N_PARAMETERS = max(MEMORY + 1, max(len(effect.parameters) for effect in EFFECTS))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
@@ -106,8 +107,28 @@ def _chain_inertia(laws):
     return pick
 
 
+def _chain_memory(laws):
+    """One compiled function that evaluates the memory of the effect in one row."""
+    if not laws:
+        @njit(nogil=True, inline="always")
+        def pick(k, p, theta, w, j, h):
+            return 0.0
+        return pick
+    (row, law), rest = laws[0], _chain_memory(laws[1:])
+
+    @njit(nogil=True, inline="always")
+    def pick(k, p, theta, w, j, h):
+        if k == row:
+            a = law(p, theta, w, j, h)
+        else:
+            a = rest(k, p, theta, w, j, h)
+        return a
+    return pick
+
+
 _torque_of = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
 _friction_of = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
+_memory_of = _chain_memory([(row, e.memory) for row, e in enumerate(EFFECTS) if e.memory])
 _inertia_of = _chain_inertia([(row, e.inertia) for row, e in enumerate(EFFECTS) if e.inertia])
 
 
@@ -140,10 +161,19 @@ def _moved(on, p, theta, w, a):
     return a
 
 
+@inlined
+def _remember(on, p, theta, w, j, h):
+    """Bring the memories of effects, their last constants, on by a sample of length h."""
+    for i in range(on[3, 0]):
+        k = on[3, i + 1]
+        p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, h)
+
+
 def rows_of(names):
-    """Effects as the laws are called: (3, 1 + effects) their number and rows, of torques, of frictions and of inertias."""
-    on = np.zeros((3, 1 + len(EFFECTS)), np.int64)
-    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS], [e.inertia for e in EFFECTS])):
+    """Effects as the laws are called: (4, 1 + effects) their number and rows, of torques, of frictions, of inertias and of memories."""
+    on = np.zeros((4, 1 + len(EFFECTS)), np.int64)
+    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS], [e.inertia for e in EFFECTS],
+                                 [e.memory for e in EFFECTS])):
         rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and laws[row]]
         on[kind, 0], on[kind, 1:1 + len(rows)] = len(rows), rows
     return on
@@ -867,6 +897,7 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[1], x[2], x[0] if bristle else x[3]
         if k == n - 1:
             break
+        _remember(on, p, x[0], x[1], x[2], t[k + 1] - t[k])
         if gain > 0.0 and k % every == 0 and y[k] == y[k]:
             resting, extra = -1, np.nan
             x, m = _corrected(c, on, p, lawful, t[k], x, m, gain * (y[k] - x[0]))
@@ -950,8 +981,8 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
 
     ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
     hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
-    holds the rows of the effects with a law (see rows_of), ``p`` (effects, N_PARAMETERS) their constants; ``refine`` divides the
-    segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
+    holds the rows of the effects with a law (see rows_of), ``p`` (effects, N_PARAMETERS) their constants, of which memories change; ``refine``
+    divides the segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
     """
     lawful, h0 = on[0, 0] + on[1, 0] > 0, t[1] - t[0]
     tau, a_emf = c[TAU], c[A_EMF]

@@ -57,7 +57,7 @@ class ReducedModel:
         for name, values in self.effects:
             effect = BY_NAME[name]
             c = effect.coefficients(values, c)
-            if effect.torque or effect.friction or effect.inertia:
+            if effect.torque or effect.friction or effect.inertia or effect.memory:
                 constants = effect.constants(values, c)
                 p[ROW[name], :len(constants)] = constants
         object.__setattr__(self, "_lowered", (np.array(c, float), rows_of([name for name, _ in self.effects]), p))
@@ -80,7 +80,7 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        simulate_kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p, refine, x0, out)
+        simulate_kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p.copy(), refine, x0, out)
         return out
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
@@ -124,12 +124,12 @@ class ReducedModel:
         enable = np.ones(t.size, np.bool_) if enable is None else enable
         load = np.zeros(t.size) if load is None else load
         maps, slopes, terminal, out = np.empty((2, 3, 5, 11)), np.zeros((t.size, 3)), self.terminal(u), []
-        prepare_kernel(t, load, path, c.copy(), on, p, maps, slopes)
+        prepare_kernel(t, load, path, c.copy(), on, p.copy(), maps, slopes)
         for other in others:
             c_2, on_2, p_2 = other._lowered
             change = np.empty((t.size, 3))
             tangent_kernel(t, terminal, (other.terminal(u) - terminal) * scale, enable, load, t if y is None else y, path, maps, slopes, gain, every,
-                           c.copy(), on, p, c_2, on_2, p_2, scale, change)
+                           c.copy(), on, p.copy(), c_2, on_2, p_2.copy(), scale, change)
             out.append(change)
         return out
 

@@ -10,7 +10,7 @@ from numba import njit, types
 from ers_mj.effects import BY_NAME
 from ers_mj.plants.compiled import compiled_cache
 from ers_mj.plants.events import (A_EMF, B, BRISTLE_CORNER, C_1, C_PLUS, CONTACT_STEP, CORNER, D_STOP, DELAY, K_STOP, K_TWIST, LOWER, RHO, TAU, TWO, UPPER,
-                                  _advance, _bounded, _cuts, _has_bristle, _last, _start_mode)
+                                  _advance, _bounded, _cuts, _has_bristle, _last, _remember, _start_mode)
 from ers_mj.plants.reduced import ReducedModel
 
 
@@ -47,6 +47,7 @@ def _sample(t, h0, before, now, c, on, p, refine, x, m):
         corner = max(corner, BRISTLE_CORNER * c[C_1] * last * refine)
     z, mode = (x[0], x[1], x[2], x[3], x[4]), (m[0], m[1], m[2], m[3], m[4])
     start = 0.0
+    _remember(on, p, x[0], x[1], x[2], h0)
     for i in range(ends.size):
         drive = c[B] * (now if fresh[i] == 1 else before)
         z, mode, _ = _advance(c, on, p, lawful, t + start, z, mode, drive, tau, a_emf, ends[i] - start, h_max, corner)
@@ -77,8 +78,8 @@ class SampledReduced:
 
     def __init__(self, model: ReducedModel, rate_hz: float, start: tuple[float, float]):
         self._model, self._h = model, 1.0 / rate_hz
-        c, self._on, self._p = model._lowered
-        self._c = c.copy()
+        c, self._on, p = model._lowered
+        self._c, self._p = c.copy(), p.copy()
         self._refine = 2 if any(BY_NAME[name].follows_current for name, _ in model.effects) else 1
         self._x, self._mode = np.array([*start, 0.0, 0.0, 0.0]), np.zeros(5, np.int64)
         self._skip = int(c[DELAY] * rate_hz + 1e-9)

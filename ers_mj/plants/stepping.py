@@ -20,13 +20,14 @@ LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dyn
 
 @dataclass(frozen=True)
 class Law:
-    """A law that the stepping evaluates: an effect's torque, friction or inertia (see effects/base.py) and its constants p."""
+    """A law that the stepping evaluates: an effect's torque, friction, inertia or memory (see effects/base.py) and its constants p."""
 
     name: str
     p: np.ndarray
     torque: Callable | None
     friction: Callable | None
     inertia: Callable | None = None
+    memory: Callable | None = None
 
 
 @dataclass(frozen=True)
@@ -69,9 +70,11 @@ class Stepper:
         self.gap = self._address("gap") if self.c.has_motor_side else None
         self.current = int(self.model.actuator_actadr[self.motor])
         self.bristle = self.model.actuator("bristle").id if self.c.has_bristle else None
-        self.torques = [(law.torque, law.p) for law in self.laws if law.torque]
-        self.frictions = [(law.friction, law.p) for law in self.laws if law.friction]
-        self.inertias = [(law.inertia, law.p) for law in self.laws if law.inertia and not self.c.has_motor_side]
+        laws = [(law, law.p.copy()) for law in self.laws]
+        self.torques = [(law.torque, p) for law, p in laws if law.torque]
+        self.frictions = [(law.friction, p) for law, p in laws if law.friction]
+        self.inertias = [(law.inertia, p) for law, p in laws if law.inertia and not self.c.has_motor_side]
+        self.memories = [(law.memory, p) for law, p in laws if law.memory]
         self.turning = self.model.joint("rocker").dofadr[0]
         self.armature = float(self.model.dof_armature[self.turning])
 
@@ -169,6 +172,8 @@ class Stepper:
         """Set load torque, frictionloss and armature from the laws at the present state, per step."""
         theta, w, _, _, _ = self._observe()
         j, t, c = self._drive(v), self.data.time, self.c
+        for memory, p in self.memories:
+            p[-1] = memory(p, theta, w, j, self.model.opt.timestep)
         force = load + sum(torque(p, theta, w, j, t) for torque, p in self.torques)
         for inertia, p in self.inertias:
             relative, half_slope = inertia(p, theta)
