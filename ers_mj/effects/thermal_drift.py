@@ -27,7 +27,7 @@ class ThermalDrift(Drive):
     sized, tries = 1, 2
 
     def starts(self, scales):
-        return [np.array([0.3, part * scales.duration, scales.input]) for part in (0.3, 1.5, 0.06)]
+        return [np.array([0.4, part * scales.duration, scales.input]) for part in (0.3, 1.5, 0.06)]
 
     def constants(self, p, c):
         return np.array([p[0], p[1], abs(c.b) * p[2], 0.0, 0.0])
