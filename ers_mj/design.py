@@ -137,17 +137,12 @@ class Bench:
         """What CHANNELS would read (N,): the motor's torque for the current, the motor's side, and the share of the supply that is left."""
         self.simulations += 1
         plant, run = model.staged(trace, 1, OBSERVER_RATE, None)
-        theta, omega, drive, theta_m = plant.outputs(trace.t, trace.u, **run)[1].T
-        current, supply = drive.copy(), np.ones(theta.size)
+        motion = plant.outputs(trace.t, trace.u, **run)[1]
+        theta, drive, theta_m, supply = motion[:, 0], motion[:, 2], motion[:, 3], np.ones(trace.t.size)
         for name, values in plant.effects:
-            if _electric(name):
-                constants = tuple(BY_NAME[name].constants(values, plant.coefficients).tolist())
-                rows = zip(theta.tolist(), omega.tolist(), drive.tolist(), trace.t.tolist())
-                more = np.array([BY_NAME[name].torque.py_func(constants, *row) for row in rows])
-                current += more
-                if name == "supply_sag":
-                    supply += more / np.where(drive == 0.0, 1.0, drive)
-        return {"i_A": current, "theta_m_rad": theta_m if plant.coupled else theta, "vin_V": supply}
+            if name == "supply_sag":
+                supply = BY_NAME[name].winding(values, plant.coefficients, trace.t, motion, drive) / np.where(drive == 0.0, 1.0, drive)
+        return {"i_A": plant.current(trace.t, motion), "theta_m_rad": theta_m if plant.coupled else theta, "vin_V": supply}
 
     def cost(self, misfit: np.ndarray) -> float:
         """C beyond the leader's of blocks that miss this much (B,) more than it does."""
@@ -383,9 +378,3 @@ def channels(pair: Pair, check: Check, slopes: np.ndarray, bench: Bench) -> dict
         out[name] = math.sqrt(2 * max(remains(np.nan_to_num(stacked), np.nan_to_num(wide), known, both, bench, gone), 0.0))
     return out
 
-
-def _electric(name: str) -> bool:
-    """Whether an effect's torque is the current's doing: a law of the drive that vanishes where no current is asked for."""
-    effect = BY_NAME[name]
-    return effect.subsystem == "drive" and bool(effect.torque) and all(
-        effect.torque.py_func((1.0,) * 4, x, 0.0, 0.0, 1.0) == 0.0 for x in (0.0, 0.1, 0.25))

@@ -89,6 +89,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     def total(found):
         return float(score(found.misfit, tau).sum())
 
+    def priced(found):
+        return total(found) + PARAMETER_PRICE * found.size
+
     def quick(begin):
         return fit(begin.model, traces, tau=tau, steps=QUICK, ceiling=base.misfit, known=begin.known, renewals=0)
 
@@ -163,7 +166,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         finished = dict(pool.map(finish, rough[:close]))
         for name, found in pool.map(finish, _wider(finished, exclude)):
-            if name not in best or total(found) < total(finished.get(name, best[name])):
+            if name not in best or priced(found) < priced(finished.get(name, best[name])):
                 finished[name] = found
         ranked = sorted(map(judged, {**dict(rough), **finished}.items()), key=lambda c: -c.worth)
         rivals = len(_rivals(ranked))

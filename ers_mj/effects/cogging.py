@@ -10,35 +10,49 @@ ORDERS = (2, *range(3, 41, 2))  # periods within the whole travel from which a f
 
 
 class Cogging(Drive):
-    """theta'' += A sin(2 pi theta / period + phase) / J, with or without current; n periods at the motor are n times as wide."""
+    """theta'' += A (sin x + second sin(2 x + phase_2)) / J, x = 2 pi theta / period + phase, with or without current; n periods at the motor are
+    n times as wide. The second harmonic is absent where it is infinite.
+    """
 
     name = "cogging"
     sentence = "the motor cogs: a torque of amplitude {A} at the rudder that returns every {period} of its angle"
-    mjcf = "a passive dcmotor on the rudder's angle, its cogging of one pole behind a gear of 2 pi / period"
+    mjcf = "a passive dcmotor on the rudder's angle, its cogging of one pole behind a gear of 2 pi / period, and another for the second harmonic"
     parameters = (
         Parameter("A", "torque", "amplitude, seen at the output", positive=False),
         Parameter("period", "position", "period, seen at the output"),
         Parameter("phase", "phase", "phase of the sine at angle zero", positive=False),
+        Parameter("second", "ratio", "second harmonic over the first", positive=False, lower=-2.0, upper=2.0, absent=np.inf),
+        Parameter("phase_2", "phase", "phase of the second harmonic against the first", positive=False, absent=np.inf),
     )
     sized, tries = 1, 3
     wave = (0, 2)
 
     def starts(self, scales):
         travel = scales.high - scales.low
-        return [np.array([0.2 * scales.acceleration, travel / order, 0.0]) for order in ORDERS]
+        return [np.array([0.2 * scales.acceleration, travel / order, 0.0, np.inf, np.inf]) for order in ORDERS]
+
+    def grown(self, name, p, scales):
+        """From a plain sine: with a second harmonic."""
+        return [np.array([*p[:3], 0.1, phase]) for phase in (0.0, 0.5 * np.pi)] if name == self.name and not np.isfinite(p[3]) else []
 
     def constants(self, p, c):
-        return np.array([p[0], 2 * np.pi / p[1], p[2]])
+        return np.array([p[0], 2 * np.pi / p[1], p[2], *(p[3:] if np.isfinite(p[3]) else (0.0, 0.0))])
 
     @law
     def torque(p, theta, w, j, t):
-        return p[0] * math.sin(p[1] * theta + p[2])
+        x = p[1] * theta + p[2]
+        cog = math.sin(x)
+        if p[3] != 0.0:
+            cog += p[3] * math.sin(2.0 * x + p[4])
+        return p[0] * cog
 
     def edit_spec(self, p, c, twin):
         import mujoco
 
-        magnets = twin.spec.add_actuator(name="cogging", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle")
-        magnets.set_to_dcmotor(motorconst=[0.0, 0.0], resistance=1.0, cogging=[twin.inertia * p[0] / p[1], 1.0, p[2]],
-                               ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE))
-        magnets.gear[0] = p[1]
+        waves = [(p[0], p[1], p[2])] + ([(p[0] * p[3], 2.0 * p[1], 2.0 * p[2] + p[4])] if p[3] != 0.0 else [])
+        for k, (amplitude, rate, phase) in enumerate(waves):
+            magnets = twin.spec.add_actuator(name=("cogging", "cogging_2")[k], trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle")
+            magnets.set_to_dcmotor(motorconst=[0.0, 0.0], resistance=1.0, cogging=[twin.inertia * amplitude / rate, 1.0, phase],
+                                   ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE))
+            magnets.gear[0] = rate
         return True

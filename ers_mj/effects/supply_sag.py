@@ -25,3 +25,6 @@ class SupplySag(Drive):
     def torque(p, theta, w, j, t):
         sag = p[0] * (j + p[1] * w) ** 2
         return -j * sag / (1.0 + sag)
+
+    def winding(self, p, c, t, motion, j):
+        return j / (1.0 + ((motion[:, 2] + c.a_emf * motion[:, 1]) / (c.b * p[0])) ** 2)
