@@ -15,7 +15,7 @@ import numpy as np
 from ers_mj.design import CHANNELS, DESIGN_RATE, SETTLED, VAGUE, Bench, Check, Design, Explanation, Pair, chances, channels, checked, designed, solved
 from ers_mj.effects import BY_NAME
 from ers_mj.excitation import GENTLE, SHARES, Limits, excitations
-from ers_mj.identification import DIFFERENCE, Fit, tau_of
+from ers_mj.identification import Fit, step_of, tau_of
 from ers_mj.model import STATES, Model
 from ers_mj.traces import Blocks, Trace
 
@@ -133,8 +133,9 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
     vague = np.eye(leader.z.size) / VAGUE**2
     before = _spreads(leader.known + vague, wanted)
     wanted, before = [i for i, x in zip(wanted, before) if x < SEEN * VAGUE], before[before < SEEN * VAGUE]
-    by = np.full(leader.z.size, DIFFERENCE)
-    by[wanted] = np.clip(before, DIFFERENCE, WIDEST)
+    least = step_of(leader.model)
+    by = np.full(leader.z.size, least)
+    by[wanted] = np.clip(before, least, max(WIDEST, least))
     best, tried = None, 0
     for shares in (SHARES, GENTLE):
         for shape in excitations(bench.limits, shares):

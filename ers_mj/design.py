@@ -15,7 +15,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME
 from ers_mj.excitation import GENTLE, SHARES, Limits, excitations, signal
-from ers_mj.identification import DIFFERENCE, Fit
+from ers_mj.identification import Fit, step_of
 from ers_mj.model import OBSERVER_RATE, STATES, Free, Model
 from ers_mj.traces import Blocks, Trace, make_trace
 
@@ -129,7 +129,7 @@ class Bench:
 
     def slopes(self, one: Explanation, z: np.ndarray, e: np.ndarray, trace: Trace, by: np.ndarray | None = None) -> np.ndarray:
         """Finite differences (N, k) of ``misses``, over steps ``by`` (k,)."""
-        by = np.full(z.size, DIFFERENCE) if by is None else by
+        by = np.full(z.size, step_of(one.model)) if by is None else by
         columns = [(self.misses(one.at(z + row), trace) - e) / step for row, step in zip(np.diag(by), by)]
         return np.nan_to_num(np.column_stack(columns), nan=0.0, posinf=0.0, neginf=0.0)
 
@@ -364,13 +364,14 @@ def channels(pair: Pair, check: Check, slopes: np.ndarray, bench: Bench) -> dict
     """
     one, clean, e, blocks = pair.answer, check.clean, check.e, Blocks.of([check.clean])
     seen, read = bench.further(pair.rig.model, clean), bench.further(one.at(check.z), clean)
-    moved = [bench.further(one.at(check.z + DIFFERENCE * row), clean) for row in np.eye(check.z.size)]
+    step = step_of(one.model)
+    moved = [bench.further(one.at(check.z + step * row), clean) for row in np.eye(check.z.size)]
     both = Blocks(np.concatenate([blocks.index, blocks.index + blocks.counts.size]), np.tile(blocks.counts, 2))
     out = {}
     for name, noise in CHANNELS.items():
         sigma = noise * float(np.max(np.abs(seen[name]))) if noise else clean.sigma
         free = np.column_stack([read[name], np.ones(clean.t.size)] if noise else [np.ones(clean.t.size)])
-        columns = np.column_stack([(read[name] - x[name]) / DIFFERENCE for x in moved])
+        columns = np.column_stack([(read[name] - x[name]) / step for x in moved])
         wide = np.block([[slopes, np.zeros(free.shape)], [columns / sigma, free / sigma]])
         known, gone = np.zeros((wide.shape[1],) * 2), np.zeros(wide.shape[1])
         known[:check.z.size, :check.z.size], gone[:check.z.size] = one.known, check.z - one.z

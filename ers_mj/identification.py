@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ers_mj.effects import BY_NAME, Effect
 from ers_mj.model import OBSERVER_RATE, Columns, Model
 from ers_mj.starts import with_starts
 from ers_mj.traces import Blocks, Trace
 
-DIFFERENCE = 1e-4  # step of the finite differences in transformed parameters
 POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
 FLOOR = 1e-4  # gain in C of one step below which a fit stands on its valley's floor
@@ -266,6 +266,11 @@ def _has_tangents(model: Model, traces: Sequence[Trace]) -> bool:
     return model.has_tangents and all(t.is_uniform for t in traces)
 
 
+def step_of(model: Model) -> float:
+    """Step of finite differences in the transformed numbers."""
+    return max((BY_NAME[name].step for name in model.names), default=Effect.step)
+
+
 def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns | None = None, by_tangents: bool = True) -> np.ndarray:
     """Slopes (N, k) of what a run leaves by the numbers fitted of its model, but for the ``known`` ones.
 
@@ -278,20 +283,22 @@ def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns |
     wanted = [k for k in range(z.size) if not (known and layout[k].key in known)]
     for k in set(range(z.size)) - set(wanted):
         jacobian[:, k] = known[layout[k].key]
-    others = [model.at(layout, z + DIFFERENCE * (np.arange(z.size) == k)) for k in wanted]
+    step = step_of(model)
+    others = [model.at(layout, z + step * (np.arange(z.size) == k)) for k in wanted]
     if by_tangents and _has_tangents(model, traces):
-        jacobian[:, wanted] = -model.changes(traces, rate, others, 1.0 / DIFFERENCE, run.motions)
+        jacobian[:, wanted] = -model.changes(traces, rate, others, 1.0 / step, run.motions)
     else:
         for k, other in zip(wanted, others):
-            jacobian[:, k] = (residuals(other, traces, rate) - run.left) / DIFFERENCE
+            jacobian[:, k] = (residuals(other, traces, rate) - run.left) / step
     jacobian[~np.isfinite(jacobian)] = 0.0
     return jacobian
 
 
 def central_jacobian(model: Model, layout, z: np.ndarray, traces: Sequence[Trace], rate: float) -> np.ndarray:
     """Central differences (N, k) of the residuals: tangents, good to a few per cent each, blur the directions in which their columns cancel."""
-    ends = [[residuals(model.at(layout, z + way * step), traces, rate) for way in (1, -1)] for step in DIFFERENCE * np.eye(z.size)]
-    return np.nan_to_num(np.column_stack([(ahead - behind) / (2.0 * DIFFERENCE) for ahead, behind in ends]), nan=0.0, posinf=0.0, neginf=0.0)
+    step = step_of(model)
+    ends = [[residuals(model.at(layout, z + way * row), traces, rate) for way in (1, -1)] for row in step * np.eye(z.size)]
+    return np.nan_to_num(np.column_stack([(ahead - behind) / (2.0 * step) for ahead, behind in ends]), nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _prior_cost(layout, z):

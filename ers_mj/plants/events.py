@@ -664,11 +664,20 @@ def _start_mode(c, on, p, lawful, t, x):
 
 @inlined
 def _corrected(c, on, p, lawful, t, x, m, jump):
-    """The state after the observer has moved the angle by ``jump`` (both bodies), unless the corner holds it."""
+    """The state after the observer has moved the angle by ``jump`` (both bodies), unless the corner holds it.
+
+    On a bristle a rudder bounces in the corner, out of sight, before it rests: there it is moved the less the nearer it is, so that nothing hangs on
+    where in its bounce a sample finds it.
+    """
+    if c[C_1] > 0 and _has_bristle(c):
+        jump *= min(1.0, abs(x[0] - c[THETA_0]) / max(2.0 * abs(jump), 1e-300))
     theta = x[0] + jump
     side = 0
     if c[C_1] > 0:
         side = 1 if theta > c[THETA_0] else -1
+        if m[0] == 0 and m[1] * side < 0:  # a rudder at rest is not pushed through the corner, which would throw it back
+            theta, side = c[THETA_0], 0
+            jump = theta - x[0]
     stop = 1 if theta > c[UPPER] else (-1 if theta < c[LOWER] else 0)
     z = (theta, x[1], x[2], x[3] + jump, x[4])
     m_new = (m[0], side, stop, m[3], m[4])
