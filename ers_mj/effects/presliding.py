@@ -29,7 +29,7 @@ class Presliding(Friction):
     tries, dear, step = 2, True, 0.01
 
     def starts(self, scales):
-        least, most = 2 * scales.noise, 0.02 * scales.position
+        least, most = 2 * scales.noise, 0.05 * scales.position
         return [np.array([x_s, 0.5, w_d]) for x_s in np.geomspace(most, least, 4) for w_d in (FADING * scales.speed, math.inf)]
 
     def coefficients(self, p, c):
