@@ -203,8 +203,8 @@ def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
 def _likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
     """Of rivals the most probable leads (see isolability.probabilities): which of them the worth prefers may rest on one stick or slip.
 
-    What has a clock of its own (a gust, a knock) leads only where no law of the servo itself explains CLOCKED of what it does: a swing
-    bends to whatever a repeated excitation leaves over.
+    What has a clock of its own (a gust, a knock) or differs from recording to recording leads only where no law of the servo itself explains
+    CLOCKED of what it does: a swing bends to whatever a repeated excitation leaves over, a friction of each recording's own to any law of its speed.
     """
     if not ranked:
         return ranked
@@ -218,7 +218,7 @@ def _likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
 
 
 def _clocked(candidate: Candidate) -> bool:
-    return candidate.name in BY_NAME and BY_NAME[candidate.name].local
+    return candidate.name in STATES or BY_NAME[candidate.name].local
 
 
 @dataclass(frozen=True)
