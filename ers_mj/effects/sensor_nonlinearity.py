@@ -4,7 +4,7 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Sensor
 
-SETTLED = 20  # corrections until a sensor's error, whose slope is small, is taken off a reading
+NEWTON, FLATTEST = 6, 0.2  # steps that take a sensor's error off a reading, and the least slope of a reading
 ORDERS = (0.5, 1, 2, 3, 4, 6, 8)  # periods within the travel from which a fit is begun
 
 
@@ -42,9 +42,17 @@ class SensorNonlinearity(Sensor):
 
     def behind(self, p, y):
         theta = y
-        for _ in range(SETTLED):
-            theta = theta + y - self.measure(p, None, theta)
+        for _ in range(NEWTON):
+            theta = theta + (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), FLATTEST)
         return theta
+
+    def _slope(self, p, theta):
+        """Slope of the reading by the output."""
+        bend, twist, amplitude, period, phase = p
+        if np.isfinite(period):
+            rate = 2 * np.pi / period
+            return 1.0 + amplitude * rate * np.cos(rate * theta + phase)
+        return 1.0 + (2.0 * bend * theta if np.isfinite(bend) else 0.0) + (3.0 * twist * theta**2 if np.isfinite(twist) else 0.0)
 
     def describe(self, values):
         if values["period"] == "none":
