@@ -171,18 +171,20 @@ def _nearer(gain: Callable[[np.ndarray], float], start: np.ndarray) -> tuple[flo
 def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
     """Share of the residual that the start's secant explains, and the model with the start as large as the secant asks for.
 
-    A secant across a large step bends; where the effect is proportional to its leading parameters it is taken again at that size.
+    A secant across a large step bends, or is all stick and slip that fork; where the effect is proportional to its leading parameters it is taken
+    again at the size that it asks for, and what that one asks for is where a refit begins.
     """
     if effect.wave and np.isfinite(start[effect.wave[1]]):
         return _promise_of_wave(place, effect, start, e, targets, traces)
-    best, ends = None, _ends(effect, traces)
+    best, ends, whole, size = None, _ends(effect, traces), start, 1.0
     for _ in range(2 if effect.sized else 1):
         secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
         if not np.all(np.isfinite(secant)):
             break
         share, factor = max((float(part[0]), float(size[0, 0, 0])) for part, size in
                             (_shares(secant[None], 1, ends, target, effect.signed) for target in targets))
-        start = _resized(start, effect.sized, factor)
+        size = math.copysign(min(max(abs(size * factor), LEAST_SIZE), MOST_SIZE), size * factor)
+        start = np.append(size * whole[:effect.sized], whole[effect.sized:])
         if best is None or share > best[0]:
             best = share, place.with_effect(effect.name, start)
     return best
@@ -252,9 +254,3 @@ def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int,
     worst = np.argsort(-score(blocks.misfit(e), tau), kind="stable")[:HOTTEST]
     return tuple((int(record[b]), float(traces[record[b]].t[0] + within[b] * BLOCK), length) for b in worst for length in KNOCKS)
 
-
-def _resized(start: np.ndarray, sized: int, factor: float) -> np.ndarray:
-    """The start with the effect as large as its secant asks for, so that the refit begins near the model it extends."""
-    start = start.copy()
-    start[:sized] *= math.copysign(min(max(abs(factor), LEAST_SIZE), MOST_SIZE), factor)
-    return start
