@@ -24,15 +24,13 @@ import math
 import numpy as np
 from numba import njit, types
 
-from ers_mj.effects import EFFECTS
 from ers_mj.effects.base import Coefficients
 from ers_mj.plants.compiled import compiled_cache, inlined, part
+from ers_mj.plants.laws import friction_level, moved, remember, total_torque
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
  BETA, PHI, K_TWIST, D_TWIST, GAP, FADE) = range(len(Coefficients._fields))
-MEMORY = 4  # the last constant of a law, which may be a memory
-N_PARAMETERS = max(MEMORY + 1, max(len(effect.parameters) for effect in EFFECTS))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
@@ -48,135 +46,6 @@ LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
 ORDER = (0, 4, 1, 2, 3, 5, 6)  # speeds first: between their zeros angles are monotone, so that later events have one root
 GAUSS_X, GAUSS_W = (0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(10)[1])
-
-
-def _chain_torque(laws):
-    """One compiled function that evaluates the torque of the effect in one row."""
-    if not laws:
-        @njit(nogil=True, inline="always")
-        def pick(k, p, theta, w, j, t):
-            return 0.0
-        return pick
-    (row, law), rest = laws[0], _chain_torque(laws[1:])
-
-    @njit(nogil=True, inline="always")
-    def pick(k, p, theta, w, j, t):
-        if k == row:
-            a = law(p, theta, w, j, t)
-        else:
-            a = rest(k, p, theta, w, j, t)
-        return a
-    return pick
-
-
-def _chain_friction(laws):
-    """One compiled function that passes the friction level through the effect in one row."""
-    if not laws:
-        @njit(nogil=True, inline="always")
-        def pick(k, p, level, theta, w, j, direction):
-            return level
-        return pick
-    (row, law), rest = laws[0], _chain_friction(laws[1:])
-
-    @njit(nogil=True, inline="always")
-    def pick(k, p, level, theta, w, j, direction):
-        if k == row:
-            a = law(p, level, theta, w, j, direction)
-        else:
-            a = rest(k, p, level, theta, w, j, direction)
-        return a
-    return pick
-
-
-def _chain_inertia(laws):
-    """One compiled function that evaluates the inertia of the effect in one row."""
-    if not laws:
-        @njit(nogil=True, inline="always")
-        def pick(k, p, theta):
-            return 1.0, 0.0
-        return pick
-    (row, law), rest = laws[0], _chain_inertia(laws[1:])
-
-    @njit(nogil=True, inline="always")
-    def pick(k, p, theta):
-        if k == row:
-            a = law(p, theta)
-        else:
-            a = rest(k, p, theta)
-        return a
-    return pick
-
-
-def _chain_memory(laws):
-    """One compiled function that evaluates the memory of the effect in one row."""
-    if not laws:
-        @njit(nogil=True, inline="always")
-        def pick(k, p, theta, w, j, h):
-            return 0.0
-        return pick
-    (row, law), rest = laws[0], _chain_memory(laws[1:])
-
-    @njit(nogil=True, inline="always")
-    def pick(k, p, theta, w, j, h):
-        if k == row:
-            a = law(p, theta, w, j, h)
-        else:
-            a = rest(k, p, theta, w, j, h)
-        return a
-    return pick
-
-
-_torque_of = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
-_friction_of = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
-_memory_of = _chain_memory([(row, e.memory) for row, e in enumerate(EFFECTS) if e.memory])
-_inertia_of = _chain_inertia([(row, e.inertia) for row, e in enumerate(EFFECTS) if e.inertia])
-
-
-@inlined
-def _torque(on, p, theta, w, j, t):
-    """Sum of the torques of the effects that are on."""
-    a = 0.0
-    for i in range(on[0, 0]):
-        k = on[0, i + 1]
-        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, t)
-    return a
-
-
-@inlined
-def _friction(on, p, level, theta, w, j, direction):
-    """The friction level after every effect that is on."""
-    for i in range(on[1, 0]):
-        k = on[1, i + 1]
-        level = _friction_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), level, theta, w, j, direction)
-    return level
-
-
-@inlined
-def _moved(on, p, theta, w, a):
-    """The acceleration that is left of ``a``, per total inertia, where effects change the inertia along the travel."""
-    for i in range(on[2, 0]):
-        k = on[2, i + 1]
-        inertia, half_slope = _inertia_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta)
-        a = (a - half_slope * w * w) / inertia
-    return a
-
-
-@inlined
-def _remember(on, p, theta, w, j, h):
-    """Bring the memories of effects, their last constants, on by a sample of length h."""
-    for i in range(on[3, 0]):
-        k = on[3, i + 1]
-        p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, h)
-
-
-def rows_of(names):
-    """Effects as the laws are called: (4, 1 + effects) their number and rows, of torques, of frictions, of inertias and of memories."""
-    on = np.zeros((4, 1 + len(EFFECTS)), np.int64)
-    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS], [e.inertia for e in EFFECTS],
-                                 [e.memory for e in EFFECTS])):
-        rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and laws[row]]
-        on[kind, 0], on[kind, 1:1 + len(rows)] = len(rows), rows
-    return on
 
 
 @inlined
@@ -219,7 +88,7 @@ def _level(c, on, p, lawful, x, direction):
     """Level of friction on a bristle in one direction, per total inertia."""
     level = c[C_PLUS] if direction > 0 else c[C_MINUS]
     if lawful:
-        level = _friction(on, p, level, x[0], x[1], x[2], direction)
+        level = friction_level(on, p, level, x[0], x[1], x[2], direction)
     return max(level, LEAST_LEVEL * 0.5 * (c[C_PLUS] + c[C_MINUS]))
 
 
@@ -256,8 +125,8 @@ def _held(c, on, p, lawful, t, x, m):
         a += j
     up, down = c[C_PLUS], c[C_MINUS]
     if lawful:
-        a += _torque(on, p, theta, 0.0, j, t)
-        up, down = _friction(on, p, up, theta, 0.0, j, 1.0), _friction(on, p, down, theta, 0.0, j, -1.0)
+        a += total_torque(on, p, theta, 0.0, j, t)
+        up, down = friction_level(on, p, up, theta, 0.0, j, 1.0), friction_level(on, p, down, theta, 0.0, j, -1.0)
     up, down = share * up, share * down
     if m[1] == 0:
         up, down = up + c[C_1], down + c[C_1]
@@ -301,8 +170,8 @@ def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
         a_mech = c[A_PLUS] if m[0] > 0 else c[A_MINUS]
         force = c[BIAS] + c[A_1] * (c[THETA_0] - theta) - c[C_1] * m[1] + _stop_force(c, m[2], theta, w)
         if lawful:
-            force += _torque(on, p, theta, w, j, t)
-            level = _friction(on, p, level, theta, w, j, float(m[0]))
+            force += total_torque(on, p, theta, w, j, t)
+            level = friction_level(on, p, level, theta, w, j, float(m[0]))
         if two:
             force += push - (1.0 - c[BETA]) * a_mech * w - (1.0 - c[PHI]) * level * m[0]
             dw = force / (1.0 - c[RHO])
@@ -311,7 +180,7 @@ def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
         else:
             dw = force + j - a_mech * w - level * m[0]
             if lawful:
-                dw = _moved(on, p, theta, w, dw)
+                dw = moved(on, p, theta, w, dw)
     dw_m = 0.0
     if two and m[3] != 0:
         a_mech = c[A_PLUS] if w_m > 0 else c[A_MINUS]
@@ -760,12 +629,12 @@ def _extra(c, on, p, load, t, x, s):
     """What the laws of effects add to the force on a slipping rudder under a known ``load``, per total inertia; what they take of its inertia of one body only."""
     level = c[C_PLUS] if s > 0 else c[C_MINUS]
     share = 1.0 - c[PHI] if c[TWO] > 0 else 1.0
-    force = _torque(on, p, x[0], x[1], x[2], t) - s * share * (_friction(on, p, level, x[0], x[1], x[2], float(s)) - level)
+    force = total_torque(on, p, x[0], x[1], x[2], t) - s * share * (friction_level(on, p, level, x[0], x[1], x[2], float(s)) - level)
     if on[2, 0] > 0 and c[TWO] <= 0:
         side = 1.0 if x[0] > c[THETA_0] else -1.0
         rest = (c[BIAS] + load + c[A_1] * (c[THETA_0] - x[0]) - c[C_1] * side + x[2]
                 - (c[A_PLUS] if s > 0 else c[A_MINUS]) * x[1] - s * level)
-        force = _moved(on, p, x[0], x[1], rest + force) - rest
+        force = moved(on, p, x[0], x[1], rest + force) - rest
     return force
 
 
@@ -906,7 +775,7 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[1], x[2], x[0] if bristle else x[3]
         if k == n - 1:
             break
-        _remember(on, p, x[0], x[1], x[2], t[k + 1] - t[k])
+        remember(on, p, x[0], x[1], x[2], t[k + 1] - t[k])
         if gain > 0.0 and k % every == 0 and y[k] == y[k]:
             resting, extra = -1, np.nan
             x, m = _corrected(c, on, p, lawful, t[k], x, m, gain * (y[k] - x[0]))
@@ -990,7 +859,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
 
     ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
     hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
-    holds the rows of the effects with a law (see rows_of), ``p`` (effects, N_PARAMETERS) their constants, of which memories change; ``refine``
+    holds the rows of the effects with a law (see laws.rows_of), ``p`` (effects, N_PARAMETERS) their constants, of which memories change; ``refine``
     divides the segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
     """
     lawful, h0 = on[0, 0] + on[1, 0] > 0, t[1] - t[0]

@@ -9,7 +9,8 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients, Effect
-from ers_mj.plants.events import N_PARAMETERS, rows_of, simulate_kernel
+from ers_mj.plants.events import simulate_kernel
+from ers_mj.plants.laws import N_PARAMETERS, rows_of
 from ers_mj.plants.tangents import prepare_kernel, tangent_kernel
 
 ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}

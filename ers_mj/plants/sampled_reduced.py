@@ -10,7 +10,8 @@ from numba import njit, types
 from ers_mj.effects import BY_NAME
 from ers_mj.plants.compiled import compiled_cache
 from ers_mj.plants.events import (A_EMF, B, BRISTLE_CORNER, C_1, C_PLUS, CONTACT_STEP, CORNER, D_STOP, DELAY, K_STOP, K_TWIST, LOWER, RHO, TAU, TWO, UPPER,
-                                  _advance, _bounded, _cuts, _has_bristle, _last, _remember, _start_mode)
+                                  _advance, _bounded, _cuts, _has_bristle, _last, _start_mode)
+from ers_mj.plants.laws import remember
 from ers_mj.plants.reduced import ReducedModel
 
 
@@ -47,7 +48,7 @@ def _sample(t, h0, before, now, c, on, p, refine, x, m):
         corner = max(corner, BRISTLE_CORNER * c[C_1] * last * refine)
     z, mode = (x[0], x[1], x[2], x[3], x[4]), (m[0], m[1], m[2], m[3], m[4])
     start = 0.0
-    _remember(on, p, x[0], x[1], x[2], h0)
+    remember(on, p, x[0], x[1], x[2], h0)
     for i in range(ends.size):
         drive = c[B] * (now if fresh[i] == 1 else before)
         z, mode, _ = _advance(c, on, p, lawful, t + start, z, mode, drive, tau, a_emf, ends[i] - start, h_max, corner)

@@ -22,7 +22,8 @@ from numba import njit, types
 
 from ers_mj.plants.compiled import compiled_cache, inlined
 from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, READ, READ_BOOL, ROWS, LAWS, TAU, THETA_0, VECTOR,
-                                  _derivative, _extra, _maps, _remember)
+                                  _derivative, _extra, _maps)
+from ers_mj.plants.laws import remember
 
 NUDGE = 1e-6  # of the motion's largest angle, speed and drive: step of a law's slopes
 MOST = 10.0  # times the motion's extent and largest speed by which a unit of change may move it: beyond, stick and slip only fork otherwise
@@ -64,7 +65,7 @@ def _prepare(t, load, path, c, on, p, maps, out):
             size[i] = max(size[i], abs(path[k, i]))
     for k in range(t.size):
         w = path[k, 1]
-        _remember(on, p, path[k, 0], w, path[k, 2], h)
+        remember(on, p, path[k, 0], w, path[k, 2], h)
         if w == 0.0:
             out[k, 0] = out[k, 1] = out[k, 2] = 0.0
             continue
@@ -103,8 +104,8 @@ def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p,
         if k == t.size - 1:
             break
         theta, w, j = path[k, 0], path[k, 1], path[k, 2]
-        _remember(on, p, theta, w, j, h)
-        _remember(on_2, p_2, theta, w, j, h)
+        remember(on, p, theta, w, j, h)
+        remember(on_2, p_2, theta, w, j, h)
         theta_1, w_1, j_1 = path[k + 1, 0], path[k + 1, 1], path[k + 1, 2]
         side = 0.0 if c[C_1] <= 0 else (1.0 if theta > c[THETA_0] else (-1.0 if theta < c[THETA_0] else 0.0))
         side_1 = 0.0 if c[C_1] <= 0 else (1.0 if theta_1 > c[THETA_0] else (-1.0 if theta_1 < c[THETA_0] else 0.0))

@@ -1,0 +1,141 @@
+"""The laws of the effects as the compiled integrator calls them: torques, frictions, inertias and memories, those that are on and no others."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ers_mj.effects import EFFECTS
+from ers_mj.plants.compiled import inlined
+
+MEMORY = 4  # the last constant of a law, which may be a memory
+N_PARAMETERS = max(MEMORY + 1, max(len(effect.parameters) for effect in EFFECTS))
+
+
+def _chain_torque(laws):
+    """One compiled function that evaluates the torque of the effect in one row."""
+    if not laws:
+        @njit(nogil=True, inline="always")
+        def pick(k, p, theta, w, j, t):
+            return 0.0
+        return pick
+    (row, law), rest = laws[0], _chain_torque(laws[1:])
+
+    @njit(nogil=True, inline="always")
+    def pick(k, p, theta, w, j, t):
+        if k == row:
+            a = law(p, theta, w, j, t)
+        else:
+            a = rest(k, p, theta, w, j, t)
+        return a
+    return pick
+
+
+def _chain_friction(laws):
+    """One compiled function that passes the friction level through the effect in one row."""
+    if not laws:
+        @njit(nogil=True, inline="always")
+        def pick(k, p, level, theta, w, j, direction):
+            return level
+        return pick
+    (row, law), rest = laws[0], _chain_friction(laws[1:])
+
+    @njit(nogil=True, inline="always")
+    def pick(k, p, level, theta, w, j, direction):
+        if k == row:
+            a = law(p, level, theta, w, j, direction)
+        else:
+            a = rest(k, p, level, theta, w, j, direction)
+        return a
+    return pick
+
+
+def _chain_inertia(laws):
+    """One compiled function that evaluates the inertia of the effect in one row."""
+    if not laws:
+        @njit(nogil=True, inline="always")
+        def pick(k, p, theta):
+            return 1.0, 0.0
+        return pick
+    (row, law), rest = laws[0], _chain_inertia(laws[1:])
+
+    @njit(nogil=True, inline="always")
+    def pick(k, p, theta):
+        if k == row:
+            a = law(p, theta)
+        else:
+            a = rest(k, p, theta)
+        return a
+    return pick
+
+
+def _chain_memory(laws):
+    """One compiled function that evaluates the memory of the effect in one row."""
+    if not laws:
+        @njit(nogil=True, inline="always")
+        def pick(k, p, theta, w, j, h):
+            return 0.0
+        return pick
+    (row, law), rest = laws[0], _chain_memory(laws[1:])
+
+    @njit(nogil=True, inline="always")
+    def pick(k, p, theta, w, j, h):
+        if k == row:
+            a = law(p, theta, w, j, h)
+        else:
+            a = rest(k, p, theta, w, j, h)
+        return a
+    return pick
+
+
+_torque_of = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
+_friction_of = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
+_memory_of = _chain_memory([(row, e.memory) for row, e in enumerate(EFFECTS) if e.memory])
+_inertia_of = _chain_inertia([(row, e.inertia) for row, e in enumerate(EFFECTS) if e.inertia])
+
+
+@inlined
+def total_torque(on, p, theta, w, j, t):
+    """Sum of the torques of the effects that are on."""
+    a = 0.0
+    for i in range(on[0, 0]):
+        k = on[0, i + 1]
+        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, t)
+    return a
+
+
+@inlined
+def friction_level(on, p, level, theta, w, j, direction):
+    """The friction level after every effect that is on."""
+    for i in range(on[1, 0]):
+        k = on[1, i + 1]
+        level = _friction_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), level, theta, w, j, direction)
+    return level
+
+
+@inlined
+def moved(on, p, theta, w, a):
+    """The acceleration that is left of ``a``, per total inertia, where effects change the inertia along the travel."""
+    for i in range(on[2, 0]):
+        k = on[2, i + 1]
+        inertia, half_slope = _inertia_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta)
+        a = (a - half_slope * w * w) / inertia
+    return a
+
+
+@inlined
+def remember(on, p, theta, w, j, h):
+    """Bring the memories of effects, their last constants, on by a sample of length h."""
+    for i in range(on[3, 0]):
+        k = on[3, i + 1]
+        p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, h)
+
+
+def rows_of(names):
+    """Effects as the laws are called: (4, 1 + effects) their number and rows, of torques, of frictions, of inertias and of memories."""
+    on = np.zeros((4, 1 + len(EFFECTS)), np.int64)
+    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS], [e.inertia for e in EFFECTS],
+                                 [e.memory for e in EFFECTS])):
+        rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and laws[row]]
+        on[kind, 0], on[kind, 1:1 + len(rows)] = len(rows), rows
+    return on
