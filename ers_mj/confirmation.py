@@ -12,6 +12,7 @@ from ers_mj.baseline import Start
 from ers_mj.effects import BY_NAME
 from ers_mj.evaluation import Fold, Score, folds, halves, paired_p, pooled, recalibrated, refits, scored
 from ers_mj.identification import Fit, fit, polished, residuals_in, score
+from ers_mj.intervals import half_widths
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.selection import Selection
 from ers_mj.traces import Blocks, Trace
@@ -55,12 +56,22 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
                 p[name] = min(p[name], _p_within(model, less, start, selection.tau, jobs))
         failed = [n for n in model.names if (p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse)
                   and not _halves(pooled(after), without[n], parts)
-                  and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))]
+                  and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))
+                  or _may_be_none(n, model, start.traces, selection.tau)]
         if not failed:
             return selection, Confirmed(_scores(base_models, parts), after, without, p, after_models, base_models, parts, sentence)
         worst = max(failed, key=lambda n: p[n])
         reduced = _without(worst, model, start, selection.tau)
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
+
+
+def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:
+    """Whether the interval of what acts once holds zero: a knock that few samples bear, as at the edge of a recording, bends to whatever they leave."""
+    if not BY_NAME[name].once:
+        return False
+    layout, size = model.layout(), BY_NAME[name].parameters[0].name
+    z, widths = model.vector(layout), half_widths(model, traces, (), tau)
+    return all(abs(z[k]) <= widths[k] for k, f in enumerate(layout) if f.owner == name and f.name == size)
 
 
 def _p_within(model: Model, less: Model, start: Start, tau: float, jobs: int) -> float:

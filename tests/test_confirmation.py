@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ers_mj.baseline import baseline
-from ers_mj.confirmation import _p_within
+from ers_mj.confirmation import _may_be_none, _p_within
 from ers_mj.datasheet import Datasheet
 from ers_mj.evaluation import folds, halves
 from ers_mj.identification import fit
@@ -93,3 +93,13 @@ def test_what_is_too_small_to_be_found_widens_the_intervals(plain):
     noise, unseen = half_widths(model, faint.traces, (), 1.0), unseen_widths(model, faint.traces, 1.0)
     off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))
     assert np.all(unseen > 0) and np.all(off < 2.0 * np.hypot(noise, unseen))
+
+
+def test_a_knock_whose_torque_may_as_well_be_none_is_taken_out():
+    knock = np.array([40.0, 1.0, 0.2, 1.0])
+    quiet = [trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))]
+    knocked = [quiet[0], trace("steps", [("load_disturbance", knock)], seed=1), quiet[2]]
+    for traces, none in ((quiet, True), (knocked, False)):
+        start = started(traces)
+        found = fit(start.fit.model.with_effect("load_disturbance", knock), start.traces)
+        assert _may_be_none("load_disturbance", found.model, start.traces, 1.0) == none
