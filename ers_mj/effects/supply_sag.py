@@ -21,7 +21,7 @@ class SupplySag(Drive):
         Parameter("bridge", "ratio", "source resistance over the motor's at the largest input, of a bridge that draws its duty's share of the current", absent=np.inf),
         Parameter("whole", "ratio", "the same of a source that carries the whole current of the motor", absent=np.inf),
         Parameter("T_c", "time", "time constant of the supply's capacitor", lower=0.005, upper=10.0, absent=np.inf),
-        Parameter("u_most", "input", "largest input", fitted=False, absent=1.0),
+        Parameter("u_most", "input", "largest input, 24 where it is not told", fitted=False, absent=24.0),
     )
     sized, tries = 2, 4
 

@@ -22,7 +22,7 @@ class ThermalDrift(Drive):
     parameters = (
         Parameter("rise", "ratio", "relative rise of the resistance, once warm at a standstill under the largest input", positive=False, lower=-3.0, upper=30.0),
         Parameter("T_w", "time", "time constant of the warm-up", upper=1e4),
-        Parameter("u", "input", "largest input", fitted=False, absent=1.0),
+        Parameter("u", "input", "largest input, 24 where it is not told", fitted=False, absent=24.0),
     )
     sized, tries = 1, 2
 
