@@ -6,6 +6,7 @@ import math
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -26,13 +27,14 @@ from ers_mj.localisation import Place, gather, over_frequency, places, residual_
 from ers_mj.multibody import Rig, run_in_mujoco
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.recording import Recording
+from ers_mj.remainder import left_by_sensor
 from ers_mj.selection import Candidate, Selection
 from ers_mj.simulation import PER_INERTIA, unit_of
 from ers_mj.traces import Blocks, Trace
 
 CONSISTENT = 0.05  # cost per block up to which a model explains the data within its noise (an error of 0.3 sigma RMS)
-SIGNIFICANT = 0.15  # cost per block from which the baseline is said to miss something
-REST, REST_SHARE, PLAIN = 0.05, 0.3, 0.5  # the same beside named effects: cost per block and its share of what the baseline leaves, or plain
+SIGNIFICANT = 0.095  # mean of ln(1 + power) over blocks from which a mismatch is left (0.32 noise levels; see remainder.py)
+REST = 0.3  # share of what the baseline leaves that another form of the right law may leave in the output
 TIED = 0.02  # weight from which a rival is told as an alternative
 LEAST_FACTOR, LEAST_OFFSET = 0.02, 0.01  # of a gain or friction level, and of half the travel: a smaller drift is not worth a line
 VISIBLE = 1.5  # noise levels of free-run error from which a recording shows a mismatch
@@ -76,6 +78,11 @@ class Case:
     @property
     def input_unit(self) -> str:
         return {"pct": "%"}.get(self.recordings[0].input_unit, self.recordings[0].input_unit)
+
+    @cached_property
+    def left(self) -> dict[str, float]:
+        """What the answer leaves beyond the noise, by sensor."""
+        return left_by_sensor(self.model, self.start.traces)
 
     @property
     def inertia(self) -> float | None:
@@ -149,22 +156,21 @@ class Case:
         return float(np.mean(shares)) if shares else 0.0
 
     def _more_is_missing(self) -> bool:
-        """Whether what the answer leaves is more than another form of the same law would: the mimic of an unknown effect takes a part only."""
-        left = self._left()
-        if not self.model.names:
-            return left > SIGNIFICANT
-        return left > PLAIN or left > max(REST, REST_SHARE * float(np.mean(score(self.start.fit.misfit, 1.0))))
+        """Whether what the answer leaves is more than another form of the same law would: the mimic of an unknown effect takes a part only.
 
-    def _left(self) -> float:
-        """Cost per block of the final model, at the noise."""
-        return float(np.mean(score(self.selection.chosen.misfit, 1.0)))
+        A mimic in the output is seldom one in the current, which no form of the right law leaves amiss.
+        """
+        if not self.model.names:
+            return max(self.left.values()) > SIGNIFICANT
+        least = {"output": max(SIGNIFICANT, REST * left_by_sensor(self.start.fit.model, self.start.traces)["output"])}
+        return any(left > least.get(kind, SIGNIFICANT) for kind, left in self.left.items())
 
     def _verdict(self, explained: float) -> str:
         if self.sensors and not self.model.names:
             return "missing_physics"
         if self.model.names:
             return "missing_physics" if explained >= HALF else "unexplained"
-        if float(np.mean(score(self.start.fit.misfit, 1.0))) > SIGNIFICANT or self._astray():
+        if self._more_is_missing() or self._astray():
             return "unexplained"
         return "consistent" if self._datasheet_explains() else "parameters_only"
 
@@ -252,7 +258,7 @@ class Case:
         """The answer and what the recordings do not exclude in its place, with probabilities: of the effect with the least certain name."""
         chosen = self.selection.chosen
         best = (" and ".join(self.model.names) or "baseline", chosen), []
-        for name in self.model.names or [ranked[0].name for ranked in self.selection.rounds[-1:] if ranked and self._left() > SIGNIFICANT]:
+        for name in self.model.names or [ranked[0].name for ranked in self.selection.rounds[-1:] if ranked and self._more_is_missing()]:
             ranked, weights = self._found(name)
             rivals = [(c.name, c.fit, weights[c.name]) for c in ranked[1:] if weights[c.name] > TIED]
             if sum(r[2] for r in rivals) > sum(r[2] for r in best[1]):
@@ -354,7 +360,7 @@ class Case:
     def _remainder(self, verdict: str, explained: float) -> dict:
         significant = verdict == "unexplained" or self._more_is_missing()
         words = "nothing beyond the noise is left" if not significant else "a mismatch is left that nothing named accounts for"
-        return {"explained_share": explained, "significant": significant, "cost_per_block": self._left(),
+        return {"explained_share": explained, "significant": significant, "left_sigma": {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in self.left.items()},
                 "sentence": f"{explained:.0%} of the squared held-out error above the noise is explained; {words}."}
 
     @staticmethod

@@ -10,6 +10,7 @@ FEWEST_REVISITED = 0.05  # share of the distinct values that a converter shows t
 COARSE = 200  # levels of travel below which even a decimal grid acts as a converter
 JUMP, CALM_CHANGES, LONGEST_EXCURSION = 8.0, 6, 50  # noise levels of a jump; changes on either side that are usual; samples
 ON_LATTICE = 0.18  # of a step by which a gap may miss a multiple of it: a coarse converter behind a fine one of a seventh of its step misses by that
+ONE_STEP = 0.3  # of a step by which gaps of one step, seen through a finer converter, may differ
 LEAP = 3.0, 6.0, 1.5  # grid steps, noise levels and usual changes that the catching up after a held span must exceed at least
 LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
 LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
@@ -124,7 +125,8 @@ def _on_lattice(gaps: np.ndarray, step: float) -> np.ndarray:
 
 
 def _refined(gaps: np.ndarray, step: float) -> float:
-    """The step by least squares over the gaps that are multiples of it."""
+    """The step by least squares over the gaps that are multiples of it, begun with the mean of those that may be one step."""
+    step = float(np.mean(gaps[np.abs(gaps - step) < ONE_STEP * step]))
     gaps = gaps[_on_lattice(gaps, step)]
     multiples = np.rint(gaps / step)
     return float(gaps @ multiples / (multiples @ multiples))

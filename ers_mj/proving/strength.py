@@ -14,8 +14,8 @@ LEAST, MOST = 0.5, 50.0  # [sigma] visibility after refit, drawn log-uniform
 FAINT, FAINTEST, BARELY = 0.2, 0.02, 0.3  # [sigma] clutter: drawn between the first two, left out above the third
 NEAR = 0.15  # of the logarithm of the target
 TRIES = 7
-STRUCTURAL = ("backlash", "shaft_compliance", "variable_ratio", "sensor_dropout", "inductance", "end_stop")
-"""What is no clutter: it changes the mechanism, or shows below the noise."""
+STRUCTURAL = ("backlash", "shaft_compliance", "variable_ratio", "sensor_dropout", "inductance", "end_stop", "presliding")
+"""What is no clutter: it changes the mechanism, shows below the noise, or is, where it is faint, too stiff for the step (bristles)."""
 
 
 def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) -> dict:

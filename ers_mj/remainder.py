@@ -1,0 +1,61 @@
+"""How much of a mismatch a model leaves, told from the noise by memory: noise forgets from sample to sample, a mismatch does not.
+
+    what a run leaves, e(t) = noise + mismatch -> products e(t) e(t + k h), k = 1, 2, 3 -> their mean in each block is the mismatch's power there
+
+The size of the noise need not be known for that, so that a mismatch of a third of the noise shows. What a converter makes of a slow motion has a
+memory, too: that of the simulated motion read with the same step is taken off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ers_mj.identification import residuals_in
+from ers_mj.model import OBSERVER_RATE, Model
+from ers_mj.symptoms import converter_step
+from ers_mj.traces import Trace
+
+LAGS = (1, 2, 3)  # samples
+FEWEST_PAIRS = 12  # in a block that is judged
+LEAST = -0.9  # power of a block, in those of the noise, that chance does not go below
+
+
+def left_by_sensor(model: Model, traces: Sequence[Trace]) -> dict[str, float]:
+    """What the model's observer leaves beyond the noise, by sensor ("output", and the kinds of the further channels).
+
+    The mean over blocks of ln(1 + power), the power in that of the noise: a few blocks in which stick and slip fork do not decide it.
+    """
+    logs: dict[str, list[np.ndarray]] = {}
+    for record, trace in enumerate(traces):
+        parts = residuals_in(model, trace, record, OBSERVER_RATE).reshape(-1, trace.t.size)
+        sensors = [("output", trace.y, trace.sigma, trace.quantum, trace.valid)]
+        sensors += [(c.kind, c.values, c.sigma, converter_step(c.values), np.isfinite(c.values)) for c in trace.channels]
+        for e, (kind, values, sigma, step, known) in zip(parts, sensors, strict=True):
+            power = remembered(e, known, trace.block)
+            if step > 0:
+                power = power - _converted(values - e * sigma, values, sigma, step, known, trace.block)
+            logs.setdefault(kind, []).append(np.log1p(np.maximum(power, LEAST)))
+    return {kind: float(np.nanmean(np.concatenate(parts))) for kind, parts in logs.items()}
+
+
+def remembered(e: np.ndarray, known: np.ndarray, block: np.ndarray) -> np.ndarray:
+    """Power (B,) of what e (N,) keeps from sample to sample in each block; NaN in a block of too few known samples."""
+    size = int(block[-1]) + 1
+    total, pairs = np.zeros(size), np.zeros(size)
+    for lag in LAGS:
+        both = known[:-lag] & known[lag:] & (block[:-lag] == block[lag:])
+        where = block[:-lag][both]
+        total += np.bincount(where, (e[:-lag] * e[lag:])[both], size)
+        pairs += np.bincount(where, minlength=size)
+    return np.where(pairs >= FEWEST_PAIRS * len(LAGS), total / np.maximum(pairs, 1.0), np.nan)
+
+
+def _converted(simulated: np.ndarray, measured: np.ndarray, sigma: float, step: float, known: np.ndarray, block: np.ndarray) -> np.ndarray:
+    """The same power (B,), in the noise's, of what a converter makes of the simulated output: noise ahead of it takes its sawtooth's waves away."""
+    zero = measured[np.argmax(known)]
+    sawtooth = zero + step * np.rint((simulated - zero) / step) - simulated
+    noise = max(sigma**2 - step**2 / 12.0, 0.0)
+    return remembered(sawtooth / sigma, known, block) * math.exp(-4.0 * math.pi**2 * noise / step**2)

@@ -1,0 +1,41 @@
+"""What a model leaves beyond the noise is told by its memory, whatever the noise's size and whatever the converter does."""
+
+import numpy as np
+import pytest
+from test_confirmation import NOISE, started, trace
+
+from ers_mj.remainder import left_by_sensor, remembered
+from ers_mj.symptoms import converter_step
+
+T = np.arange(0.0, 8.0, 1e-3)
+BLOCK = (T / 0.25).astype(int)
+FAINT = 0.4  # noise levels
+
+
+@pytest.mark.parametrize("noise", [0.7, 1.0, 1.4])
+def test_the_power_of_a_faint_wave_is_read_whatever_the_noise(noise):
+    rng, known = np.random.default_rng(3), np.ones(T.size, bool)
+    wave, white = FAINT * np.sqrt(2.0) * np.sin(2 * np.pi * 4.0 * T), noise * rng.standard_normal(T.size)
+    known[100:180] = False  # what no sensor saw does not count, however large
+    some = np.where(known, wave + white, 1e3)
+    assert abs(np.nanmean(remembered(white, known, BLOCK))) < 0.02
+    assert np.nanmean(remembered(some, known, BLOCK)) == pytest.approx(FAINT**2, abs=0.03)
+    assert np.isnan(remembered(some[:10], known[:10], BLOCK[:10])).all()
+
+
+@pytest.mark.parametrize("times", [0.0, 1.0, 40.0])
+def test_a_converter_leaves_no_mismatch(times):
+    """The model that made the recordings, read as it is or by a converter of one or forty noise levels."""
+    def sensor(y):
+        return np.round(y / (times * NOISE)) * times * NOISE if times else y
+
+    start = started([trace(name, sensor=sensor, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
+    assert times < 1.0 or converter_step(start.traces[0].y) == pytest.approx(times * NOISE, rel=0.1)
+    assert abs(left_by_sensor(start.fit.model, start.traces)["output"]) < 0.06
+
+
+def test_a_mismatch_below_the_noise_is_seen():
+    traces = [trace(name, sensor=lambda y: y + NOISE * np.sin(600.0 * y), seed=k)
+              for k, name in enumerate(("multisine", "steps", "chirp"))]
+    start = started(traces)
+    assert left_by_sensor(start.fit.model, start.traces)["output"] > 0.1
