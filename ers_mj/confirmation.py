@@ -22,6 +22,7 @@ ALONE = 0.6  # share of an effect's gain in one recording, from which it is judg
 CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
 WORSE = 1.3  # times the raw error that an effect which only recalibration confirms may make of it
 HALF = 0.5  # share of the squared error that must go
+EDGE = 0.1  # [s] at either end of a recording, in which few samples bear a knock
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,15 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
 
 
 def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:
-    """Whether the interval of what acts once holds zero: a knock that few samples bear, as at the edge of a recording, bends to whatever they leave."""
+    """Whether what acts once acts at the edge of a recording, and the interval of its size holds zero: it bends to whatever few samples leave.
+
+    Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose.
+    """
     if not BY_NAME[name].once:
+        return False
+    columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
+    begun, width = (model.local[name][:, columns.index(column)] for column in ("t_0", "width"))
+    if not any(b < t.t[0] + EDGE or b + w > t.t[-1] - EDGE for b, w, t in zip(begun, width, traces, strict=True)):
         return False
     layout, size = model.layout(), BY_NAME[name].parameters[0].name
     z, widths = model.vector(layout), half_widths(model, traces, (), tau)
