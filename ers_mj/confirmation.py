@@ -18,9 +18,10 @@ from ers_mj.selection import Selection
 from ers_mj.traces import Blocks, Trace
 
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
+SURE_P = 1e-3  # up to which it is beyond doubt
 ALONE = 0.6  # share of an effect's gain in one recording, from which it is judged within that one as well
 CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
-WORSE = 1.3  # times the raw error that an effect which only recalibration confirms may make of it
+WORSE = 1.3  # times the raw error that an effect which only recalibration confirms, or blocks beyond doubt, may make of it
 HALF = 0.5  # share of the squared error that must go
 EDGE = 0.1  # [s] at either end of a recording, in which few samples bear a knock
 
@@ -55,7 +56,7 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
             p[name] = paired_p(pooled(after).misfit, without[name].misfit, BY_NAME[name].once)
             if p[name] > LARGEST_P and not held and len(start.traces) > 1:
                 p[name] = min(p[name], _p_within(model, less, start, selection.tau, jobs))
-        failed = [n for n in model.names if (p[n] > LARGEST_P or without[n].rmse <= pooled(after).rmse)
+        failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(pooled(after), without[n], p[n]))
                   and not _halves(pooled(after), without[n], parts)
                   and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))
                   or _may_be_none(n, model, start.traces, selection.tau)]
@@ -64,6 +65,11 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         worst = max(failed, key=lambda n: p[n])
         reduced = _without(worst, model, start, selection.tau)
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
+
+
+def _no_closer(after: Score, without: Score, p: float) -> bool:
+    """Whether an effect brings the free run no closer; where its blocks leave no doubt, an error that forks of stick and slip make somewhat larger counts as closer."""
+    return after.rmse >= (WORSE if p < SURE_P else 1.0) * without.rmse
 
 
 def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:

@@ -21,12 +21,12 @@ from ers_mj.model import STATES
 from ers_mj.screening import Begin, screen
 from ers_mj.traces import Blocks, Trace
 
-LEAST_GAIN = 5.0  # decrease of C that an effect must buy
+LEAST_GAIN = 3.0  # decrease of C that an effect must buy: one servo in forty without missing physics offers as much (evaluation.NULL_GAIN)
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 LATER_Z = 2.5  # and beside an effect, whose law is hardly ever exactly the one that acts
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
-ONCE = 8.0  # of C that an effect which acts once must buy
+ONCE = 6.0  # of C that an effect which acts once must buy
 PEAK = 30.0  # or the factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
 QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)

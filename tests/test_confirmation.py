@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from ers_mj.baseline import baseline
-from ers_mj.confirmation import _may_be_none, _p_within
+from ers_mj.confirmation import _may_be_none, _no_closer, _p_within
 from ers_mj.datasheet import Datasheet
-from ers_mj.evaluation import folds, halves
+from ers_mj.evaluation import Score, folds, halves
 from ers_mj.identification import fit
 from ers_mj.intervals import half_widths, unseen_widths
 from ers_mj.plants.inputs import INPUTS
@@ -104,3 +104,9 @@ def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out():
         start = started(traces)
         found = fit(start.fit.model.with_effect("load_disturbance", knock), start.traces)
         assert _may_be_none("load_disturbance", found.model, start.traces, 1.0) == none
+
+
+def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks():
+    score = lambda rmse: Score(rmse**2, 1, np.ones(1))  # noqa: E731
+    assert _no_closer(score(1.2), score(1.0), 0.04) and not _no_closer(score(1.2), score(1.0), 1e-6)
+    assert _no_closer(score(1.4), score(1.0), 1e-6) and not _no_closer(score(0.9), score(1.0), 0.04)
