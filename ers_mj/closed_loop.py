@@ -69,7 +69,7 @@ class Sensor:
     def __init__(self, effects: Sequence[tuple[str, np.ndarray]], t: np.ndarray, noise: float = 0.0, seed: int = 0):
         touching = [(BY_NAME[name], p) for name, p in effects if BY_NAME[name].subsystem == "sensor"]
         self._before = [(effect, p) for effect, p in touching if effect.name not in AFTER_NOISE and effect.name != "sensor_lag"]
-        self._lags = [p[0] for effect, p in touching if effect.name == "sensor_lag"]
+        self._lags = [p for effect, p in touching if effect.name == "sensor_lag"]
         self._after = [(effect, p) for effect, p in touching if effect.name == "sensor_quantisation"]
         self._wires = [(effect, p) for effect, p in touching if effect.name == "sensor_dropout"]
         self._noise = noise * np.random.default_rng(seed).standard_normal(t.size)
@@ -84,8 +84,8 @@ class Sensor:
         """The reading [rad] of the angle at the next sample."""
         k, y = self._k, theta
         self._truth[k] = theta
-        for T in self._lags:
-            y = self._lagged(T, k)
+        for p in self._lags:
+            y = self._lagged(p, k)
         at = self._t[k : k + 1]
         for effect, p in self._before:
             y = float(effect.measure(p, at, np.array([y]))[0])
@@ -96,12 +96,12 @@ class Sensor:
         self._k += 1
         return float(self._read[self._held[k]])
 
-    def _lagged(self, T: float, k: int) -> float:
-        h = float(self._t[1] - self._t[0])
-        begin = max(0, k - 2 - int(MEMORY * T / h))
+    def _lagged(self, p: np.ndarray, k: int) -> float:
+        h, late = float(self._t[1] - self._t[0]), MEMORY * p[0] + (p[1] if np.isfinite(p[1]) else 0.0)
+        begin = max(0, k - 2 - int(late / h))
         if k == 0:
             return float(self._truth[0])
-        return float(BY_NAME["sensor_lag"].measure(np.array([T]), self._t[begin : k + 1], self._truth[begin : k + 1])[-1])
+        return float(BY_NAME["sensor_lag"].measure(p, self._t[begin : k + 1], self._truth[begin : k + 1])[-1])
 
 
 def close(controller: Controller, plant: Sampled, sensor: Sensor, reference: Reference, terminal=None) -> Run:

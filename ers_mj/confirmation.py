@@ -15,7 +15,7 @@ from ers_mj.identification import Fit, fit, polished, residuals_in, score
 from ers_mj.intervals import half_widths
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.selection import Selection
-from ers_mj.traces import Blocks, Trace
+from ers_mj.traces import START, Blocks, Trace
 
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
 SURE_P = 1e-3  # up to which it is beyond doubt
@@ -75,13 +75,17 @@ def _no_closer(after: Score, without: Score, p: float) -> bool:
 def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:
     """Whether what acts once acts at the edge of a recording, and the interval of its size holds zero: it bends to whatever few samples leave.
 
-    Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose.
+    Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose. What is over while the start is
+    read, or begins in the last moment, is none.
     """
     if not BY_NAME[name].once:
         return False
     columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
     begun, width = (model.local[name][:, columns.index(column)] for column in ("t_0", "width"))
-    if not any(b < t.t[0] + EDGE or b + w > t.t[-1] - EDGE for b, w, t in zip(begun, width, traces, strict=True)):
+    knocks = [(b - t.t[0], t.t[-1] - b - w, t.t[-1] - t.t[0]) for b, w, t in zip(begun, width, traces, strict=True) if np.isfinite(b)]
+    if any(total - after < START or total - before < START for before, after, total in knocks):
+        return True
+    if not any(before < EDGE or after < EDGE for before, after, _ in knocks):
         return False
     layout, size = model.layout(), BY_NAME[name].parameters[0].name
     z, widths = model.vector(layout), half_widths(model, traces, (), tau)

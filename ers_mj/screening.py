@@ -19,6 +19,7 @@ PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from wh
 LEAST_PROMISE = 2.5  # of C that the secant of a candidate must promise where a model is quiet
 LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the screening may scale it
 HOTTEST, KNOCKS, NEARER = 3, (0.08, 0.25), 60  # blocks in which a knock is looked for, the lengths [s] from which its fit is begun, and simulations of it
+IDLE, HALVINGS = 1e-3, 6  # of C that a push which moves nothing changes; of the way from it to the next that throws the rudder
 
 
 @dataclass(frozen=True)
@@ -154,11 +155,32 @@ def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.nd
         without, beside = (float(np.sum(score(Blocks.of([traces[k]]).misfit(some), tau))) for some in left)
         return without - beside if np.isfinite(beside) else -math.inf
 
+    tried: dict[tuple, list[tuple[float, np.ndarray]]] = {}
     for start in starts:
-        kind = int(start[column]), start[0] > 0, start[2]
-        best[kind] = max(best.get(kind, (0.0, start)), (gain(start), start), key=lambda found: found[0])
+        tried.setdefault((start[0] > 0, *start[1:]), []).append((gain(start), start))
+    for pushes in tried.values():
+        for won, start in (*pushes, *_between(gain, pushes)):
+            kind = int(start[column]), start[0] > 0, start[2]
+            best[kind] = max(best.get(kind, (0.0, start)), (won, start), key=lambda found: found[0])
     nearer = [_nearer(gain, start) for won, start in sorted(best.values(), key=lambda found: -found[0])[:effect.tries] if won > 0]
     return [(2.0 * won / float(target @ target), place.with_effect(effect.name, start)) for won, start in nearer]
+
+
+def _between(gain: Callable[[np.ndarray], float], pushes: Sequence[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:
+    """Pushes alike but for their size, between the largest that moves nothing and the next, which throws the rudder too far: what a rudder at rest was
+    moved by is often within a few per cent of what moves it at all.
+    """
+    ordered = sorted(pushes, key=lambda push: abs(push[1][0]))
+    k = next((k for k, (won, _) in enumerate(ordered) if abs(won) > IDLE), 0)
+    if k == 0 or ordered[k][0] > 0.0:
+        return []
+    idle, thrown, found = ordered[k - 1][1], ordered[k][1], []
+    for _ in range(HALVINGS):
+        middle = np.append(np.sign(idle[0]) * math.sqrt(idle[0] * thrown[0]), idle[1:])
+        won = gain(middle)
+        found.append((won, middle))
+        idle, thrown = (middle, thrown) if abs(won) <= IDLE else (idle, middle)
+    return found
 
 
 def _nearer(gain: Callable[[np.ndarray], float], start: np.ndarray) -> tuple[float, np.ndarray]:

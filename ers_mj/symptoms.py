@@ -135,6 +135,14 @@ def _refined(gaps: np.ndarray, step: float) -> float:
 # -- samples that are not the signal's -----------------------------------------------------------------------
 
 
+def spikes(y: np.ndarray, sigma: float) -> list[slice]:
+    """Excursions, and single samples that jump: no motion goes and comes back within two, however many there are (at 5 a second and 200 Hz 4 % of the
+    changes are theirs)."""
+    found = excursions(y, sigma)
+    alone = excursions(y, sigma, usual=0.9, longest=1)
+    return found + [s for s in alone if not any(s.start < other.stop and other.start < s.stop for other in found)]
+
+
 def excursions(y: np.ndarray, sigma: float, times: float = JUMP, usual: float = 0.98,
                longest: int = LONGEST_EXCURSION) -> list[slice]:
     """Spans of at most ``longest`` samples in which y (N,) jumps away from its course and back again.

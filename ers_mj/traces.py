@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ers_mj.recording import Recording
-from ers_mj.symptoms import at_extreme, converter_step, excursions, frozen_spans, leapt_spans
+from ers_mj.symptoms import at_extreme, converter_step, frozen_spans, leapt_spans, spikes
 
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
@@ -98,7 +98,7 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
     stuck = [s for s in frozen_spans(y, recording.quantum) if not at_extreme(y, s)]
     stuck += [s for s in leapt_spans(y, recording.quantum, sigma) if not any(s.start < other.stop and other.start < s.stop for other in stuck)]
-    lost = (*excursions(np.where(recording.valid, y, np.nan), sigma), *stuck)
+    lost = (*spikes(np.where(recording.valid, y, np.nan), sigma), *stuck)
     trace = make_trace(recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum)
     trace = trace.without(lost)
     return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid))

@@ -49,7 +49,7 @@ def explained(traces, *starts):
 
 @pytest.fixture(scope="module")
 def late():
-    return explained(traces_of([("sensor_lag", np.array([1.5e-3]))]), ("input_delay", 1.5e-3), ("sensor_lag", 1.5e-3))
+    return explained(traces_of([("sensor_lag", np.array([1.5e-3, np.inf]))]), ("input_delay", 1.5e-3), ("sensor_lag", 1.5e-3, np.inf))
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from ers_mj.datasheet import read_datasheet, write_model
 from ers_mj.effects.base import Coefficients
 from ers_mj.frequency.cycle import balanced, lasting, predicted, simulated
 from ers_mj.frequency.describing import contact, controller_response, coulomb, leaning, preload, rubbing, saturation
-from ers_mj.frequency.linear import linearised
+from ers_mj.frequency.linear import at, linearised
 from ers_mj.frequency.loop import ask, close_loop, judged
 from ers_mj.simulation import build_plant, parse_effect
 from ers_mj.trial import sampled
@@ -49,6 +49,10 @@ def test_the_linear_plant_moves_as_the_reduced_model(effects, options):
 def test_a_sensors_lag_is_in_it():
     plain, late = (linearised(build_plant(FREE, effects=effects), 1000.0, HOME) for effects in ((), [("sensor_lag", {"T": 0.004})]))
     np.testing.assert_allclose(late.response(F_HZ) / plain.response(F_HZ), 1 / (1 + 2j * np.pi * F_HZ * 0.004), rtol=0.04)  # the reading takes the angle as straight between samples
+    later = linearised(build_plant(FREE, effects=[("sensor_lag", {"T": 0.004, "T_d": 0.0033})]), 1000.0, HOME)
+    np.testing.assert_allclose(later.response(F_HZ) / late.response(F_HZ), np.exp(-2j * np.pi * F_HZ * 0.0033), rtol=0.05)
+    load = [at(x.load, F_HZ) for x in (late, later)]
+    np.testing.assert_allclose(load[1] / load[0], np.exp(-2j * np.pi * F_HZ * 0.0033), rtol=0.05)
 
 
 @pytest.mark.parametrize(("effects", "options"), [([], {}), ([], {"inductance": True}), ([], {"gap": math.radians(0.5)}),

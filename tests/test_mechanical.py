@@ -116,7 +116,7 @@ def test_many_at_once_are_the_same_as_one_by_one():
 
 
 def test_the_exported_model_is_the_plant():
-    effects = [("voltage_saturation", np.array([4.5])), ("bias_torque", np.array([8.0])), ("gravity_imbalance", np.array([15.0, 5.0])),
+    effects = [("voltage_saturation", np.array([4.5, np.inf])), ("bias_torque", np.array([8.0])), ("gravity_imbalance", np.array([15.0, 5.0])),
                ("input_delay", np.array([3e-3]))]
     u, plant = INPUTS["chirp"](T[:1000]), rudder(EQ_1, effects=effects, linkage="rod", gap=0.01)
     model = mujoco.MjModel.from_xml_string(plant.xml())

@@ -108,7 +108,7 @@ def test_a_loop_that_runs_away_is_given_up():
 def test_the_sensor_reads_as_a_recording_would():
     t = np.arange(400) / 1000.0
     theta = np.sin(20 * t)
-    for name, values in (("sensor_lag", {"T": 0.004}), ("sensor_quantisation", {"step": 0.01}), ("sensor_dropout", {"rate": 20.0, "duration": 0.01}),
+    for name, values in (("sensor_lag", {"T": 0.004}), ("sensor_lag", {"T": 0.002, "T_d": 0.0053}), ("sensor_quantisation", {"step": 0.01}), ("sensor_dropout", {"rate": 20.0, "duration": 0.01}),
                          ("sensor_nonlinearity", {"A": 0.02, "period": 0.3, "phase": 0.1})):
         (_, p), = kernel_effects([(name, values)])
         sensor = Sensor([(name, p)], t)

@@ -6,18 +6,30 @@ from ers_mj.effects.base import Parameter, Sensor, recursive
 
 
 class SensorLag(Sensor):
-    """T y' = theta - y, settled at the start: a filter in the sensor or its electronics. Theta is taken as straight between samples."""
+    """T y' = theta(t - T_d) - y, settled at the start: a filter in the sensor or its electronics, and a bus that brings its reading late.
+
+    Theta is taken as straight between samples.
+    """
 
     name = "sensor_lag"
     sentence = "the sensor lags behind the output by a time constant of {T}"
     mjcf = "none: the reading is filtered after the simulation"
-    parameters = (Parameter("T", "time", "time constant of the sensor"),)
+    parameters = (
+        Parameter("T", "time", "time constant of the sensor"),
+        Parameter("T_d", "time", "dead time of its reading", absent=np.inf),
+    )
     sized = 1
 
     def starts(self, scales):
-        return [np.array([2 * scales.sample_time])]
+        return [np.array([2 * scales.sample_time, np.inf])]
+
+    def grown(self, name, p, scales):
+        """From a plain lag: with a dead time for a part of it."""
+        return [np.array([(1.0 - part) * p[0], part * p[0]]) for part in (0.5, 0.95)] if name == self.name and not np.isfinite(p[1]) else []
 
     def measure(self, p, t, y):
+        if np.isfinite(p[1]):
+            y = np.interp(t - p[1], t, y)
         ratio = p[0] / float(np.median(np.diff(t)))
         if ratio < 1e-3:
             return y

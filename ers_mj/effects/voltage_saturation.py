@@ -4,22 +4,33 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter
 
+SOFT = 10.0  # sharpness from which a soft knee is begun
+
 
 class VoltageSaturation(Drive):
-    """The terminals see the command clipped at +-u_max."""
+    """The terminals see the command u clipped at +-u_max, or u / (1 + |u / u_max|^sharpness)^(1 / sharpness): a drive that gives in before."""
 
     name = "voltage_saturation"
     sentence = "the drive gives no more than {u_max}, whatever is commanded"
-    mjcf = "the ctrlrange of the motor"
-    parameters = (Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),)
-
+    mjcf = "the ctrlrange of the motor; a soft knee is put into the command before it reaches ctrl"
+    parameters = (
+        Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),
+        Parameter("sharpness", "ratio", "exponent of a soft knee; a plain clip where there is none", lower=2.0, upper=100.0, absent=np.inf),
+    )
     tries = 2
 
     def starts(self, scales):
-        return [np.array([part * scales.input]) for part in (0.95, 0.8)]
+        return [np.array([part * scales.input, np.inf]) for part in (0.95, 0.8)]
+
+    def grown(self, name, p, scales):
+        """From a plain clip: with a soft knee."""
+        return [np.array([p[0], SOFT])] if name == self.name and np.isfinite(p[0]) and not np.isfinite(p[1]) else []
 
     def command(self, p, u):
-        return np.clip(u, -p[0], p[0])
+        u_max, sharpness = p
+        if not (np.isfinite(u_max) and np.isfinite(sharpness)):
+            return np.clip(u, -u_max, u_max)
+        return u / (1.0 + np.abs(u / u_max) ** sharpness) ** (1.0 / sharpness)
 
     def edit_spec(self, p, c, twin):
         if np.isfinite(p[0]):

@@ -28,6 +28,7 @@ NUDGE = 1e-5  # of the point, for slopes of laws
 EPSILONS = (1e-7, 1e-8, 3e-9, 1e-9)  # of MuJoCo's finite differences: the first that its rigid contacts bear, which give little under their loads
 BURST = 1.01  # growth in one step beyond which a difference has opened a contact
 SETTLE_S = 0.1  # before them, so that contacts and couplings carry their loads
+PADE = 4  # order of a dead time where no sample time is given
 Move = Callable[[float], tuple[np.ndarray, np.ndarray]]  # time [s] -> (transition, effect of held inputs)
 
 
@@ -79,7 +80,7 @@ def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: flo
         move = _steps(A, B[:, :1], step)
     held = _held(move, C, 1.0 / rate_hz, c.delay)
     for name, values in plant.effects:
-        held, load = (held * _lag(values[0], held.dt), load * _lag(values[0], load.dt)) if name == "sensor_lag" else (held, load)
+        held, load = (held * _late(values, held.dt), load * _late(values, load.dt)) if name == "sensor_lag" else (held, load)
     return LinearPlant("reduced" if reduced else "mujoco", held, load, theta, omega, _left_out(plant))
 
 
@@ -220,6 +221,17 @@ def _held(move: Move, C: np.ndarray, h: float, delay: float) -> control.StateSpa
         B[:n] = G2
     B[n] = 1.0
     return control.ss(A, B, np.hstack([C, np.zeros((1, line))]), 0, h)
+
+
+def _late(values: np.ndarray, dt: float) -> control.StateSpace:
+    """What a late sensor makes of the angle: its lag T, and behind it its dead time T_d where it has one."""
+    T, T_d = values
+    if not np.isfinite(T_d):
+        return _lag(T, dt)
+    if not dt:
+        return _lag(T, dt) * control.ss(control.tf(*control.pade(T_d, PADE)))
+    whole, part = divmod(T_d / dt, 1.0)
+    return _lag(T, dt) * control.ss(control.tf([1.0 - part, part], [1.0, *[0.0] * (int(whole) + 1)], dt))
 
 
 def _lag(T: float, dt: float) -> control.StateSpace:
