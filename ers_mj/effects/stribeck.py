@@ -18,10 +18,10 @@ class Stribeck(Friction):
         Parameter("v_s", "speed", "Stribeck velocity"),
         Parameter("delta", "ratio", "exponent", lower=0.4, upper=4.0, absent=1.0),
     )
-    sized, tries = 1, 2
+    sized, tries = 1, 3
 
     def starts(self, scales):
-        return [np.array([0.2 * scales.acceleration, part * scales.speed, 1.4]) for part in (0.03, 0.15)]
+        return [np.array([0.2 * scales.acceleration, part * scales.speed, 1.4]) for part in (0.03, 0.15, 0.5)]
 
     @law
     def friction(p, level, theta, w, j, direction):
