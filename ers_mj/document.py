@@ -33,7 +33,7 @@ from ers_mj.simulation import PER_INERTIA, unit_of
 from ers_mj.traces import Blocks, Trace
 
 CONSISTENT = 0.05  # cost per block up to which a model explains the data within its noise (an error of 0.3 sigma RMS)
-SIGNIFICANT = 0.095  # mean of ln(1 + power) over blocks from which a mismatch is left (0.32 noise levels; see remainder.py)
+SIGNIFICANT = 0.085  # of what is left (see remainder.py), from which it is a mismatch (0.3 noise levels): of 100 servos without one three leave more than 0.06
 REST = 0.3  # share of what the baseline leaves that another form of the right law may leave in the output
 TIED = 0.02  # weight from which a rival is told as an alternative
 LEAST_FACTOR, LEAST_OFFSET = 0.02, 0.01  # of a gain or friction level, and of half the travel: a smaller drift is not worth a line
@@ -360,7 +360,8 @@ class Case:
     def _remainder(self, verdict: str, explained: float) -> dict:
         significant = verdict == "unexplained" or self._more_is_missing()
         words = "nothing beyond the noise is left" if not significant else "a mismatch is left that nothing named accounts for"
-        return {"explained_share": explained, "significant": significant, "left_sigma": {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in self.left.items()},
+        left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in self.left.items()}
+        return {"explained_share": explained, "significant": significant, "left_sigma": left_sigma,
                 "sentence": f"{explained:.0%} of the squared held-out error above the noise is explained; {words}."}
 
     @staticmethod
