@@ -21,6 +21,7 @@ STATES = ("gain", "offset", "friction_level")
 STATE_PRIOR = 0.2  # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
 NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
 SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
+NEAR_BOUND = 1e-3  # of a bound, within which a fitted number rests at it
 LEAST_TAU, MOST_TAU = 0.1, 2.0  # of a datasheet's electrical time constant, between which the baseline's is an ordinary one
 FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
 FEWEST_TURNS = 0.8  # periods of a wave over position within the travel: a longer one is no wave but a slope
@@ -153,6 +154,10 @@ class Model:
         if f.local:
             return self.local[f.owner][f.index // 16, f.index % 16]
         return self.effects[f.index // 16][1][f.index % 16]
+
+    def at_bound(self, f: Free) -> bool:
+        """Whether a fitted number rests at one of its bounds."""
+        return any(math.isclose(abs(self._get(f)) if f.positive else self._get(f), bound, rel_tol=NEAR_BOUND) for bound in (f.lower, f.upper))
 
     def at(self, layout: Sequence[Free], z: np.ndarray) -> Model:
         """The model with the fitted numbers of z, held within their bounds."""

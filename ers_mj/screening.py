@@ -129,14 +129,17 @@ def _hopeful(alone: Run, effect: Effect, starts: list[np.ndarray], targets, trac
 
 def _targets(place: Model, left: np.ndarray, traces: Sequence[Trace], tau: float):
     """The Jacobian's columns at the place, and at either weighting (weights (N,), orthonormal basis (N, k) of the
-    place's own parameters, weighted residual (N,) of ``left`` beside it)."""
+    place's own parameters, weighted residual (N,) of ``left`` beside it).
+
+    A parameter that rests at its bound follows nothing: what would push it further, as an inductance does a time constant, is left to the effects.
+    """
     blocks, layout = Blocks.of(traces), place.layout()
     m = blocks.misfit(left)
     jacobian = central_jacobian(place, layout, place.vector(layout), traces, OBSERVER_RATE)
-    out = []
+    free, out = np.array([not place.at_bound(f) for f in layout], bool), []
     for level in (tau, max(tau, float(np.mean(m)))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
-        basis, _ = np.linalg.qr(jacobian * root[:, None])
+        basis, _ = np.linalg.qr(jacobian[:, free] * root[:, None])
         out.append((root, basis, root * left - basis @ (basis.T @ (root * left))))
     return {f.key: column for f, column in zip(layout, jacobian.T)}, out
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ers_mj.baseline import baseline
-from ers_mj.datasheet import Datasheet
+from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import residuals
 from ers_mj.plants.inputs import INPUTS
@@ -62,3 +62,17 @@ def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
     (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
     size, begin, length, record = dict(begins[0].model.effects)["load_disturbance"]
     assert size == pytest.approx(-300.0, rel=0.3) and begin == pytest.approx(2.24, abs=0.02) and length == pytest.approx(0.08, rel=0.3) and record == 0
+
+
+def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
+    """A winding of three times the datasheet's time constant: the baseline's own may rise to twice that."""
+    traces, t = [], T[::4].copy()
+    for k, name in enumerate(("multisine", "steps", "chirp")):
+        u = INPUTS[name](t)
+        y = ReducedModel(lumped({**TRUTH, "tau_e": 1.1e-3}), [("inductance", np.array([2.0e-3]))]).simulate(t, u).measured
+        traces.append(trace_of(from_arrays(t, u, y + 1.5e-4 * np.random.default_rng(k).standard_normal(t.size), name=name), None))
+    start = baseline(traces, read_datasheet("table1"), True, 1)
+    model = start.fit.model
+    assert [f.name for f in model.layout() if model.at_bound(f)] == ["tau_e"]
+    promises = screen([model], start.traces, 1.0, (), True, False).promises
+    assert max(promises, key=promises.get) == "inductance"
