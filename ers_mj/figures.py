@@ -244,7 +244,10 @@ def _spectrum(found: Mismatch, evidence: Evidence, width: float) -> Figure:
     size.set_title("measured over simulated motion", color=INK)
     phase.set_xlabel("frequency [Hz]")
     phase.set_xlim(f[0], f[-1])
+    ticks = [x for decade in range(-3, 5) for x in np.array([1.0, 2.0, 5.0]) * 10.0**decade if f[0] <= x <= f[-1]]
     for ax in (levels, size, phase):
+        ax.set_xticks(ticks, [f"{x:g}" for x in ticks])
+        ax.xaxis.minorticks_off()
         ax.axvspan(*found.region, color=SHADE, alpha=0.28, linewidth=0, zorder=0)
     left.legend(*levels.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.6, columnspacing=1.2)
     return figure

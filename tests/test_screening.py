@@ -66,7 +66,7 @@ def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
 
 def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
     """A winding of three times the datasheet's time constant: the baseline's own may rise to twice that."""
-    traces, t = [], T[::4].copy()
+    traces, t = [], T[::4]
     for k, name in enumerate(("multisine", "steps", "chirp")):
         u = INPUTS[name](t)
         y = ReducedModel(lumped({**TRUTH, "tau_e": 1.1e-3}), [("inductance", np.array([2.0e-3]))]).simulate(t, u).measured

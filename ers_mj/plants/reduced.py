@@ -148,6 +148,6 @@ class ReducedModel:
 
     def simulate(self, t, u, start=None, *, enable=None, load=None, refine=1) -> Motion:
         """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples."""
-        start = (self.coefficients.theta_0, 0.0) if start is None else start
+        t, start = np.ascontiguousarray(t, float), (self.coefficients.theta_0, 0.0) if start is None else start
         out = self._run(t, u, start, enable, load, None, 0.0, 1, refine)
         return Motion(t, out[:, 0], out[:, 1], out[:, 2], out[:, 3], self.read(t, out[:, 0]))
