@@ -16,29 +16,32 @@ import numpy as np
 from ers_mj.identification import residuals_in
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.symptoms import converter_step
-from ers_mj.traces import Trace
+from ers_mj.traces import BLOCK, Trace
 
 LAGS = (1, 2, 3)  # samples
-FEWEST_PAIRS = 12  # in a block that is judged
+FEWEST = 20  # samples in a block; at low sample rates several blocks are one
+FEWEST_PAIRS = 12  # a lag, in a block that is judged
 LEAST = -0.9  # power of a block, in those of the noise, that chance does not go below
 
 
 def left_by_sensor(model: Model, traces: Sequence[Trace]) -> dict[str, float]:
-    """What the model's observer leaves beyond the noise, by sensor ("output", and the kinds of the further channels).
+    """What the model's observer leaves beyond the noise, by sensor ("output", and the kinds of the further channels); 0 where no block is long enough.
 
     The mean over blocks of ln(1 + power), the power in that of the noise: a few blocks in which stick and slip fork do not decide it.
     """
     logs: dict[str, list[np.ndarray]] = {}
     for record, trace in enumerate(traces):
         parts = residuals_in(model, trace, record, OBSERVER_RATE).reshape(-1, trace.t.size)
+        block = trace.block // math.ceil(FEWEST * trace.sample_time / BLOCK)
         sensors = [("output", trace.y, trace.sigma, trace.quantum, trace.valid)]
         sensors += [(c.kind, c.values, c.sigma, converter_step(c.values), np.isfinite(c.values)) for c in trace.channels]
         for e, (kind, values, sigma, step, known) in zip(parts, sensors, strict=True):
-            power = remembered(e, known, trace.block)
+            power = remembered(e, known, block)
             if step > 0:
-                power = power - _converted(values - e * sigma, values, sigma, step, known, trace.block)
+                power = power - _converted(values - e * sigma, values, sigma, step, known, block)
             logs.setdefault(kind, []).append(np.log1p(np.maximum(power, LEAST)))
-    return {kind: float(np.nanmean(np.concatenate(parts))) for kind, parts in logs.items()}
+    told = {kind: np.concatenate(parts) for kind, parts in logs.items()}
+    return {kind: float(np.mean(x[np.isfinite(x)])) if np.isfinite(x).any() else 0.0 for kind, x in told.items()}
 
 
 def remembered(e: np.ndarray, known: np.ndarray, block: np.ndarray) -> np.ndarray:

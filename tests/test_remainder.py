@@ -1,11 +1,16 @@
 """What a model leaves beyond the noise is told by its memory, whatever the noise's size and whatever the converter does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from test_confirmation import NOISE, started, trace
+from test_confirmation import NOISE, TRUTH, started, trace
 
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.recording import from_arrays
 from ers_mj.remainder import left_by_sensor, remembered
 from ers_mj.symptoms import converter_step
+from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 8.0, 1e-3)
 BLOCK = (T / 0.25).astype(int)
@@ -39,3 +44,16 @@ def test_a_mismatch_below_the_noise_is_seen():
               for k, name in enumerate(("multisine", "steps", "chirp"))]
     start = started(traces)
     assert left_by_sensor(start.fit.model, start.traces)["output"] > 0.1
+
+
+@pytest.mark.parametrize("rate", [1000, 50, 10])
+def test_at_low_sample_rates_blocks_are_joined(rate):
+    """A slow mismatch of four noise levels is seen where a quarter of a second holds two samples as well as where it holds 250."""
+    plant, t = ReducedModel(lumped(TRUTH)), np.arange(0.0, 15.0, 1.0 / rate)
+    u = 3.0 * np.sign(np.sin(t))
+    y = plant.simulate(t, u).measured + NOISE * np.random.default_rng(1).standard_normal(t.size)
+    model = started([trace("multisine")]).fit.model
+    model = replace(model, values={**model.values, **TRUTH, "tau_e": 0.0, "emf_share": 1.0})
+    plain, bent = (trace_of(from_arrays(t, u, y + size * NOISE * np.sin(2.0 * t)), None) for size in (0.0, 6.0))
+    assert abs(left_by_sensor(model, [replace(plain, sigma=NOISE)])["output"]) < 0.06
+    assert left_by_sensor(model, [replace(bent, sigma=NOISE)])["output"] > 0.085
