@@ -25,6 +25,7 @@ OPENED = {"preload": STARTS, "spring": 2, "bare": 2}  # of these in a search tha
 BEHIND = 0.25  # of C per block, by which a kind is too far behind to be finished
 SPRINGS = {"bare": (), "spring": ("a_1",), "preload": ("a_1", "c_1")}
 VALLEY = 10.0  # of C by which two fits differ that ended in different valleys
+FEWEST_COGS = 3  # a turn of a motor: the least common multiple of its poles and slots, of which the smallest motors have two and three
 SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
 
 Scaffolds = tuple[tuple[str, ...], ...]
@@ -70,6 +71,9 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
         found = Start(refitted, traces, ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others))
     else:
         found = _from_scratch(traces, known, is_angle, jobs)
+    if datasheet is not None and (gear := datasheet.parameters.get("n")):
+        scales = replace(found.fit.model.scales, cog=2 * np.pi / (FEWEST_COGS * gear))
+        found = replace(found, fit=replace(found.fit, model=replace(found.fit.model, scales=scales)))
     if not np.isfinite(found.fit.cost):
         raise InputError("no motion that the reduced model can make resembles these recordings: check units and signs of input and output")
     return found

@@ -48,15 +48,16 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         model = selection.chosen.model
         after_models = refits(model, parts, selection.tau, jobs)
         after = _scores(after_models, parts)
-        without, p, lesser_models = {}, {}, {}
+        lesser, without, p, lesser_models = {}, {}, {}, {}
         for name in model.names:
             less = _without(name, model, start, selection.tau).model if len(model.names) > 1 else start.fit.model
             lesser_models[name] = refits(less, parts, selection.tau, jobs) if len(model.names) > 1 else base_models
-            without[name] = pooled(_scores(lesser_models[name], parts))
+            lesser[name] = _scores(lesser_models[name], parts)
+            without[name] = pooled(lesser[name])
             p[name] = paired_p(pooled(after).misfit, without[name].misfit, BY_NAME[name].once)
             if p[name] > LARGEST_P and not held and len(start.traces) > 1:
                 p[name] = min(p[name], _p_within(model, less, start, selection.tau, jobs))
-        failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(pooled(after), without[n], p[n]))
+        failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(after, lesser[n], p[n]))
                   and not _halves(pooled(after), without[n], parts)
                   and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))
                   or _may_be_none(n, model, start.traces, selection.tau)]
@@ -67,9 +68,16 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
 
 
-def _no_closer(after: Score, without: Score, p: float) -> bool:
-    """Whether an effect brings the free run no closer; where its blocks leave no doubt, an error that forks of stick and slip make somewhat larger counts as closer."""
-    return after.rmse >= (WORSE if p < SURE_P else 1.0) * without.rmse
+def _no_closer(after: Sequence[Score], without: Sequence[Score], p: float) -> bool:
+    """Whether an effect brings the free runs no closer.
+
+    Where its blocks leave no doubt, an error that forks of stick and slip make somewhat larger counts as closer, and so does one that falls in the
+    geometric mean of the recordings: one of them may teach so much that the others, without it, know the rest of the model badly.
+    """
+    ratio = pooled(after).rmse / pooled(without).rmse
+    if p >= SURE_P or ratio < WORSE:
+        return ratio >= (WORSE if p < SURE_P else 1.0)
+    return float(np.mean([math.log(a.rmse / b.rmse) for a, b in zip(after, without, strict=True)])) >= 0.0
 
 
 def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:

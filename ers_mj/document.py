@@ -27,14 +27,12 @@ from ers_mj.localisation import Place, gather, over_frequency, places, residual_
 from ers_mj.multibody import Rig, run_in_mujoco
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.recording import Recording
-from ers_mj.remainder import left_by_sensor
+from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.selection import Candidate, Selection
 from ers_mj.simulation import PER_INERTIA, unit_of
 from ers_mj.traces import Blocks, Trace
 
 CONSISTENT = 0.05  # cost per block up to which a model explains the data within its noise (an error of 0.3 sigma RMS)
-SIGNIFICANT = 0.085  # of what is left (see remainder.py), from which it is a mismatch (0.3 noise levels): of 100 servos without one three leave more than 0.06
-REST = 0.3  # share of what the baseline leaves that another form of the right law may leave in the output
 TIED = 0.02  # weight from which a rival is told as an alternative
 LEAST_FACTOR, LEAST_OFFSET = 0.02, 0.01  # of a gain or friction level, and of half the travel: a smaller drift is not worth a line
 VISIBLE = 1.5  # noise levels of free-run error from which a recording shows a mismatch
@@ -156,14 +154,7 @@ class Case:
         return float(np.mean(shares)) if shares else 0.0
 
     def _more_is_missing(self) -> bool:
-        """Whether what the answer leaves is more than another form of the same law would: the mimic of an unknown effect takes a part only.
-
-        A mimic in the output is seldom one in the current, which no form of the right law leaves amiss.
-        """
-        if not self.model.names:
-            return max(self.left.values()) > SIGNIFICANT
-        least = {"output": max(SIGNIFICANT, REST * left_by_sensor(self.start.fit.model, self.start.traces)["output"])}
-        return any(left > least.get(kind, SIGNIFICANT) for kind, left in self.left.items())
+        return more_is_missing(self.left, left_by_sensor(self.start.fit.model, self.start.traces) if self.model.names else None)
 
     def _verdict(self, explained: float) -> str:
         if self.sensors and not self.model.names:

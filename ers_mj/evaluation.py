@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import fit, residuals, score, tau_of
+from ers_mj.identification import fit, residuals, residuals_in, score, tau_of
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.starts import fitted_start
 from ers_mj.intervals import half_widths
@@ -26,7 +26,7 @@ LAST_PART = 0.7  # where the only recording is cut into training and held out
 
 @dataclass(frozen=True)
 class Score:
-    """Squared free-run error summed over samples, their number, and block misfits (B,) of the observer form."""
+    """Squared free-run error summed over samples, their number, and block misfits (B,) of the observer form, of all channels."""
 
     squares: float
     samples: int
@@ -52,8 +52,8 @@ def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0) -> Score
     """Score of a recording from sample ``begin`` on."""
     e = np.where(trace.valid, trace.y - free_run(model, trace, record), 0.0)[begin:]
     e = np.nan_to_num(e, nan=10 * float(np.nanstd(trace.y)))
-    local = np.where(trace.valid, (trace.y - model.predict(trace, record, OBSERVER_RATE)) / trace.sigma, 0.0)
-    return Score(float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([replace(trace, channels=())]).misfit(np.nan_to_num(local, nan=1e6)))
+    local = residuals_in(model, trace, record, OBSERVER_RATE)
+    return Score(float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)))
 
 
 def settled(model: Model, trace: Trace, tau: float) -> Model:

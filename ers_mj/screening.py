@@ -217,14 +217,14 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
 
 def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
     """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local."""
-    amplitude, phase = effect.wave
+    amplitudes, phase = effect.wave
     secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
     if not np.all(np.isfinite(secants)):
         return None
     (share,), (mixture,) = max((_shares(np.array(secants), 2, _ends(effect, traces), target, True) for target in targets), key=lambda found: found[0][0])
     sizes, turns = np.hypot(*mixture.T), np.arctan2(mixture[:, 1], mixture[:, 0])
     found = start.copy()
-    found[amplitude] *= min(max(math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
+    found[list(amplitudes)] *= min(max(math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
     found[phase] += turns[0]
     model = place.with_effect(effect.name, found)
     if effect.local:

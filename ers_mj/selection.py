@@ -18,6 +18,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, converged, fit, hopped, near_noise, score, tau_of
 from ers_mj.isolability import PARAMETER_PRICE, probabilities
 from ers_mj.model import STATES
+from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import Begin, screen
 from ers_mj.traces import Blocks, Trace
 
@@ -40,6 +41,7 @@ FOREMOST = 2  # effects of the largest promise: refitted from their other starts
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
+SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often
@@ -72,6 +74,13 @@ def paired_z(better: np.ndarray, worse: np.ndarray, tau: float) -> float:
     d = score(worse, tau) - score(better, tau)
     spread = float(np.std(d, ddof=1)) if d.size > 1 else math.inf
     return float(np.mean(d)) * math.sqrt(d.size) / spread if spread > 0 else 0.0
+
+
+def judged(name: str, found: Fit, base: Fit, tau: float) -> Candidate:
+    """What a fit has won over the model that it extends."""
+    won = score(base.misfit, tau) - score(found.misfit, tau)
+    lost = -float(np.sum(np.minimum(won, 0.0)))
+    return Candidate(name, found, float(np.sum(won)), paired_z(found.misfit, base.misfit, tau), lost, float(won.max()))
 
 
 def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str],
@@ -116,12 +125,6 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         least = reference - min(map(total, ends.values()), default=reference)
         return [label for label in labels if reference - least > QUIET * base.misfit.size or reference - total(ends[label]) >= RIVAL * least]
 
-    def judged(item):
-        name, found = item
-        won = score(base.misfit, tau) - score(found.misfit, tau)
-        lost = -float(np.sum(np.minimum(won, 0.0)))
-        return Candidate(name, found, reference - total(found), paired_z(found.misfit, base.misfit, tau), lost, float(won.max()))
-
     states = [((s, 0), [Begin(base.model.with_state(s, len(traces)), {})]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
@@ -162,17 +165,17 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
-            return sorted(map(judged, rough), key=lambda c: -c.worth)
+            return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         finished = dict(pool.map(finish, rough[:close]))
         for name, found in pool.map(finish, _wider(finished, exclude)):
             if name not in best or priced(found) < priced(finished.get(name, best[name])):
                 finished[name] = found
-        ranked = sorted(map(judged, {**dict(rough), **finished}.items()), key=lambda c: -c.worth)
+        ranked = sorted((judged(*item, base, tau) for item in {**dict(rough), **finished}.items()), key=lambda c: -c.worth)
         rivals = len(_rivals(ranked))
         if rivals > 1:
             lead, second = ranked[0].fit, ranked[1].fit
-            ranked[:rivals] = pool.map(lambda c: judged((c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau))), ranked[:rivals])
+            ranked[:rivals] = pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau), base, tau), ranked[:rivals])
     return _likeliest_first(sorted(ranked, key=lambda c: -c.worth))
 
 
@@ -245,6 +248,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT:
                 base, current, mended = base if current.model.names else again, again, mended + 1
                 continue
+        if not current.model.names and _leaves_more(ranked, current, least, traces):
+            ranked = _likeliest_first(sorted([*ranked, *_swept(current, ranked, traces, tau, exclude, jobs)], key=lambda c: -c.worth))
         rounds.append(tuple(ranked))
         if not ranked or not _asked_for(ranked[0], least, LATER_Z if current.model.names else LEAST_Z):
             break
@@ -256,6 +261,35 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         if near_noise(current):
             current = _exchanged(current, rounds[:-1], traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau)
+
+
+def _leaves_more(ranked: Sequence[Candidate], current: Fit, least: float, traces: Sequence[Trace]) -> bool:
+    """Whether something is missing that the best candidate, if it is asked for, does not explain."""
+    without = left_by_sensor(current.model, traces)
+    if not ranked or not _asked_for(ranked[0], least, LEAST_Z):
+        return more_is_missing(without, None)
+    return more_is_missing(left_by_sensor(ranked[0].fit.model, traces), without)
+
+
+def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int) -> list[Candidate]:
+    """What the candidates of a screening missed: where stick and slip fork, the secant of the very effect that acts may promise nothing.
+
+    Every effect that is cheap to simulate and has few starts is refitted from these as they are, whatever they make worse on the way; those are returned that
+    gain more than the screening's refit of the same effect.
+    """
+    effects = [effect for effect in BY_NAME.values() if not effect.dear and not effect.once and effect.name not in exclude]
+    starts = [(effect.name, start) for effect in effects if len(few := effect.starts(base.model.scales)) < BY_SCREEN for start in few]
+    known = {c.name: c.gain for c in ranked}
+
+    def refitted(item):
+        return judged(item[0], fit(base.model.with_effect(*item), traces, tau=tau, steps=SWEEP), base, tau)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        best = {}
+        for candidate in pool.map(refitted, starts):
+            if candidate.gain > max(known.get(candidate.name, 0.0), best[candidate.name].gain if candidate.name in best else 0.0):
+                best[candidate.name] = candidate
+        return list(pool.map(lambda c: judged(c.name, fit(c.fit.model, traces, tau=tau, steps=20), base, tau), best.values()))
 
 
 def _most_rounds(current: Fit) -> int:

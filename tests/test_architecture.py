@@ -8,8 +8,8 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
 ORDER = ["errors", "minimisers", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "proving", "simulation", "traces",
          "excitation", "replay", "model_file", "rendering", "window", "model", "starts", "identification", "guess", "baseline",
-         "identifying", "isolability", "screening", "selection",
-         "intervals", "evaluation", "spectra", "mismatch", "evidence", "design", "advice", "localisation", "remainder", "confirmation", "multibody", "document", "diagnosis",
+         "identifying", "isolability", "remainder", "screening", "selection",
+         "intervals", "evaluation", "spectra", "mismatch", "evidence", "design", "advice", "localisation", "confirmation", "multibody", "document", "diagnosis",
          "known", "streaming", "tracking", "experiment",
          "validation", "controllers", "references", "closed_loop", "measures", "trial", "robustness", "gains", "claims", "frequency", "display", "validity", "frames",
          "figures", "page", "maps", "report", "validation_report", "proof_figures", "proof_report", "trial_figures", "trial_report", "frequency_figures", "frequency_report",

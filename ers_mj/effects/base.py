@@ -75,7 +75,8 @@ class Scales:
     ``position`` half the travel, ``low``/``high`` its ends, ``speed`` a high percentile of |w|, ``acceleration`` the
     friction level (or the drive's, where there is none), ``input`` the peak |u|, ``sample_time`` [s], ``noise`` and
     ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
-    recording [s], ``recordings`` their number, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
+    recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
+    behind a known gear, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
     """
 
     position: float
@@ -89,6 +90,7 @@ class Scales:
     quantum: float
     is_angle: bool
     tau_e_datasheet: float | None = None
+    cog: float = np.inf
     duration: float = 10.0
     recordings: int = 1
     hot: tuple[tuple[int, float, float], ...] = ()
@@ -150,7 +152,7 @@ class Effect:
     mjcf: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
-    wave: ClassVar[tuple[int, int] | None] = None  # amplitude and phase: the screening finds both from a start's two quarter periods
+    wave: ClassVar[tuple[tuple[int, ...], int] | None] = None  # amplitudes (of which a start has one) and phase: the screening finds both from two quarter periods
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
     dear: ClassVar[bool] = False  # a simulation takes many times as long as others: refitted only where it promises most
     step: ClassVar[float] = 1e-4  # of transformed parameters, over which differences of its simulation tell a slope: more where it bounces

@@ -25,11 +25,12 @@ class Cogging(Drive):
         Parameter("phase_2", "phase", "phase of the second harmonic against the first", positive=False, absent=np.inf),
     )
     sized, tries = 1, 3
-    wave = (0, 2)
+    wave = ((0,), 2)
 
     def starts(self, scales):
         travel = scales.high - scales.low
-        return [np.array([0.2 * scales.acceleration, travel / order, 0.0, np.inf, np.inf]) for order in ORDERS]
+        return [np.array([0.2 * scales.acceleration, travel / order, 0.0, np.inf, np.inf]) for order in ORDERS
+                if travel / order <= scales.cog]
 
     def grown(self, name, p, scales):
         """From a plain sine: with a second harmonic."""

@@ -21,7 +21,7 @@ class PeriodicGust(Load):
         Parameter("phase", "phase", "phase of the sine at time zero, another in every recording", positive=False, per_record=True),
     )
     sized, tries = 1, 3
-    wave = (0, 2)
+    wave = ((0,), 2)
 
     def starts(self, scales):
         return [np.array([0.2 * scales.acceleration, cycles / scales.duration, 0.0]) for cycles in CYCLES]

@@ -28,7 +28,7 @@ class PositionDependentFriction(Friction):
         Parameter("phase", "phase", "phase of the wave at angle zero", positive=False, absent=np.inf),
     )
     sized, tries = 1, 3
-    wave = (0, 4)
+    wave = ((0,), 4)
 
     def starts(self, scales):
         travel, size = scales.high - scales.low, 0.2 * scales.acceleration

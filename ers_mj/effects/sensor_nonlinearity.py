@@ -25,7 +25,7 @@ class SensorNonlinearity(Sensor):
         Parameter("phase", "phase", "phase of the wave at angle zero", positive=False, absent=np.inf),
     )
     tries = 2
-    wave = (2, 4)
+    wave = ((2,), 4)
     instant = True
 
     def starts(self, scales):

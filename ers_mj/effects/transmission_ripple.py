@@ -1,19 +1,22 @@
-"""A gear whose ratio swings as it turns."""
+"""A gear that does not turn evenly: its ratio swings, or its torque does."""
 
 import math
 
 import numpy as np
 
 from ers_mj.effects.base import Parameter, Transmission, law
+from ers_mj.errors import InputError
 
 ORDERS = range(1, 13)  # periods within the travel from which a fit is begun: slower than cogging, of which poles make many a turn
 
 
 class TransmissionRipple(Transmission):
-    """r = 1 + ripple sin(2 pi theta / period + phase): an eccentric gear or a bent screw.
+    """r = 1 + ripple sin(x), x = 2 pi theta / period + phase: an eccentric gear or a bent screw. Or, whatever the load, theta'' +=
+    A (sin x + second sin(2 x + phase_2)) / J: teeth that grind.
 
     The motor's torque at the rudder is r times, its back-EMF r times the mean ratio's; the change of the reflected inertia, and with
-    inductance the current's delay behind the changed back-EMF, are left out.
+    inductance the current's delay behind the changed back-EMF, are left out. A torque that waves with the angle is this one's where it is too slow for
+    a motor's cogging (``Scales.cog``), which without a known gear it never is.
     """
 
     name = "transmission_ripple"
@@ -23,20 +26,41 @@ class TransmissionRipple(Transmission):
         Parameter("ripple", "ratio", "amplitude over the mean ratio", positive=False, lower=-0.9, upper=0.9),
         Parameter("period", "position", "period, seen at the output"),
         Parameter("phase", "phase", "phase of the sine at angle zero", positive=False),
+        Parameter("A", "torque", "amplitude, seen at the output, of a torque instead of a ratio", positive=False, absent=np.inf),
+        Parameter("second", "ratio", "second harmonic of that torque over the first", positive=False, lower=-2.0, upper=2.0, absent=np.inf),
+        Parameter("phase_2", "phase", "phase of the second harmonic against the first", positive=False, absent=np.inf),
     )
     sized, tries = 1, 3
-    wave = (0, 2)
+    wave = ((0, 3), 2)
 
     def starts(self, scales):
-        travel = scales.high - scales.low
-        return [np.array([0.05, travel / order, 0.0]) for order in ORDERS]
+        periods = [(scales.high - scales.low) / order for order in ORDERS]
+        return [*(np.array([0.05, period, 0.0, np.inf, np.inf, np.inf]) for period in periods),
+                *(np.array([np.inf, period, 0.0, 0.2 * scales.acceleration, np.inf, np.inf]) for period in periods if period > scales.cog)]
+
+    def grown(self, name, p, scales):
+        """From a plain torque: with a second harmonic."""
+        plain = name == self.name and np.isfinite(p[3]) and not np.isfinite(p[4])
+        return [np.array([*p[:4], 0.1, phase]) for phase in (0.0, 0.5 * np.pi)] if plain else []
 
     def constants(self, p, c):
-        return np.array([p[0], 2 * np.pi / p[1], p[2], c.a_emf])
+        if not np.isfinite(p[3]):
+            return np.array([p[0], 2 * np.pi / p[1], p[2], c.a_emf, np.inf])
+        if np.isfinite(p[0]) and p[0] != 0.0:
+            raise InputError(f"{self.name}: ripple and A are both given, one of them was expected")
+        return np.array([p[3], 2 * np.pi / p[1], p[2], *(p[4:] if np.isfinite(p[4]) else (0.0, 0.0))])
 
     @law
     def torque(p, theta, w, j, t):
+        x = p[1] * theta + p[2]
+        if p[4] != math.inf:
+            return p[0] * (math.sin(x) + p[3] * math.sin(2.0 * x + p[4]))
         if j == 0.0:  # an open circuit
             return 0.0
-        swing = p[0] * math.sin(p[1] * theta + p[2])
+        swing = p[0] * math.sin(x)
         return swing * (j - (1.0 + swing) * p[3] * w)
+
+    def describe(self, values):
+        if values["A"] == "none":
+            return super().describe(values)
+        return f"the gear does not turn evenly: a torque of amplitude {values['A']} at the rudder that returns every {values['period']} of its angle"
