@@ -23,9 +23,10 @@ from ers_mj.screening import Begin, screen
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 3.0  # decrease of C that an effect must buy: one servo in forty without missing physics offers as much (evaluation.NULL_GAIN)
+LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the one that acts
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
-LATER_Z = 2.5  # and beside an effect, whose law is hardly ever exactly the one that acts
+LATER_Z = 2.0  # and beside an effect
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 6.0  # of C that an effect which acts once must buy
 PEAK = 30.0  # or the factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
@@ -241,7 +242,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     tau = tau_of(base.misfit)
     while len(rounds) - len(current.model.states or {}) < _most_rounds(current):
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
-        least = max(LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
+        least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
         if ranked and least <= ranked[0].gain <= MODEST and mended < MOST_MENDED:
             again = _less(ranked[0], traces, tau)

@@ -16,6 +16,7 @@ BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
 START_SAMPLES = 10
 FEWEST_SEEN = 6  # samples that a start is told from
+FIRST = 2  # changes by which a speed at the start must show
 SURE_SPEED = 3.0  # standard deviations within which a speed at the start may lie
 
 
@@ -165,7 +166,7 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
     """The least and the largest speed at the first of the samples (N,) that they allow, without a model: both 0 where rest is allowed.
 
     Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no more than their noise; the best one
-    where none does.
+    where none does. A speed against which the very first samples go is none: it is how a polynomial meets a rudder that is thrown from rest.
     """
     known = np.isfinite(y)
     t, y = t[known] - t[0], y[known]
@@ -181,7 +182,8 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
             found.append((missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1]))
     enough = max(1.0, min(missed for missed, *_ in found))
     low, high = (pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:]))
-    return (0.0, 0.0) if low <= 0.0 <= high else (float(low), float(high))
+    against = -np.sign(low) * (y[1:1 + FIRST] - y[0])
+    return (0.0, 0.0) if low <= 0.0 <= high or np.max(against) > SURE_SPEED * math.sqrt(2.0) * sigma else (float(low), float(high))
 
 
 def noise_sigma(y: np.ndarray, quantum: float) -> float:
