@@ -8,11 +8,13 @@ import pytest
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
+from ers_mj.errors import InputError
 from ers_mj.identification import residuals
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Screened, screen
+from ers_mj.selection import _swept
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -76,3 +78,38 @@ def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
     assert [f.name for f in model.layout() if model.at_bound(f)] == ["tau_e"]
     promises = screen([model], start.traces, 1.0, (), True, False).promises
     assert max(promises, key=promises.get) == "inductance"
+
+
+def test_a_sweep_finds_what_secants_miss(pushed):
+    """From its own start, whatever that makes worse on the way; no more is returned than the screening found."""
+    others = [name for name in BY_NAME if name not in ("bias_torque", "quadratic_drag", "hinge_moment_cubic")]
+    found = _swept(pushed.fit, [], pushed.traces, 1.0, others, 1)
+    best = max(found, key=lambda c: c.gain)
+    (size,) = dict(best.fit.model.effects)["bias_torque"]
+    assert best.name == "bias_torque" and size == pytest.approx(0.06, rel=0.3) and best.gain > 2.0
+    assert not [c for c in _swept(pushed.fit, [best], pushed.traces, 1.0, others, 1) if c.name == "bias_torque" and c.gain > best.gain + 0.1]
+
+
+def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
+    """Behind a gear of 20 a motor that cogs thrice a turn has a period of 0.105 rad at the output; without a gear any period may be its own."""
+    scales = replace(pushed.fit.model.scales, low=-0.3, high=0.3, cog=2 * np.pi / 60.0)
+    cogs, gears = ([p for p in BY_NAME[name].starts(scales)] for name in ("cogging", "transmission_ripple"))
+    torques = [p for p in gears if np.isfinite(p[3])]
+    assert max(p[1] for p in cogs) <= scales.cog < min(p[1] for p in torques) and len(torques) < len(gears)
+    assert not any(np.isfinite(p[3]) for p in BY_NAME["transmission_ripple"].starts(replace(scales, cog=np.inf)))
+
+
+def test_a_datasheets_gear_bounds_the_period_of_cogging(pushed):
+    sheet = Datasheet(parameters={"n": 20.0}, lumped=TRUTH)
+    assert baseline(pushed.traces, sheet, True, 1).fit.model.scales.cog == pytest.approx(2 * np.pi / 60.0)
+    assert pushed.fit.model.scales.cog == np.inf
+
+
+def test_an_uneven_gears_torque_is_the_one_of_a_cog():
+    u, c = INPUTS["multisine"](T), lumped(TRUTH)
+    wave = [5.0, 0.2, 0.4, 0.3, 1.0]
+    gear, cog = (ReducedModel(c, [(name, np.array(p))]).simulate(T, u).theta for name, p in
+                 (("transmission_ripple", [np.inf, 0.2, 0.4, 5.0, 0.3, 1.0]), ("cogging", wave)))
+    assert np.allclose(gear, cog, atol=1e-9)
+    with pytest.raises(InputError, match="ripple and A are both given"):
+        ReducedModel(c, [("transmission_ripple", np.array([0.1, 0.2, 0.4, 5.0, np.inf, np.inf]))]).simulate(T, u)
