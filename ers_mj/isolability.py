@@ -8,12 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, residuals, score
 from ers_mj.model import OBSERVER_RATE
 from ers_mj.traces import Trace
 
 RUN = 4  # neighbouring blocks that chance strikes together: 1 s, as the intervals take it
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when explanations are compared
+WIDER_PRICE = 0.75  # and of one that is the other's limit: with the price of the parameter that opens it as much as Akaike asks
 DRAWS = 1000  # of weights, in which each run of blocks counts more or less
 
 
@@ -47,17 +49,24 @@ def isolability(leader: Fit, others: Sequence[Fit], traces: Sequence[Trace]) -> 
 def probabilities(fits: Mapping[str, Fit]) -> dict[str, float]:
     """How probable each of these explanations is, if one of them is true; they sum to one.
 
-    C is a logarithm of a likelihood, so exp(-C) weighs, less the price of the parameters. What one stick or one slip did may not happen
+    C is a logarithm of a likelihood, so exp(-C) weighs, less the price of the parameters; a play closes into a springy shaft, which is no worse unless
+    the play is seen. What one stick or one slip did may not happen
     again: the weights are averaged over draws in which every run of RUN blocks counts by a random share of its own (Bayesian
     bootstrap; pseudo-BMA+ of Yao et al. 2018), so that an advantage won in one place does not exclude the rest.
     """
     runs = np.array([_runs(score(f.misfit, 1.0)) for f in fits.values()])
-    price = PARAMETER_PRICE * np.array([f.size for f in fits.values()])
+    price = np.array([PARAMETER_PRICE * f.size + WIDER_PRICE * any(_is_limit(other, f) for other in fits.values()) for f in fits.values()])
     shares = np.random.default_rng(0).dirichlet(np.ones(runs.shape[1]), DRAWS) * runs.shape[1]
     cost = shares @ runs.T + price
     weight = np.exp(-(cost - cost.min(axis=1, keepdims=True)))
     weight /= weight.sum(axis=1, keepdims=True)
     return dict(zip(fits, map(float, weight.mean(axis=0))))
+
+
+def _is_limit(narrow: Fit, wide: Fit) -> bool:
+    """Whether an effect of the wide model, which the narrow one lacks, has one of the narrow model's as its limit."""
+    return any(BY_NAME[name].grown(other, p, wide.model.scales) for name in wide.model.names if name not in narrow.model.names
+               for other, p in narrow.model.effects if other not in wide.model.names)
 
 
 def _runs(d: np.ndarray) -> np.ndarray:

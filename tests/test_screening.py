@@ -10,6 +10,7 @@ from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.errors import InputError
 from ers_mj.identification import residuals
+from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
@@ -53,6 +54,17 @@ def test_a_wider_effect_begins_where_its_limit_ended(pushed):
     apart = np.sqrt(np.mean((one - other) ** 2))
     assert apart < 0.2 * np.sqrt(np.mean((one - residuals(model, traces, 5.0)) ** 2))
     assert not BY_NAME["backlash"].grown("bias_torque", np.array([0.5]), model.scales)
+
+
+def test_of_two_alike_the_one_without_play_is_likelier(pushed):
+    """One has the other as its limit: it must do better, and not as well, to be named."""
+    wide, narrow, none = (replace(pushed.fit, model=pushed.fit.model.with_effect(name, np.array(p))) for name, p in
+                          (("backlash", [1e-4, 0.6, 0.2, 80.0, 0.2]), ("shaft_compliance", [80.0, 0.2, 0.6, 0.2]), ("bias_torque", [0.1])))
+    alike = probabilities({"backlash": wide, "shaft_compliance": narrow})
+    assert alike["shaft_compliance"] == pytest.approx(1 / (1 + np.exp(-0.75)), abs=0.01)
+    assert probabilities({"backlash": wide, "bias_torque": none})["backlash"] == pytest.approx(0.5, abs=0.01)
+    better = replace(wide, misfit=wide.misfit * 0.8)
+    assert probabilities({"backlash": better, "shaft_compliance": narrow})["backlash"] > 0.8
 
 
 def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
