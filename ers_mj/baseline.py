@@ -38,12 +38,13 @@ def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bo
     lags = [max(1, round(0.02 / t.sample_time)) for t in traces]
     speeds = np.concatenate([np.abs(t.y[k:] - t.y[:-k]) / (k * t.sample_time) for t, k in zip(traces, lags)])
     peak = max(float(np.max(np.abs(t.u))) for t in traces)
+    supplies = [t.supply for t in traces if t.supply is not None]
     return Scales(position=0.5 * (high - low), low=low, high=high, speed=float(np.nanquantile(speeds, 0.95)) + 1e-12,
                   acceleration=max(values.get("c_2", 0.0), 0.05 * abs(values["b"]) * peak), input=peak,
                   sample_time=float(np.median([t.sample_time for t in traces])),
                   noise=float(np.median([t.sigma for t in traces])), quantum=max(t.quantum for t in traces),
                   is_angle=is_angle, tau_e_datasheet=tau_e, duration=max(float(t.t[-1] - t.t[0]) for t in traces),
-                  recordings=len(traces))
+                  recordings=len(traces), supply=float(np.median(np.concatenate(supplies))) if supplies else None)
 
 
 @dataclass(frozen=True)

@@ -197,14 +197,14 @@ class Model:
         neutral = np.zeros(records) if state == "offset" else np.ones(records)
         return replace(self, states={**(self.states or {}), state: neutral})
 
-    def plant(self, record: int = 0) -> ReducedModel:
-        """The reduced model of one recording (its record state applied)."""
+    def plant(self, record: int = 0, supply: np.ndarray | None = None) -> ReducedModel:
+        """The reduced model of one recording (its record state applied), with the supply (N,) that was measured there."""
         c = lumped(self.values)
         if self.states:
             gain = self.states["gain"][record] if "gain" in self.states else 1.0
             level = self.states["friction_level"][record] if "friction_level" in self.states else 1.0
             c = c._replace(b=c.b * gain, c_2_plus=c.c_2_plus * level, c_2_minus=c.c_2_minus * level)
-        return ReducedModel(c, self.effects_of(record))
+        return ReducedModel(c, self.effects_of(record), supply)
 
     def effects_of(self, record: int | None = None) -> tuple[tuple[str, np.ndarray], ...]:
         """The effects that act in one recording (None: in any), with their values there (in the first where they act)."""
@@ -262,7 +262,7 @@ class Model:
         for k, trace in enumerate(traces):
             plant, run = self.staged(trace, k, rate, None)
             path, clock = motions[k], {key: v for key, v in run.items() if key != "start"}
-            plants = [other.plant(k) for other in others]
+            plants = [other.plant(k, trace.supply) for other in others]
             moved = plant.tangents(trace.t, trace.u, path, plants, scale, **clock)
             here, unseen = self.shown(trace, plant, path), np.flatnonzero(~trace.valid)
             for other, its, move, row in zip(others, plants, moved, changes[:, ends[k]:ends[k + 1]]):
@@ -276,7 +276,7 @@ class Model:
 
     def staged(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
         """The plant of a recording, and how it is run along it; ``start`` is the (reading, speed) it begins with, the trace's own if None."""
-        (gain, every), shift, plant = observer_gain(rate, trace.sample_time), self.offset(record), self.plant(record)
+        (gain, every), shift, plant = observer_gain(rate, trace.sample_time), self.offset(record), self.plant(record, trace.supply)
         theta, omega = trace.start if start is None else start
         drive = 0.0 if omega == 0 else plant.coefficients.b * trace.u[0] - plant.coefficients.a_emf * omega
         return plant, {"start": (plant.behind(theta - shift), omega, drive), "enable": trace.enable, "load": trace.load,

@@ -40,8 +40,8 @@ class Rig:
 
     def free_run(self, model: Model, trace: Trace) -> np.ndarray:
         """Output (N,) of the MuJoCo plant under a recording's input, from the initial state that the reduced model fits."""
-        _, run = model.staged(trace, 0, 0.0, fitted_start(model, trace))
-        return self.plant(model).simulate(trace.t, trace.u, run["start"], enable=trace.enable, load=trace.load).measured
+        reduced, run = model.staged(trace, 0, 0.0, fitted_start(model, trace))
+        return self.plant(model).simulate(trace.t, reduced.fed(trace.u), run["start"], enable=trace.enable, load=trace.load).measured
 
     def rmse(self, models: Sequence[Model], parts: Sequence[Fold], jobs: int) -> float | None:
         """Pooled free-run error [output unit] of the MuJoCo plants on what each model has not seen (see run_in_mujoco); None where one runs away."""

@@ -23,7 +23,7 @@ from ers_mj.plants.reduced import Motion, ReducedModel, lumped
 PER_INERTIA = {"torque": "", "damping": " s/{y}", "stiffness": "/{y}", "drag": " s^2/{y}^2", "cubic": "/{y}^3"}
 LUMPED_UNIT = {"torque": "{y}/s^2", "damping": "1/s", "stiffness": "1/s^2", "drag": "1/{y}", "cubic": "1/({y}^2 s^2)"}
 PLAIN_UNIT = {"position": "{y}", "speed": "{y}/s", "acceleration": "{y}/s^2", "input": "{u}", "time": "s",
-              "frequency": "Hz", "phase": "rad", "ratio": "-", "count": "-", "per_position": "1/{y}", "per_position_squared": "1/{y}^2"}
+              "frequency": "Hz", "phase": "rad", "ratio": "-", "count": "-", "per_position": "1/{y}", "per_position_squared": "1/{y}^2", "supply": "V"}
 FORCE = {"rad": "N m", "m": "N"}
 AFTER_NOISE = ("sensor_quantisation", "sensor_dropout")  # what the converter and the wire do to a noisy signal
 
@@ -198,6 +198,8 @@ def parse_effect(text: str) -> tuple[str, dict[str, float]]:
             raise InputError(f"--effect {text}: {key} is given twice")
         values[key] = _number(value, f"--effect {text}: {key}")
     _vector(effect, values, 1.0)
+    if recorded := [p.name for p in effect.parameters if p.recorded and p.name in values]:
+        raise InputError(f"--effect {text}: {recorded[0]} acts through what a recording measured, of which a simulation has none")
     return effect.name, values
 
 

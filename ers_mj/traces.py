@@ -16,6 +16,8 @@ BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
 START_SAMPLES = 10
 FEWEST_SEEN = 6  # samples that a start is told from
+KNOWN = 0.8  # share of the samples that a further sensor must have seen
+LEAST_SAG = 0.005  # of the supply, from which it varies
 FIRST = 2  # changes by which a speed at the start must show
 SURE_SPEED = 3.0  # standard deviations within which a speed at the start may lie
 
@@ -33,7 +35,8 @@ class Channel:
 class Trace:
     """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the (reading, speed) it starts with, and the spans that its sensor lost.
 
-    ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output.
+    ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output. ``supply`` is the measured one
+    [V] (N,), None where none was measured or it does not vary.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Trace:
     counts: np.ndarray
     lost: tuple[slice, ...] = ()
     channels: tuple[Channel, ...] = ()
+    supply: np.ndarray | None = None
 
     @cached_property
     def sample_time(self) -> float:
@@ -67,7 +71,7 @@ class Trace:
         pick = lambda a: None if a is None else a[cut]  # noqa: E731
         made = make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
                           pick(self.load), self.sigma, self.quantum)
-        return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels))
+        return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels), supply=pick(self.supply))
 
     def without(self, spans: Sequence[slice]) -> Trace:
         """The trace with further spans lost."""
@@ -77,7 +81,7 @@ class Trace:
         for span in spans:
             valid[span] = False
         made = make_trace(self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum)
-        return replace(made, start=self.start, channels=self.channels, lost=(*self.lost, *spans))
+        return replace(made, start=self.start, channels=self.channels, supply=self.supply, lost=(*self.lost, *spans))
 
     @property
     def seen(self) -> np.ndarray:
@@ -102,7 +106,16 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     lost = (*spikes(np.where(recording.valid, y, np.nan), sigma), *stuck)
     trace = make_trace(recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum)
     trace = trace.without(lost)
-    return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid))
+    return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid), supply=_supply(recording))
+
+
+def _supply(recording: Recording) -> np.ndarray | None:
+    """The measured supply [V] (N,), a missing sample between its neighbours; None where hardly any is known or it does not vary."""
+    if recording.vin is None or (known := np.isfinite(recording.vin)).mean() < KNOWN:
+        return None
+    supply = np.interp(recording.t, recording.t[known], recording.vin[known])
+    low, level, high = np.quantile(supply, (0.02, 0.5, 0.98))
+    return supply if low > 0.0 and high - low > LEAST_SAG * level else None
 
 
 def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
@@ -115,7 +128,7 @@ def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
         if values is None or recording.output_unit != "rad" and kind != "current":
             continue
         known = np.isfinite(values)
-        if known.mean() < 0.8 or np.ptp(values[known]) == 0:
+        if known.mean() < KNOWN or np.ptp(values[known]) == 0:
             continue
         if kind == "speed" and not _integrates(recording, values):
             continue

@@ -55,3 +55,37 @@ def test_the_current_says_on_which_side_of_the_motor_a_delay_lies(name, size):
     assert document["missing"][0]["effect"] == name
     assert document["missing"][0]["alternatives"] == []
     assert "n K_t/J" in document["parameters"]
+
+
+def sagging(told):
+    """Three recordings of a servo whose supply sinks with what it draws and with time; ``told`` is what is written down as the input and the supply."""
+    out = []
+    for k, name in enumerate(("multisine", "steps", "chirp")):
+        u, rng = np.round(INPUTS[name](T), 4), np.random.default_rng(k)
+        supply = 1.0 - 0.02 * np.abs(u) / np.max(np.abs(u)) - 0.01 * T - 0.02 * (np.sin(3.0 * T + k) > 0.3)
+        motion = ReducedModel(lumped(TRUTH)).simulate(T, u * supply)
+        u, vin = told(u, 24.0 * supply + 0.02 * rng.standard_normal(T.size))
+        out.append(from_arrays(T, u, motion.measured + NOISE["theta"] * rng.standard_normal(T.size), name=f"{name}.csv", vin=vin))
+    return out
+
+
+def test_a_measured_supply_is_what_the_motor_sees():
+    document = diagnose(sagging(lambda u, vin: (u, vin)), read_datasheet("table1"), jobs=1).document
+    (found,) = document["missing"]
+    assert found["effect"] == "supply_sag" and found["subsystem"] == "drive" and "measured changes" in found["sentence"]
+    assert found["parameters"]["measured"]["value"] == pytest.approx(1.0, abs=0.1)
+    assert document["fit"]["heldout_rmse_after_rad"] < 1.3 * NOISE["theta"] < document["fit"]["heldout_rmse_before_rad"]
+    assert document["fit"]["mujoco_heldout_rmse_after_rad"] < 0.5 * document["fit"]["mujoco_heldout_rmse_before_rad"]
+
+
+def test_a_supply_that_the_input_holds_already_is_no_effect():
+    document = diagnose(sagging(lambda u, vin: (u * vin / 24.0, vin)), read_datasheet("table1"), jobs=1).document
+    assert document["missing"] == [] and not document["remainder"]["significant"]
+
+
+def test_a_supply_that_is_steady_or_hardly_known_is_left_out():
+    t, u = T, INPUTS["multisine"](T)
+    steady, holed = 24.0 + 0.01 * np.sin(t), np.where(np.sin(9.0 * t) > 0.0, np.nan, 24.0 + np.sin(t))
+    assert all(trace_of(from_arrays(t, u, np.sin(t), vin=vin), None).supply is None for vin in (steady, holed, -24.0 + np.sin(t)))
+    seen = trace_of(from_arrays(t, u, np.sin(t), vin=np.where(t == 1.0, np.nan, 24.0 + np.sin(t))), None)
+    assert np.isfinite(seen.supply).all() and seen.part(10, 90).supply.size == 80 and seen.without([slice(3, 5)]).supply is seen.supply

@@ -76,7 +76,7 @@ class Scales:
     friction level (or the drive's, where there is none), ``input`` the peak |u|, ``sample_time`` [s], ``noise`` and
     ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
     recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
-    behind a known gear, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
+    behind a known gear, ``supply`` the median [V] of one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
     """
 
     position: float
@@ -91,6 +91,7 @@ class Scales:
     is_angle: bool
     tau_e_datasheet: float | None = None
     cog: float = np.inf
+    supply: float | None = None
     duration: float = 10.0
     recordings: int = 1
     hot: tuple[tuple[int, float, float], ...] = ()
@@ -101,9 +102,9 @@ class Parameter:
     """One number of an effect.
 
     ``kind`` names its dimension: torque, damping, stiffness, drag, cubic (all carried per inertia), position, speed,
-    input, time, frequency, phase, ratio, count, per_position, per_position_squared. ``positive`` parameters are fitted in their
+    input, time, frequency, phase, ratio, count, per_position, per_position_squared, supply. ``positive`` parameters are fitted in their
     logarithm; those not ``fitted`` keep the value they start with; those ``per_record`` are another number in every recording; those
-    ``on_travel`` are places that the travel reaches, or nearly.
+    ``on_travel`` are places that the travel reaches, or nearly; those ``recorded`` act through what a recording measured, so that ``--effect`` has no such.
     """
 
     name: str
@@ -116,6 +117,7 @@ class Parameter:
     fitted: bool = True
     per_record: bool = False
     on_travel: bool = False
+    recorded: bool = False
 
 
 @dataclass(frozen=True)
@@ -206,6 +208,10 @@ class Effect:
 
     def command(self, p: np.ndarray, u: np.ndarray) -> np.ndarray:
         """What the motor's terminals see (N,) of the command u (N,)."""
+        return u
+
+    def fed(self, p: np.ndarray, u: np.ndarray, supply: np.ndarray) -> np.ndarray:
+        """What the drive makes of the command u (N,) from a measured supply [V] (N,)."""
         return u
 
     def measure(self, p: np.ndarray, t: np.ndarray, y: np.ndarray) -> np.ndarray:

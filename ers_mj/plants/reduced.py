@@ -45,11 +45,13 @@ class Motion:
 class ReducedModel:
     """Eq. (6)'s coefficients and the effects on top of them.
 
-    ``effects`` is a sequence of (name, parameters (k,)); torques are carried per inertia (see effects/base.py).
+    ``effects`` is a sequence of (name, parameters (k,)); torques are carried per inertia (see effects/base.py). ``supply`` is what a recording
+    measured of it [V] (N,), or None.
     """
 
     coefficients: Coefficients
     effects: Sequence[tuple[str, np.ndarray]] = ()
+    supply: np.ndarray | None = field(default=None, repr=False, compare=False)
     _lowered: tuple = field(init=False, repr=False, compare=False)
 
     def __post_init__(self):
@@ -68,8 +70,15 @@ class ReducedModel:
         """Whether there is a second body."""
         return Coefficients(*self._lowered[0]).two_body > 0
 
+    def fed(self, u: np.ndarray) -> np.ndarray:
+        """What a drive makes of the command u (N,) whose supply varies as it was measured."""
+        for name, values in self.effects if self.supply is not None else ():
+            u = BY_NAME[name].fed(values, u, self.supply)
+        return u
+
     def terminal(self, u: np.ndarray) -> np.ndarray:
         """The input (N,) that is left of the command u (N,) after the drive's static effects."""
+        u = self.fed(u)
         for name, values in self.effects:
             u = BY_NAME[name].command(values, u)
         return np.ascontiguousarray(u, float)
