@@ -249,10 +249,12 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT:
                 base, current, mended = base if current.model.names else again, again, mended + 1
                 continue
-        if not current.model.names and _leaves_more(ranked, current, least, traces):
-            ranked = _likeliest_first(sorted([*ranked, *_swept(current, ranked, traces, tau, exclude, jobs)], key=lambda c: -c.worth))
+        least_z = LATER_Z if current.model.names else LEAST_Z
+        if not (ranked and _asked_for(ranked[0], least, least_z)) and _is_cheap_and_wrong(current, base, traces):
+            found = _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs)
+            ranked = _likeliest_first(sorted([*ranked, *found], key=lambda c: -c.worth))
         rounds.append(tuple(ranked))
-        if not ranked or not _asked_for(ranked[0], least, LATER_Z if current.model.names else LEAST_Z):
+        if not ranked or not _asked_for(ranked[0], least, least_z):
             break
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
@@ -264,16 +266,14 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     return Selection(base, current, tuple(rounds), tau)
 
 
-def _leaves_more(ranked: Sequence[Candidate], current: Fit, least: float, traces: Sequence[Trace]) -> bool:
-    """Whether something is missing that the best candidate, if it is asked for, does not explain."""
-    without = left_by_sensor(current.model, traces)
-    if not ranked or not _asked_for(ranked[0], least, LEAST_Z):
-        return more_is_missing(without, None)
-    return more_is_missing(left_by_sensor(ranked[0].fit.model, traces), without)
+def _is_cheap_and_wrong(current: Fit, base: Fit, traces: Sequence[Trace]) -> bool:
+    """Whether a model of one body, which is simulated fast, leaves more than noise (see remainder.py)."""
+    without = left_by_sensor(base.model, traces) if current.model.names else None
+    return not current.model.plant().coupled and more_is_missing(left_by_sensor(current.model, traces), without)
 
 
 def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int) -> list[Candidate]:
-    """What the candidates of a screening missed: where stick and slip fork, the secant of the very effect that acts may promise nothing.
+    """What a screening missed when it found nothing to add: where stick and slip fork, the secant of the very effect that acts may promise nothing.
 
     Every effect that is cheap to simulate and has few starts is refitted from these as they are, whatever they make worse on the way; those are returned that
     gain more than the screening's refit of the same effect.
