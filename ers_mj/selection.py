@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.effects import BY_NAME
+from ers_mj.effects import BY_NAME, EQUIVALENT
 from ers_mj.identification import Fit, converged, fit, hopped, near_noise, score, tau_of
 from ers_mj.isolability import PARAMETER_PRICE, probabilities
 from ers_mj.model import STATES
@@ -205,7 +205,8 @@ def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
-    """Of rivals the most probable leads (see isolability.probabilities): which of them the worth prefers may rest on one stick or slip.
+    """Of rivals the most probable leads (see isolability.probabilities), together with those that are one with it (effects.EQUIVALENT): which of them the
+    worth prefers may rest on one stick or slip.
 
     What has a clock of its own (a gust, a knock) or differs from recording to recording leads only where no law of the servo itself explains
     CLOCKED of what it does: a swing bends to whatever a repeated excitation leaves over, a friction of each recording's own to any law of its speed.
@@ -217,7 +218,8 @@ def _likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
         ranked = sorted(ranked, key=lambda c: c not in lawful)
     rivals = _rivals(ranked) or ranked[:1]
     chances = probabilities({c.name: c.fit for c in rivals})
-    first = max(rivals, key=lambda c: (not _clocked(c), chances[c.name]))
+    kinds = {c.name: next((group for group in EQUIVALENT if c.name in group), {c.name}) for c in rivals}
+    first = max(rivals, key=lambda c: (not _clocked(c), sum(chances[name] for name in kinds[c.name] if name in chances), chances[c.name]))
     return [first, *(c for c in ranked if c is not first)]
 
 
