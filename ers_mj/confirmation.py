@@ -19,7 +19,6 @@ from ers_mj.traces import START, Blocks, Trace
 
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
 SURE_P = 1e-3  # up to which it is beyond doubt
-ALONE = 0.6  # share of an effect's gain in one recording, from which it is judged within that one as well
 CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
 WORSE = 1.3  # times the raw error that an effect which only recalibration confirms, or blocks beyond doubt, may make of it
 HALF = 0.5  # share of the squared error that must go
@@ -48,16 +47,19 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         model = selection.chosen.model
         after_models = refits(model, parts, selection.tau, jobs)
         after = _scores(after_models, parts)
-        lesser, without, p, lesser_models = {}, {}, {}, {}
+        pairs, without, p, lesser_models = {}, {}, {}, {}
         for name in model.names:
             less = _without(name, model, start, selection.tau).model if len(model.names) > 1 else start.fit.model
             lesser_models[name] = refits(less, parts, selection.tau, jobs) if len(model.names) > 1 else base_models
-            lesser[name] = _scores(lesser_models[name], parts)
-            without[name] = pooled(lesser[name])
-            p[name] = paired_p(pooled(after).misfit, without[name].misfit, BY_NAME[name].once)
-            if p[name] > LARGEST_P and not held and len(start.traces) > 1:
-                p[name] = min(p[name], _p_within(model, less, start, selection.tau, jobs))
-        failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(after, lesser[n], p[n]))
+            lesser = _scores(lesser_models[name], parts)
+            without[name] = pooled(lesser)
+            p[name] = _p_of(name, after, lesser)
+            pairs[name] = after, lesser
+            if (p[name] > LARGEST_P or _no_closer(after, lesser, p[name])) and not held and len(start.traces) > 1:
+                halved = _halved(model, less, after, lesser, start, selection.tau, jobs)
+                if (chance := _p_of(name, *halved)) < LARGEST_P:
+                    p[name], pairs[name] = chance, halved
+        failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(*pairs[n], p[n]))
                   and not _halves(pooled(after), without[n], parts)
                   and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))
                   or _may_be_none(n, model, start.traces, selection.tau)]
@@ -66,6 +68,10 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         worst = max(failed, key=lambda n: p[n])
         reduced = _without(worst, model, start, selection.tau)
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
+
+
+def _p_of(name: str, after: Sequence[Score], without: Sequence[Score]) -> float:
+    return paired_p(pooled(after).misfit, pooled(without).misfit, BY_NAME[name].once)
 
 
 def _no_closer(after: Sequence[Score], without: Sequence[Score], p: float) -> bool:
@@ -100,18 +106,20 @@ def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -
     return all(abs(z[k]) <= widths[k] for k, f in enumerate(layout) if f.owner == name and f.name == size)
 
 
-def _p_within(model: Model, less: Model, start: Start, tau: float, jobs: int) -> float:
-    """The p-value of an effect that one recording shows, within it: left out as a whole, it leaves nothing to learn the effect from.
+def _halved(model: Model, less: Model, after: Sequence[Score], without: Sequence[Score], start: Start, tau: float,
+            jobs: int) -> tuple[list[Score], list[Score]]:
+    """The scores with and without an effect, the recording that teaches most of it held out by halves: left out as a whole, it leaves little to learn the effect from.
 
-    Either half of that recording is held out in turn. 1 where no recording holds ALONE of the gain, or where the halves' free runs do not improve.
+    It is the one in which the effect's gain falls most from where all recordings were fitted to where the others were.
     """
     traces = list(start.traces)
-    won = np.array([float(np.sum(score(_misfit(less, t, k), tau) - score(_misfit(model, t, k), tau))) for k, t in enumerate(traces)])
-    if not won.max() >= ALONE * np.maximum(won, 0.0).sum() > 0.0:
-        return 1.0
-    parts = halves(traces, int(np.argmax(won)))
-    after, before = (pooled(_scores(refits(some, parts, tau, jobs), parts)) for some in (model, less))
-    return paired_p(after.misfit, before.misfit) if after.rmse < before.rmse else 1.0
+    fitted = [float(np.sum(score(_misfit(less, t, k), tau) - score(_misfit(model, t, k), tau))) for k, t in enumerate(traces)]
+    held = [float(np.sum(score(b.misfit, tau) - score(a.misfit, tau))) for a, b in zip(after, without, strict=True)]
+    record = int(np.argmax(np.subtract(fitted, held)))
+    parts = halves(traces, record)
+    within = (_scores(refits(some, parts, tau, jobs), parts) for some in (model, less))
+    both = [[*known[:record], *known[record + 1:], *new] for known, new in zip((list(after), list(without)), within)]
+    return both[0], both[1]
 
 
 def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:

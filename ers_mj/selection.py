@@ -43,6 +43,7 @@ NEAR_LEAST = 0.5  # share of the gain that matters below which the best first re
 NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
+AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often
@@ -278,7 +279,7 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
     """What a screening missed when it found nothing to add: where stick and slip fork, the secant of the very effect that acts may promise nothing.
 
     Every effect that is cheap to simulate and has few starts is refitted from these as they are, whatever they make worse on the way; those are returned that
-    gain more than the screening's refit of the same effect.
+    gain more than the screening's refit of the same effect. One with several numbers at their bounds is none: a shaft of 1000 Hz without a resonance.
     """
     effects = [effect for effect in BY_NAME.values() if not effect.dear and not effect.once and effect.name not in exclude]
     starts = [(effect.name, start) for effect in effects if len(few := effect.starts(base.model.scales)) < BY_SCREEN for start in few]
@@ -292,7 +293,8 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
         for candidate in pool.map(refitted, starts):
             if candidate.gain > max(known.get(candidate.name, 0.0), best[candidate.name].gain if candidate.name in best else 0.0):
                 best[candidate.name] = candidate
-        return list(pool.map(lambda c: judged(c.name, fit(c.fit.model, traces, tau=tau, steps=20), base, tau), best.values()))
+        ended = list(pool.map(lambda c: judged(c.name, fit(c.fit.model, traces, tau=tau, steps=20), base, tau), best.values()))
+    return [c for c in ended if sum(c.fit.model.at_bound(f) for f in c.fit.model.layout() if f.owner == c.name) <= AT_BOUND]
 
 
 def _most_rounds(current: Fit) -> int:
