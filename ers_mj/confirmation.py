@@ -27,7 +27,10 @@ EDGE = 0.1  # [s] at either end of a recording, in which few samples bear a knoc
 
 @dataclass(frozen=True)
 class Confirmed:
-    """What held-out data says: scores before and after, without each effect, and the p-value of each effect."""
+    """What held-out data says: scores before and after, without each effect, and the p-value of each effect.
+
+    ``shown`` are the scores before and after with the noise of what was held out, by halves where an effect was judged so.
+    """
 
     before: list[Score]
     after: list[Score]
@@ -37,6 +40,7 @@ class Confirmed:
     base_models: list[Model]
     parts: list[Fold]
     sentence: str
+    shown: list[tuple[Score, Score, float]]
 
 
 def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) -> tuple[Selection, Confirmed]:
@@ -47,7 +51,7 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         model = selection.chosen.model
         after_models = refits(model, parts, selection.tau, jobs)
         after = _scores(after_models, parts)
-        pairs, without, p, lesser_models = {}, {}, {}, {}
+        pairs, without, p, lesser_models, by_halves = {}, {}, {}, {}, set()
         for name in model.names:
             less = _without(name, model, start, selection.tau).model if len(model.names) > 1 else start.fit.model
             lesser_models[name] = refits(less, parts, selection.tau, jobs) if len(model.names) > 1 else base_models
@@ -56,15 +60,23 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
             p[name] = _p_of(name, after, lesser)
             pairs[name] = after, lesser
             if (p[name] > LARGEST_P or _no_closer(after, lesser, p[name])) and not held and len(start.traces) > 1:
-                halved = _halved(model, less, after, lesser, start, selection.tau, jobs)
+                record, *halved = _halved(model, less, after, lesser, start, selection.tau, jobs)
                 if (chance := _p_of(name, *halved)) < LARGEST_P:
                     p[name], pairs[name] = chance, halved
+                    by_halves.add(record)
         failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(*pairs[n], p[n]))
                   and not _halves(pooled(after), without[n], parts)
                   and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))
                   or _may_be_none(n, model, start.traces, selection.tau)]
         if not failed:
-            return selection, Confirmed(_scores(base_models, parts), after, without, p, after_models, base_models, parts, sentence)
+            before = _scores(base_models, parts)
+            shown = [(b, a, fold.held_out.sigma) for b, a, fold in zip(before, after, parts) if fold.record not in by_halves]
+            for record in sorted(by_halves):
+                cut = halves(start.traces, record)
+                ends = (_scores(refits(some, cut, selection.tau, jobs), cut) for some in (start.fit.model, model))
+                shown += [(b, a, fold.held_out.sigma) for b, a, fold in zip(*ends, cut)]
+                sentence += f"; {start.traces[record].name}, which teaches most of an effect, by halves as well"
+            return selection, Confirmed(before, after, without, p, after_models, base_models, parts, sentence, shown)
         worst = max(failed, key=lambda n: p[n])
         reduced = _without(worst, model, start, selection.tau)
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
@@ -107,8 +119,8 @@ def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -
 
 
 def _halved(model: Model, less: Model, after: Sequence[Score], without: Sequence[Score], start: Start, tau: float,
-            jobs: int) -> tuple[list[Score], list[Score]]:
-    """The scores with and without an effect, the recording that teaches most of it held out by halves: left out as a whole, it leaves little to learn the effect from.
+            jobs: int) -> tuple[int, list[Score], list[Score]]:
+    """A recording, and the scores with and without an effect where this one, which teaches most of it, is held out by halves: left out as a whole, it leaves little to learn the effect from.
 
     It is the one in which the effect's gain falls most from where all recordings were fitted to where the others were.
     """
@@ -118,8 +130,8 @@ def _halved(model: Model, less: Model, after: Sequence[Score], without: Sequence
     record = int(np.argmax(np.subtract(fitted, held)))
     parts = halves(traces, record)
     within = (_scores(refits(some, parts, tau, jobs), parts) for some in (model, less))
-    both = [[*known[:record], *known[record + 1:], *new] for known, new in zip((list(after), list(without)), within)]
-    return both[0], both[1]
+    with_it, without_it = ([*known[:record], *known[record + 1:], *new] for known, new in zip((list(after), list(without)), within))
+    return record, with_it, without_it
 
 
 def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:

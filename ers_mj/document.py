@@ -145,11 +145,11 @@ class Case:
         return max(*shares, self._explained_each())
 
     def _explained_each(self) -> float:
-        """The mean of that share over the held-out recordings whose error without the effects is above the noise."""
+        """The mean of that share over the held-out recordings, or halves of one, whose error without the effects is above the noise."""
         shares = []
-        for before, after, fold in zip(self.confirmed.before, self.confirmed.after, self.confirmed.parts):
-            above, left = (s.rmse**2 - fold.held_out.sigma**2 for s in (before, after))
-            if before.rmse > VISIBLE * fold.held_out.sigma:
+        for before, after, noise in self.confirmed.shown:
+            above, left = (s.rmse**2 - noise**2 for s in (before, after))
+            if before.rmse > VISIBLE * noise:
                 shares.append(min(max(1.0 - left / above, 0.0), 1.0))
         return float(np.mean(shares)) if shares else 0.0
 
