@@ -95,17 +95,14 @@ class Case:
         """The document, the evidence and the model."""
         base, model, traces = self.start.fit.model, self.model, self.start.traces
         samples = gather(base, model, traces)
-        fits, record_state = self._fits(), self._record_state(held)
-        explained = self._explained(fits)
-        verdict = self._verdict(explained)
-        missing = self._missing() if verdict == "missing_physics" else []
+        verdict, missing, record_state = self._verdict(), self._missing(), self._record_state(held)
         spectrum = over_frequency(samples, traces)
         found = places(samples, traces, self.selection.rounds, self.start.fit.cost, [m["effect"] for m in missing], self.output_unit,
                        self.input_unit, spectrum)
         document = {
-            "version": 1, "verdict": verdict, "sentence": self._sentence(verdict, missing, fits, found, explained),
+            "version": 1, "verdict": verdict, "sentence": self._sentence(verdict, missing, found),
             "where": [] if verdict == "consistent" else [self._place(p) for p in found],
-            "missing": missing, "remainder": self._remainder(verdict, explained), "record_state": record_state, "fit": fits,
+            "missing": missing, "remainder": self._remainder(verdict), "record_state": record_state, "fit": self.fits,
             "parameters": self._parameters(), "next_recording": next_recording(*self._rivals(), self.start.traces, self.input_unit, self.output_unit),
             "data": self._data(), "seed": self.seed, "versions": _versions(),
         }
@@ -115,12 +112,13 @@ class Case:
         views = self._views(samples, verdict)
         evidence = Evidence(tuple(views), tuple(self._ladder()), residual_map(samples), self.noise, self.output_unit,
                             self.recordings[0].input_unit, spectrum)
-        plant = self.rig.plant(model if verdict == "missing_physics" else base)
-        return Diagnosis(document, evidence, self._improved(verdict), plant)
+        return Diagnosis(document, evidence, self._improved(), self.rig.plant(model if self.told_effects else base))
 
     # numbers
 
-    def _fits(self) -> dict:
+    @cached_property
+    def fits(self) -> dict:
+        """The errors before and after, as diagnosis.json has them."""
         c, base, model = self.confirmed, self.start.fit.model, self.model
         train = [pooled([scored(m, t, k) for k, t in enumerate(self.start.traces)]).rmse for m in (base, model)]
         again = [[recalibrated(m, fold.held_out)[0] for m, fold in zip(models, c.parts)] for models in (c.base_models, c.models)]
@@ -132,7 +130,8 @@ class Case:
                 "mujoco_heldout_from": f"the MuJoCo plant ran {', '.join(fold.held_out.name for fold in run_in_mujoco(c.parts))} of what was held out",
                 "selection_cost_before": self.start.fit.cost, "selection_cost_after": self.selection.chosen.cost}
 
-    def _explained(self, fits: dict) -> float:
+    @cached_property
+    def explained(self) -> float:
         """Share of the squared held-out free-run error above the noise that the named effects take away.
 
         Where the rig has changed between the days (held-out recordings of their own), raw or recalibrated, whichever tells more. Where stick
@@ -140,28 +139,31 @@ class Case:
         """
         shares = []
         for kind in ("heldout", "recalibrated") if self.holdout else ("heldout",):
-            above, left = (fits[f"{kind}_rmse_{when}_rad"] ** 2 - self.noise**2 for when in ("before", "after"))
+            above, left = (self.fits[f"{kind}_rmse_{when}_rad"] ** 2 - self.noise**2 for when in ("before", "after"))
             shares.append(min(max(1.0 - left / above, 0.0), 1.0) if above > 0 else 0.0)
         return max(*shares, self._explained_each())
 
     def _explained_each(self) -> float:
-        """The mean of that share over the held-out recordings, or halves of one, whose error without the effects is above the noise."""
-        shares = []
-        for before, after, noise in self.confirmed.shown:
-            above, left = (s.rmse**2 - noise**2 for s in (before, after))
-            if before.rmse > VISIBLE * noise:
-                shares.append(min(max(1.0 - left / above, 0.0), 1.0))
-        return float(np.mean(shares)) if shares else 0.0
+        """The mean of that share over the held-out recordings, or halves of one, whose error without the effects is above the noise.
+
+        One whose free run is lost with and without them (ASTRAY) tells nothing, as long as there are others.
+        """
+        above = [(b.rmse / noise, a.rmse / noise) for b, a, noise in self.confirmed.shown if b.rmse > VISIBLE * noise]
+        told = [ends for ends in above if min(ends) < ASTRAY] or above
+        return float(np.mean([min(max(1.0 - (a**2 - 1.0) / (b**2 - 1.0), 0.0), 1.0) for b, a in told])) if told else 0.0
 
     def _more_is_missing(self) -> bool:
         return more_is_missing(self.left, left_by_sensor(self.start.fit.model, self.start.traces) if self.model.names else None)
 
-    def _verdict(self, explained: float) -> str:
-        if self.sensors and not self.model.names:
+    @property
+    def told_effects(self) -> tuple[str, ...]:
+        """The effects that are named: those of the model, if they account for half of what the baseline leaves."""
+        return self.model.names if self.explained >= HALF else ()
+
+    def _verdict(self) -> str:
+        if self.told_effects or self.sensors:
             return "missing_physics"
-        if self.model.names:
-            return "missing_physics" if explained >= HALF else "unexplained"
-        if self._more_is_missing() or self._astray():
+        if self.model.names or self._more_is_missing() or self._astray():
             return "unexplained"
         return "consistent" if self._datasheet_explains() else "parameters_only"
 
@@ -180,7 +182,7 @@ class Case:
 
     def _missing(self) -> list[dict]:
         sensors = [self._symptom(name, values) for name, values in self.sensors.items()]
-        effects = [self._effect(name) for name in self.model.names]
+        effects = [self._effect(name) for name in self.told_effects]
         effects.sort(key=lambda e: (BY_NAME[e["effect"]].once, -float(np.sum(score(self.confirmed.without[e["effect"]].misfit, 1.0)))))
         return effects + sensors
 
@@ -329,7 +331,8 @@ class Case:
 
     # words
 
-    def _sentence(self, verdict: str, missing: list, fits: dict, found: list[Place], explained: float) -> str:
+    def _sentence(self, verdict: str, missing: list, found: list[Place]) -> str:
+        fits = self.fits
         before, after = (_shown(fits[f"heldout_rmse_{w}_rad"], self.output_unit) for w in ("before", "after"))
         if verdict == "consistent":
             return "The datasheet's model explains these recordings within their noise: nothing is missing."
@@ -337,7 +340,7 @@ class Case:
             return "Only the numbers were off: with refitted parameters the model explains these recordings within their noise."
         if verdict == "missing_physics":
             names = "; ".join(m["sentence"] for m in missing)
-            if not self.model.names:
+            if not self.told_effects:
                 return f"Only the sensor shows: {names}."
             told = "held-out error"
             if fits["heldout_rmse_after_rad"] > math.sqrt(HALF) * fits["heldout_rmse_before_rad"] and self.holdout:
@@ -345,15 +348,15 @@ class Case:
                 before, after = (_shown(fits[f"recalibrated_rmse_{w}_rad"], self.output_unit) for w in ("before", "after"))
             return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
         place = next((p.sentence for p in found if p.axis != "subsystem"), "")
-        return (f"Something acts here that no effect of the library accounts for (the best explains {explained:.0%} of the held-out "
+        return (f"Something acts here that no effect of the library accounts for (the best explains {self.explained:.0%} of the held-out "
                 f"error); {place or 'it is spread over the whole record'}.")
 
-    def _remainder(self, verdict: str, explained: float) -> dict:
-        significant = verdict == "unexplained" or self._more_is_missing()
+    def _remainder(self, verdict: str) -> dict:
+        significant = verdict == "unexplained" or self.told_effects != self.model.names or self._more_is_missing()
         words = "nothing beyond the noise is left" if not significant else "a mismatch is left that nothing named accounts for"
         left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in self.left.items()}
-        return {"explained_share": explained, "significant": significant, "left_sigma": left_sigma,
-                "sentence": f"{explained:.0%} of the squared held-out error above the noise is explained; {words}."}
+        return {"explained_share": self.explained, "significant": significant, "left_sigma": left_sigma,
+                "sentence": f"{self.explained:.0%} of the squared held-out error above the noise is explained; {words}."}
 
     @staticmethod
     def _place(p: Place) -> dict:
@@ -400,16 +403,15 @@ class Case:
                            "" if candidate.name in BY_NAME else "differs between recordings", candidate.fit.size)
             taken = ranked[0].fit.model.names if ranked else taken
 
-    def _improved(self, verdict: str) -> Datasheet:
+    def _improved(self) -> Datasheet:
         """The improved model: refitted lumped values in [lumped], effects in a reader's units."""
         lumped = {k: float(self.model.values[k]) for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")}
         extra = {k: float(self.model.values[k]) for k in ("tau_e", "emf_share")}
         effects = []
-        for name in (self.model.names if verdict == "missing_physics" else ()):
+        for name in self.told_effects:
             entries = {p["name"]: p["entry"]["value"] for p in self._effect_parameters(name)}
             effects.append((name, {k: v for k, v in entries.items() if v is not None}))
-        if verdict == "missing_physics":
-            effects += [(name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)}) for name, values in self.sensors.items()]
+        effects += [(name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)}) for name, values in self.sensors.items()]
         parameters = dict(self.datasheet.parameters) if self.datasheet is not None else {}
         return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
 

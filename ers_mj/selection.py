@@ -40,7 +40,7 @@ AGAIN = 0.1  # share of the best first refit's gain from which an effect is refi
 FAILED = 0.05  # share of the best first refit's gain below which a promise was none
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
-NEAR_TIE = 0.02  # share of the best one's gain within which candidates are rivals, which only converged fits can tell apart
+TIE, NEAR_TIE = 1.0, 0.02  # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
@@ -181,6 +181,11 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     return _likeliest_first(sorted(ranked, key=lambda c: -c.worth))
 
 
+def _priced(found: Fit) -> float:
+    """The cost and the price of the parameters."""
+    return found.cost + PARAMETER_PRICE * found.size
+
+
 def _attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
     """What C would fall by, were no block (B,) worse than the noise, or than half of them where that is less; beyond what noise makes of ``counts`` samples."""
     level = min(1.0, float(np.median(misfit)))
@@ -201,7 +206,7 @@ def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[st
 
 def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
     """The candidates that the best one does not beat clearly, itself among them."""
-    least = max(ranked[0].worth - max(1.0, NEAR_TIE * ranked[0].gain), 0.0)
+    least = max(ranked[0].worth - max(TIE, NEAR_TIE * ranked[0].gain), 0.0)
     return [c for c in ranked if c.worth > least]
 
 
@@ -214,18 +219,24 @@ def _likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
     """
     if not ranked:
         return ranked
-    if _clocked(ranked[0]):
-        lawful = [c for c in ranked if not _clocked(c) and c.gain >= CLOCKED * ranked[0].gain and c.z >= LEAST_Z]
+    if _clocked(ranked[0].name):
+        lawful = [c for c in ranked if not _clocked(c.name) and c.gain >= CLOCKED * ranked[0].gain and c.z >= LEAST_Z]
         ranked = sorted(ranked, key=lambda c: c not in lawful)
     rivals = _rivals(ranked) or ranked[:1]
-    chances = probabilities({c.name: c.fit for c in rivals})
-    kinds = {c.name: next((group for group in EQUIVALENT if c.name in group), {c.name}) for c in rivals}
-    first = max(rivals, key=lambda c: (not _clocked(c), sum(chances[name] for name in kinds[c.name] if name in chances), chances[c.name]))
+    name = _likeliest({c.name: c.fit for c in rivals})
+    first = next(c for c in rivals if c.name == name)
     return [first, *(c for c in ranked if c is not first)]
 
 
-def _clocked(candidate: Candidate) -> bool:
-    return candidate.name in STATES or BY_NAME[candidate.name].local
+def _likeliest(fits: Mapping[str, Fit]) -> str:
+    """The most probable of what is not clocked, or else of all; the probabilities of those that are one with it count as its own."""
+    chances = probabilities(fits)
+    kinds = {name: next((group for group in EQUIVALENT if name in group), {name}) for name in fits}
+    return max(fits, key=lambda name: (not _clocked(name), sum(chances[other] for other in kinds[name] if other in chances), chances[name]))
+
+
+def _clocked(name: str) -> bool:
+    return name in STATES or BY_NAME[name].local
 
 
 @dataclass(frozen=True)
@@ -265,7 +276,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         if not any(BY_NAME[name].dear for name in current.model.names):
             current, _ = hopped(current, traces, tau, jobs)
         if near_noise(current):
-            current = _exchanged(current, rounds[:-1], traces, tau, jobs)
+            current = _exchanged(current, rounds, traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau)
 
 
@@ -323,8 +334,8 @@ def _asked_for(candidate: Candidate, least: float, least_z: float) -> bool:
     return candidate.gain >= least and (candidate.z >= least_z or candidate.lost <= LOST * candidate.gain)
 
 
-def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
-    """With earlier effects exchanged for their rivals of that round where these do better beside what came later."""
+def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
+    """With earlier effects exchanged for rivals of their round that are likelier beside what came later; they lead their rounds then."""
     def instead(candidate):
         name = candidate.name
         model = without.with_effect(name, dict(candidate.fit.model.effects)[name])
@@ -332,16 +343,19 @@ def _exchanged(current: Fit, rounds: Sequence[Sequence[Candidate]], traces: Sequ
             model = replace(model, local={**model.local, name: candidate.fit.model.local[name]})
         return fit(model, traces, tau=tau, steps=12)
 
-    for ranked in rounds:
-        if ranked[0].name not in current.model.names:
+    for k, ranked in enumerate(rounds[:-1]):
+        leader = ranked[0].name
+        if leader not in current.model.names:
             continue
         rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names
                   and c.gain >= RIVAL * ranked[0].gain][:MOST_RIVALS]
-        without = current.model.without_effect(ranked[0].name)
+        without = current.model.without_effect(leader)
         with ThreadPoolExecutor(jobs) as pool:
-            best = min(pool.map(instead, rivals), key=lambda f: f.cost, default=current)
-        if best.cost < current.cost - LEAST_GAIN:
-            current = best
+            fits = {leader: current} | dict(zip((c.name for c in rivals), pool.map(instead, rivals)))
+        least = min(map(_priced, fits.values())) + TIE
+        if (name := _likeliest({n: found for n, found in fits.items() if _priced(found) < least})) != leader:
+            current = fits[name]
+            rounds[k] = tuple(sorted(ranked, key=lambda c: c.name != name))
     return current
 
 

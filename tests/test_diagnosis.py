@@ -91,17 +91,19 @@ def test_a_coarse_sensor_is_told_from_the_data():
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
 
 
-def test_what_the_library_has_no_name_for_is_unexplained():
-    """A torque that hops between two values at random times is no effect of the library."""
+@pytest.mark.parametrize("step", [0.0, np.radians(0.6)])
+def test_what_the_library_has_no_name_for_is_unexplained(step):
+    """A torque that hops between two values at random times is no effect of the library; a coarse sensor is told beside it."""
     rng = np.random.default_rng(4)
     out = []
     for k, r in enumerate(recordings()):
         hops = np.repeat(rng.choice([-25.0, 25.0], 40), 100)
         plant = ReducedModel(lumped(TRUTH))
         y = plant.theta(T, r.u, (TRUTH["theta_0"], 0.0), load=hops) + NOISE * rng.standard_normal(T.size)
-        out.append(from_arrays(T, r.u, y, name=r.name))
+        out.append(from_arrays(T, r.u, np.round(y / step) * step if step else y, name=r.name))
     document = diagnose(out, read_datasheet("table1")).document
-    assert document["verdict"] == "unexplained" or document["remainder"]["significant"]
+    assert document["remainder"]["significant"]
+    assert ("sensor_quantisation" in [m["effect"] for m in document["missing"]]) is bool(step)
 
 
 def test_without_a_datasheet_everything_is_identified():
@@ -154,3 +156,10 @@ def test_where_every_free_run_is_lost_the_parameters_are_not_all_that_was_off(er
     scores = [Score(n * e**2, n, np.ones(1)) for e in errors]
     case = SimpleNamespace(confirmed=SimpleNamespace(before=scores, parts=[Fold(trace, None)] * len(errors)))
     assert Case._astray(case) is lost
+
+
+@pytest.mark.parametrize("lost, explained", [((60.0, 80.0), 0.99), ((20.0, 25.0), 0.495)])
+def test_a_free_run_that_is_lost_with_and_without_the_effects_tells_nothing(lost, explained):
+    n = 100
+    shown = [(*(Score(n * e**2, n, np.ones(1)) for e in ends), 1.0) for ends in ((10.0, np.sqrt(1.99)), lost)]
+    assert Case._explained_each(SimpleNamespace(confirmed=SimpleNamespace(shown=shown))) == pytest.approx(explained)

@@ -9,13 +9,13 @@ from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.errors import InputError
-from ers_mj.identification import residuals
+from ers_mj.identification import fit, residuals
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Screened, screen
-from ers_mj.selection import _swept
+from ers_mj.selection import _exchanged, _swept, judged
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -65,6 +65,18 @@ def test_of_two_alike_the_one_without_play_is_likelier(pushed):
     assert probabilities({"backlash": wide, "bias_torque": none})["backlash"] == pytest.approx(0.5, abs=0.01)
     better = replace(wide, misfit=wide.misfit * 0.8)
     assert probabilities({"backlash": better, "shaft_compliance": narrow})["backlash"] > 0.8
+
+
+def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(pushed):
+    """A constant torque and its asymmetric form are one; gravity, a third that does as well, is beaten by the two together."""
+    base, traces = pushed.fit, pushed.traces
+    ranked = tuple(judged(name, fit(base.model.with_effect(name, np.array(p)), traces), base, 1.0) for name, p in
+                   (("gravity_imbalance", [0.06, 0.0]), ("bias_torque", [0.06]), ("asymmetric_friction", [-0.06, 0.0])))
+    rounds = [ranked, ()]
+    found = _exchanged(ranked[0].fit, rounds, traces, 1.0, 1)
+    assert found.model.names == ("bias_torque",) and [c.name for c in rounds[0]][0] == "bias_torque" and len(rounds[0]) == 3
+    unlike = [(ranked[0], replace(ranked[1], gain=0.0), replace(ranked[2], gain=0.0)), ()]
+    assert _exchanged(ranked[0].fit, unlike, traces, 1.0, 1).model.names == ("gravity_imbalance",)
 
 
 def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):

@@ -18,7 +18,7 @@ class Backlash(Transmission):
             "shares of inertia, damping and friction on the rocker")
     parameters = (
         Parameter("gap", "position", "half-width of the play"),
-        Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.1, upper=0.9, absent=0.5),
+        Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.2, upper=0.9, absent=0.5),
         Parameter("phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1),
         Parameter("f_contact", "frequency", "contact's natural frequency", lower=40.0, upper=1000.0, absent=120.0),
         Parameter("zeta", "ratio", "contact's damping ratio", lower=0.05, upper=2.0, absent=0.2),

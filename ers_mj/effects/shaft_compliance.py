@@ -16,8 +16,8 @@ class ShaftCompliance(Transmission):
     mjcf = "stiffness and damping of the joint gap, without its limit; the shares of inertia, damping and friction on the rocker"
     parameters = (
         Parameter("f_shaft", "frequency", "natural frequency of the shaft's spring", lower=2.0, upper=1000.0, absent=np.inf),
-        Parameter("zeta", "ratio", "damping ratio of the shaft", lower=0.005, upper=2.0, absent=0.05),
-        Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.1, upper=0.9, absent=0.5),
+        Parameter("zeta", "ratio", "damping ratio of the shaft", lower=0.005, upper=0.7, absent=0.05),
+        Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.2, upper=0.9, absent=0.5),
         Parameter("phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1),
     )
     tries = 3
