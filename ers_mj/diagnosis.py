@@ -11,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from ers_mj.baseline import baseline
+from ers_mj.case import Case
 from ers_mj.confirmation import confirmed
 from ers_mj.datasheet import Datasheet
-from ers_mj.document import Case, Diagnosis
+from ers_mj.document import Diagnosis, told
 from ers_mj.identification import polished
 from ers_mj.model import MOST_TAU, Model
 from ers_mj.starts import without_spikes
@@ -63,7 +64,7 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
     progress("locating", 0.92)
     case = Case(recordings, list(holdout), datasheet, start, selection, judged, sensors, seed, rig, multibody)
-    return case.told(held)
+    return told(case, held)
 
 
 def _ordinary(model: Model) -> tuple[str, ...]:

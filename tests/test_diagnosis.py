@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ers_mj.case import Case
 from ers_mj.commands.output import plain
 from ers_mj.datasheet import Datasheet, read_datasheet, write_model
 from ers_mj.diagnosis import diagnose
-from ers_mj.document import Case
 from ers_mj.evaluation import Fold, Score
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
