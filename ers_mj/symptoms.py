@@ -13,6 +13,7 @@ ON_LATTICE = 0.18  # of a step by which a gap may miss a multiple of it: a coars
 ONE_STEP = 0.3  # of a step by which gaps of one step, seen through a finer converter, may differ
 LEAP = 3.0, 6.0, 1.5  # grid steps, noise levels and usual changes that the catching up after a held span must exceed at least
 LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
+WITHIN = 1.75  # times the smallest gap between rounded levels up to which a gap is one step of the converter ahead
 LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
 
 
@@ -112,12 +113,30 @@ def decimal_grain(levels: np.ndarray) -> float:
 
 
 def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
-    """The largest step that nine in ten differences of the levels are multiples of, within ON_LATTICE."""
+    """The largest step that nine in ten differences of the levels are multiples of, within ON_LATTICE; what two kinds of gap differ by may be it as well."""
     finest = 8 * max(grain, float(np.finfo(np.float32).eps) * np.abs(levels).max())
     gaps = np.diff(levels)
     gaps = gaps[gaps > finest / 8]
-    steps = [_refined(gaps, step) for step in np.quantile(gaps, LATTICE_QUANTILES) if step >= finest]
-    return max((step for step in steps if np.mean(_on_lattice(gaps, step)) >= 0.9), default=0.0)
+    usual = np.quantile(gaps, LATTICE_QUANTILES)
+    begun = {*usual, *np.abs(usual[:, None] - usual).ravel()}
+    steps = [_refined(gaps, step) for step in begun if step >= finest]
+    step = max((step for step in steps if np.mean(_on_lattice(gaps, step)) >= 0.9), default=0.0)
+    return _ahead(levels, step) or step
+
+
+def _ahead(levels: np.ndarray, step: float) -> float:
+    """The step of a coarser converter ahead of the one of this ``step``, which rounds its levels: neighbours are two or three steps apart then, never one.
+    0.0 where there is none.
+    """
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 0.5 * step]
+    if not step or gaps.min() < 1.5 * step:
+        return 0.0
+    coarse = float(np.mean(gaps[gaps < WITHIN * gaps.min()]))
+    counts = np.cumsum(np.rint(gaps / coarse))
+    slope, offset = np.polyfit(counts, np.cumsum(gaps), 1)
+    missed = np.abs(np.cumsum(gaps) - offset - slope * counts)
+    return float(slope) if missed.max() < step else 0.0
 
 
 def _on_lattice(gaps: np.ndarray, step: float) -> np.ndarray:
@@ -126,8 +145,11 @@ def _on_lattice(gaps: np.ndarray, step: float) -> np.ndarray:
 
 def _refined(gaps: np.ndarray, step: float) -> float:
     """The step by least squares over the gaps that are multiples of it, begun with the mean of those that may be one step."""
-    step = float(np.mean(gaps[np.abs(gaps - step) < ONE_STEP * step]))
+    alike = gaps[np.abs(gaps - step) < ONE_STEP * step]
+    step = float(np.mean(alike)) if alike.size else float(step)
     gaps = gaps[_on_lattice(gaps, step)]
+    if not gaps.size:
+        return step
     multiples = np.rint(gaps / step)
     return float(gaps @ multiples / (multiples @ multiples))
 

@@ -423,7 +423,7 @@ def test_a_converter_is_found_among_outliers():
     assert converter_step(np.round(y, 6)) == pytest.approx(step, rel=2e-3)
 
 
-@pytest.mark.parametrize("coarse, fine", [(0.0067, 5.113e-4), (0.001722, 2.5566e-4), (1.39806e-3, 2.5566e-4)])
+@pytest.mark.parametrize("coarse, fine", [(0.0067, 5.113e-4), (0.001722, 2.5566e-4), (1.39806e-3, 2.5566e-4), (7.3415e-4, 2.5566e-4), (8.795e-4, 1.2783e-4)])
 def test_a_coarse_step_counts_before_the_converter_behind_it(coarse, fine):
     y = np.round(np.round(travel(4000, 2e-4, 0) / coarse) * coarse / fine) * fine
     assert converter_step(np.round(y, 6)) == pytest.approx(coarse, rel=1e-2)
