@@ -25,6 +25,7 @@ from ers_mj.traces import Trace, trace_of
 
 FEWEST_LOST = 3  # dropouts from which a sensor is said to have them
 AT_BOUND = 0.95  # share of the most that the baseline allows of a known inductance, from which it may be more than an ordinary one
+MOST = 0.5  # of the noise's power
 COARSE = 1 / 300  # a converter whose step is more than this share of the travel is an effect, not an ordinary one
 
 Progress = Callable[[str, float], None]
@@ -51,7 +52,7 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     traces = [trace_of(r, inertia) for r in recordings]
     progress("fitting the baseline", 0.03)
     start = baseline(traces, datasheet, first.output_unit == "rad", jobs)
-    sensors = _symptoms(start.traces, 2 * start.fit.model.scales.position)
+    sensors = _symptoms(recordings, start.traces, 2 * start.fit.model.scales.position)
     chosen = select(start.fit, start.traces, anchors=start.anchors, exclude=_ordinary(start.fit.model), jobs=jobs, progress=progress)
     start = replace(start, fit=polished(chosen.base, start.traces))
     chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
@@ -73,15 +74,19 @@ def _ordinary(model: Model) -> tuple[str, ...]:
     return ("inductance",) if known and model.values["tau_e"] < AT_BOUND * MOST_TAU * known else ()
 
 
-def _symptoms(traces: Sequence[Trace], travel: float) -> dict[str, np.ndarray]:
-    """Sensor effects that show in the data itself, with their parameters."""
+def _symptoms(recordings: Sequence[Recording], traces: Sequence[Trace], travel: float) -> dict[str, np.ndarray]:
+    """Sensor effects that show in the data itself, with their parameters.
+
+    A converter is one where it is coarse for the travel, or where it stands ahead of another, which is the sensor's own, and makes most of the noise.
+    """
     found = {}
     lost = [(t, span) for t in traces for span in t.lost]
     if len(lost) >= FEWEST_LOST:
         seconds = sum(float(t.t[-1] - t.t[0]) for t in traces)
         found["sensor_dropout"] = np.array([len(lost) / seconds, np.mean([(s.stop - s.start) * t.sample_time for t, s in lost])])
     quantum = max(t.quantum for t in traces)
-    if quantum > COARSE * travel:
+    ahead = all(r.behind > 0 and r.quantum**2 / 12 > MOST * t.sigma**2 for r, t in zip(recordings, traces, strict=True))
+    if quantum > COARSE * travel or ahead:
         found["sensor_quantisation"] = np.array([quantum])
     return found
 

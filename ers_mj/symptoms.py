@@ -13,6 +13,8 @@ ON_LATTICE = 0.18  # of a step by which a gap may miss a multiple of it: a coars
 ONE_STEP = 0.3  # of a step by which gaps of one step, seen through a finer converter, may differ
 LEAP = 3.0, 6.0, 1.5  # grid steps, noise levels and usual changes that the catching up after a held span must exceed at least
 LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
+RARER = 0.1  # share of the gaps of one step that either kind has at least, where a converter behind makes two kinds of them
+FLOAT32 = float(np.finfo(np.float32).eps)
 WITHIN = 1.75  # times the smallest gap between rounded levels up to which a gap is one step of the converter ahead
 LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
 
@@ -99,8 +101,26 @@ def converter_step(y: np.ndarray) -> float:
     grain = decimal_grain(levels)
     multiple = np.gcd.reduce(np.rint(np.diff(levels) / grain).astype(np.int64)) if grain else 1
     if multiple > 1:
-        return float(multiple * grain)
+        return _ahead(levels, multiple * grain) or float(multiple * grain)
     return _rounded_lattice(levels, grain) or (grain if np.ptp(levels) < COARSE * grain else 0.0)
+
+
+def step_behind(y: np.ndarray, step: float) -> float:
+    """The step of a converter behind the one of this ``step`` that y (N,) lies on, in y's unit; 0.0 where none shows.
+
+    It rounds the steps ahead of it to its own, so that they are of two kinds which differ by one of these. Where it fits into ``step`` a whole
+    number of times nothing shows. Pass values in the unit they were printed in.
+    """
+    levels = np.unique(y[np.isfinite(y)])
+    gaps = np.diff(levels)
+    gaps = gaps[np.abs(gaps - step) < 0.5 * step]
+    short, long = gaps[gaps < np.mean(gaps)] if gaps.size else gaps, gaps[gaps >= np.mean(gaps)] if gaps.size else gaps
+    if min(short.size, long.size) < RARER * gaps.size or gaps.size < FEWEST_LEVELS:
+        return 0.0
+    behind = float(np.mean(long) - np.mean(short))
+    finest, apart = 8 * max(decimal_grain(levels), FLOAT32 * np.abs(levels).max()), np.mean(short) / max(behind, 1e-300)
+    sharp = behind > finest and max(np.std(short), np.std(long)) < 0.1 * behind
+    return behind if sharp and abs(apart - np.rint(apart)) < ON_LATTICE else 0.0
 
 
 def decimal_grain(levels: np.ndarray) -> float:
@@ -114,7 +134,7 @@ def decimal_grain(levels: np.ndarray) -> float:
 
 def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
     """The largest step that nine in ten differences of the levels are multiples of, within ON_LATTICE; what two kinds of gap differ by may be it as well."""
-    finest = 8 * max(grain, float(np.finfo(np.float32).eps) * np.abs(levels).max())
+    finest = 8 * max(grain, FLOAT32 * np.abs(levels).max())
     gaps = np.diff(levels)
     gaps = gaps[gaps > finest / 8]
     usual = np.quantile(gaps, LATTICE_QUANTILES)

@@ -9,7 +9,7 @@ import pytest
 from ers_mj.case import Case
 from ers_mj.commands.output import plain
 from ers_mj.datasheet import Datasheet, read_datasheet, write_model
-from ers_mj.diagnosis import diagnose
+from ers_mj.diagnosis import _symptoms, diagnose
 from ers_mj.evaluation import Fold, Score
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
@@ -89,6 +89,17 @@ def test_a_coarse_sensor_is_told_from_the_data():
     document = diagnose(recordings(sensor=lambda y: np.round(y / step) * step), read_datasheet("table1")).document
     assert document["missing"][0]["effect"] == "sensor_quantisation"
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
+
+
+@pytest.mark.parametrize("ahead, noise, told", [(8.795e-4, 1e-4, True), (0.0, 1e-4, False), (8.795e-4, 5e-4, False)])
+def test_a_converter_ahead_of_the_sensors_own_is_one(ahead, noise, told):
+    """As long as its step makes most of the noise; the sensor's own counts only where it is coarse for the travel."""
+    fine, random = 1.2783e-4, np.random.default_rng(2)
+    y = 0.3 * np.sin(5.0 * T) + noise * random.standard_normal(T.size)
+    y = np.round(y / ahead) * ahead if ahead else y
+    r = from_arrays(T, np.zeros(T.size), np.round(np.round(y / fine) * fine, 7))
+    found = _symptoms([r], [trace_of(r, None)], 0.6)
+    assert found == ({"sensor_quantisation": pytest.approx([ahead], rel=1e-3)} if told else {})
 
 
 @pytest.mark.parametrize("step", [0.0, np.radians(0.6)])

@@ -11,7 +11,7 @@ import pytest
 
 from ers_mj.errors import InputError
 from ers_mj.recording import converter_step, from_arrays, read_recording, write_recording
-from ers_mj.symptoms import leapt_spans
+from ers_mj.symptoms import leapt_spans, step_behind
 from ers_mj.traces import start_seen
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -427,6 +427,16 @@ def test_a_converter_is_found_among_outliers():
 def test_a_coarse_step_counts_before_the_converter_behind_it(coarse, fine):
     y = np.round(np.round(travel(4000, 2e-4, 0) / coarse) * coarse / fine) * fine
     assert converter_step(np.round(y, 6)) == pytest.approx(coarse, rel=1e-2)
+
+
+@pytest.mark.parametrize("decimals", [5, 7, None])
+@pytest.mark.parametrize("coarse, fine", [(7.3415e-4, 2.5566e-4), (8.795e-4, 1.2783e-4), (8.795e-4, 0.0), (7.6698e-4, 2.5566e-4)])
+def test_a_converter_behind_another_shows_where_its_step_does_not_fit(coarse, fine, decimals):
+    y = np.round(travel(4000, 2e-4, 0) / coarse) * coarse
+    y = np.round(y / fine) * fine if fine else y
+    y = y if decimals is None else np.round(y, decimals)
+    shows = fine and abs(coarse / fine - 3.0) > 0.01
+    assert step_behind(y, converter_step(y)) == (pytest.approx(fine, rel=0.05) if shows else 0.0)
 
 
 @pytest.mark.parametrize("grid", [0.0, 2.5e-4])
