@@ -12,8 +12,8 @@ from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.errors import InputError
-from ers_mj.identification import Fit, cost_of, descend, fit, hopped, tau_of
-from ers_mj.model import Model
+from ers_mj.identification import Fit, cost_of, descend, fit, hopped, run_of, tau_of
+from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.starts import with_starts, without_spikes
 from ers_mj.traces import Trace
 
@@ -72,12 +72,12 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
         found = Start(refitted, traces, ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others))
     else:
         found = _from_scratch(traces, known, is_angle, jobs)
-    if datasheet is not None and (gear := datasheet.parameters.get("n")):
-        scales = replace(found.fit.model.scales, cog=2 * np.pi / (FEWEST_COGS * gear))
-        found = replace(found, fit=replace(found.fit, model=replace(found.fit.model, scales=scales)))
     if not np.isfinite(found.fit.cost):
         raise InputError("no motion that the reduced model can make resembles these recordings: check units and signs of input and output")
-    return found
+    model, gear = found.fit.model, datasheet.parameters.get("n") if datasheet is not None else None
+    drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, found.traces, OBSERVER_RATE).motions)
+    scales = replace(model.scales, drive=drive, cog=2 * np.pi / (FEWEST_COGS * gear) if gear else model.scales.cog)
+    return replace(found, fit=replace(found.fit, model=replace(model, scales=scales)))
 
 
 def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:

@@ -76,7 +76,7 @@ class Scales:
     friction level (or the drive's, where there is none), ``input`` the peak |u|, ``sample_time`` [s], ``noise`` and
     ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
     recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
-    behind a known gear, ``supply`` the median [V] of one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
+    behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
     """
 
     position: float
@@ -91,6 +91,7 @@ class Scales:
     is_angle: bool
     tau_e_datasheet: float | None = None
     cog: float = np.inf
+    drive: float | None = None
     supply: float | None = None
     duration: float = 10.0
     recordings: int = 1

@@ -15,7 +15,8 @@ class CurrentLimit(Drive):
     follows_current = True
 
     def starts(self, scales):
-        return [np.array([part * scales.acceleration]) for part in (4.0, 2.5, 1.5)]
+        peak = scales.drive or 4.0 * scales.acceleration
+        return [np.array([part * peak]) for part in (0.94, 0.86, 0.7, 0.5)]
 
     @law
     def torque(p, theta, w, j, t):
