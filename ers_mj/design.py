@@ -277,10 +277,21 @@ def remains(e: np.ndarray, slopes: np.ndarray, known: np.ndarray, blocks: Blocks
 
 def solved(curvature: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """curvature^-1 slope, scaled, with what nothing determines left where it is."""
+    scaled, scale = _scaled(curvature)
+    return scale * np.linalg.solve(scaled, scale * slope)
+
+
+def drawn(curvature: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Numbers (D, k) of covariance curvature^-1 from ``normal`` ones (D, k): some are known a hundred million times better than others."""
+    scaled, scale = _scaled(curvature)
+    return scale * np.linalg.solve(np.linalg.cholesky(scaled).T, normal.T).T
+
+
+def _scaled(curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The curvature with a diagonal of ones, and hardly more, and the scale (k,) that makes it so: 0 for what nothing determines."""
     diagonal = np.diag(curvature)
     scale = np.where(diagonal > UNSEEN, 1.0 / np.sqrt(np.maximum(diagonal, UNSEEN)), 0.0)
-    scaled = curvature * np.outer(scale, scale)
-    return scale * np.linalg.solve(scaled + 1e-10 * np.eye(slope.size), scale * slope)
+    return curvature * np.outer(scale, scale) + 1e-10 * np.eye(scale.size), scale
 
 
 def checked(pair: Pair, excitation: dict, bench: Bench) -> Check | None:
@@ -311,8 +322,7 @@ def chances(pair: Pair, check: Check, slopes: np.ndarray, bench: Bench) -> np.nd
     """
     rig, blocks = pair.rig, Blocks.of([check.clean])
     own = bench.slopes(rig, rig.z, bench.misses(rig.model, check.clean), check.clean)
-    root = np.linalg.cholesky(np.linalg.inv(rig.known + np.eye(rig.z.size) / VAGUE**2))
-    draws = np.random.default_rng(2).standard_normal((DRAWS, rig.z.size)) @ root.T
+    draws = drawn(rig.known + np.eye(rig.z.size) / VAGUE**2, np.random.default_rng(2).standard_normal((DRAWS, rig.z.size)))
     gone = check.z - pair.answer.z
     return np.array([remains(check.e - own @ np.clip(d, -FAR, FAR), slopes, pair.answer.known, blocks, bench, gone) for d in draws]) - check.forked
 

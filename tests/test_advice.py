@@ -10,7 +10,7 @@ from ers_mj.advice import _said, _widened, next_recording
 from ers_mj.baseline import baseline
 from ers_mj.commands.diagnose import _input_table
 from ers_mj.datasheet import Datasheet
-from ers_mj.design import SETTLED
+from ers_mj.design import SETTLED, drawn
 from ers_mj.excitation import SHARES, WAVES, Limits, excitations, signal
 from ers_mj.identification import fit
 from ers_mj.isolability import isolability, probabilities
@@ -179,3 +179,12 @@ def test_a_richer_rival_that_further_numbers_alone_set_apart_is_told():
     told = {"backlash": {"recordings_needed": None, "channels_sigmas": {}, "rms_over_left": 0.3, "cost": 2.0 * SETTLED}}
     (words,) = _said("shaft_compliance", told, None, {}, 50, "the noise")
     assert "tells shaft compliance and backlash apart" in words
+
+
+def test_numbers_are_drawn_as_widely_as_they_are_known():
+    """A curvature whose inverse has no root any more: one direction is known 1e9 times as well as the other."""
+    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    draws = drawn(turn @ np.diag([1e18, 1.0]) @ turn.T, np.random.default_rng(0).standard_normal((4000, 2)))
+    assert np.all(np.isfinite(draws)) and np.std(draws @ turn[:, 0]) < 1e-4
+    draws = drawn(turn @ np.diag([1e6, 4.0]) @ turn.T, np.random.default_rng(0).standard_normal((4000, 2)))
+    assert np.std(draws @ turn, axis=0) == pytest.approx([1e-3, 0.5], rel=0.05)
