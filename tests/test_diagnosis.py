@@ -174,3 +174,9 @@ def test_a_free_run_that_is_lost_with_and_without_the_effects_tells_nothing(lost
     n = 100
     shown = [(*(Score(n * e**2, n, np.ones(1)) for e in ends), 1.0) for ends in ((10.0, np.sqrt(1.99)), lost)]
     assert Case._explained_each(SimpleNamespace(confirmed=SimpleNamespace(shown=shown))) == pytest.approx(explained)
+
+
+@pytest.mark.parametrize("explained, left, after, part", [(0.95, 0.2, 3.0, True), (0.99, 0.2, 3.0, False), (0.95, 0.05, 3.0, False), (0.95, 0.2, 9.0, False)])
+def test_what_memory_and_held_out_error_both_miss_is_left(explained, left, after, part):
+    case = SimpleNamespace(told_effects=("supply_sag",), explained=explained, left={"output": left}, fits={"heldout_rmse_after_rad": after}, noise=1.0)
+    assert Case._is_a_part(case) is part
