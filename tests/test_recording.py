@@ -457,6 +457,15 @@ def test_a_rudder_that_breaks_loose_is_no_hold():
     assert leapt_spans(np.round(y / 2.5e-4) * 2.5e-4, 2.5e-4, 8e-5) == []
 
 
+def test_a_leap_of_three_counts_is_chance():
+    """A rudder on its way, read with noise of half a count: three alike and three counts at once come about within some ten thousand samples."""
+    grid = 5.1133e-4
+    y = grid * np.array([0, 1, 1, 2, 3, 4, 4, 4, 7, 7, 8, 9, 10, 10])
+    assert leapt_spans(y, grid, 0.49 * grid) == []
+    y[8:] += grid
+    assert leapt_spans(y, grid, 0.49 * grid) == [slice(6, 8)]
+
+
 def test_decimal_steps_in_degrees_are_told_apart_by_their_size(tmp_path, columns):
     degrees = np.degrees(columns.pop("theta_rad"))
     fine = read_recording(put(tmp_path, csv_text(columns | {"theta_deg": degrees.round(3)})))
