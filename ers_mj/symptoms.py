@@ -150,7 +150,7 @@ def _ahead(levels: np.ndarray, step: float) -> float:
     """
     gaps = np.diff(levels)
     gaps = gaps[gaps > 0.5 * step]
-    if not step or gaps.min() < 1.5 * step:
+    if not step or gaps.size < FEWEST_LEVELS or gaps.min() < 1.5 * step:
         return 0.0
     coarse = float(np.mean(gaps[gaps < WITHIN * gaps.min()]))
     counts = np.cumsum(np.rint(gaps / coarse))
@@ -168,10 +168,8 @@ def _refined(gaps: np.ndarray, step: float) -> float:
     alike = gaps[np.abs(gaps - step) < ONE_STEP * step]
     step = float(np.mean(alike)) if alike.size else float(step)
     gaps = gaps[_on_lattice(gaps, step)]
-    if not gaps.size:
-        return step
     multiples = np.rint(gaps / step)
-    return float(gaps @ multiples / (multiples @ multiples))
+    return float(gaps @ multiples / (multiples @ multiples)) if np.any(multiples) else step
 
 
 # -- samples that are not the signal's -----------------------------------------------------------------------
