@@ -230,6 +230,13 @@ def _vector(effect: Effect, values: Mapping[str, float], inertia: float) -> np.n
     if needed or not values:
         what = " and ".join(needed) or "one or more"
         raise InputError(f"{effect.name}: needs {what} of its parameters {_meanings(effect.parameters)}")
+    for group in effect.needs:
+        if not values.keys() & set(group):
+            raise InputError(f"{effect.name}: does nothing with {', '.join(values)} alone, expected {' or '.join(group)} too")
+    for group in effect.together:
+        if lacking := [key for key in group if key not in values and values.keys() & set(group)]:
+            raise InputError(f"{effect.name}: {', '.join(key for key in group if key in values)} given without {' and '.join(lacking)}, "
+                             f"expected {', '.join(group)} together")
     given = [_checked(effect, p, float(values[p.name])) if p.name in values else p.absent for p in effect.parameters]
     ends = dict(zip(known, given, strict=True))
     if ends.get("lower", -math.inf) >= ends.get("upper", math.inf):

@@ -1,10 +1,14 @@
 """What every member of the effects folder owes: a complete declaration, parameters within bounds, and nesting."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
+from ers_mj.datasheet import read_datasheet
 from ers_mj.effects import BY_NAME, EFFECTS, EQUIVALENT
-from ers_mj.simulation import unit_of
+from ers_mj.errors import InputError
+from ers_mj.simulation import simulate_recording, unit_of
 from test_reduced import SCALES, T, table_1
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel
@@ -38,6 +42,30 @@ def test_an_absent_effect_leaves_the_motion_alone(effect):
         values = np.array([1e-12, 0.1, 1.0])
     motion = ReducedModel(table_1().coefficients, [(effect.name, values)]).simulate(T, u).theta
     assert np.degrees(np.max(np.abs(motion - table_1().simulate(T, u).theta))) < 2e-4
+
+
+@pytest.mark.parametrize("effect", EFFECTS, **ids)
+def test_what_a_reader_may_give_acts_and_leaves_numbers(effect):
+    """Any of an effect's numbers, however few, are refused or change the recording: none is swallowed in silence."""
+    starts = effect.starts(SCALES)
+    starts += [more for p in starts for more in effect.grown(effect.name, p, SCALES)]
+    typical = {p.name: min((abs(float(s[k])) for s in starts if np.isfinite(s[k]) and s[k] != 0), default=0.3) for k, p in enumerate(effect.parameters)}
+    typical |= {"rate": 5.0, "tau_max": 0.01}
+    settable = [p.name for p in effect.parameters if not p.recorded]
+    t, u = T[:1500], INPUTS["multisine"](T[:1500])
+    sheet = read_datasheet("table1")
+    plain = simulate_recording(sheet, t, u)["theta_rad"]
+    accepted = 0
+    for size in range(1, len(settable) + 1):
+        for names in combinations(settable, size):
+            values = {name: typical[name] for name in names}
+            try:
+                theta = simulate_recording(sheet, t, u, effects=[(effect.name, values)])["theta_rad"]
+            except InputError:
+                continue
+            accepted += 1
+            assert np.max(np.abs(theta - plain)) > 1e-6, values  # nor is it where there is no number
+    assert accepted > 0
 
 
 def test_equivalence_classes_hold_known_names_once():

@@ -159,6 +159,8 @@ class Effect:
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
     dear: ClassVar[bool] = False  # a simulation takes many times as long as others: refitted only where it promises most
     step: ClassVar[float] = 1e-4  # of transformed parameters, over which differences of its simulation tell a slope: more where it bounces
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = ()  # of each of these one number at least, or it does nothing; () where any one will do
+    together: ClassVar[tuple[tuple[str, ...], ...]] = ()  # numbers that say something only together
     sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
     follows_current: ClassVar[bool] = False  # its law changes as fast as the current, or within a small angle: half the segment length
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)

@@ -24,6 +24,7 @@ class Cogging(Drive):
         Parameter("second", "ratio", "second harmonic over the first", positive=False, lower=-2.0, upper=2.0, absent=np.inf),
         Parameter("phase_2", "phase", "phase of the second harmonic against the first", positive=False, absent=np.inf),
     )
+    needs, together = (("A",),), (("second", "phase_2"),)
     sized, tries = 1, 3
     wave = ((0,), 2)
 

@@ -17,6 +17,7 @@ class EndStop(Load):
         Parameter("f_stop", "frequency", "natural frequency of the contact", lower=10.0, upper=400.0, absent=100.0),
         Parameter("zeta", "ratio", "damping ratio of the contact", lower=0.02, upper=2.0, absent=0.3),
     )
+    needs = (("lower", "upper"),)
     tries = 3
 
     def starts(self, scales):

@@ -19,6 +19,7 @@ class LoadDisturbance(Load):
         Parameter("width", "time", "how long it lasts", lower=2 * EDGE, upper=10.0, absent=0.1, per_record=True),
         Parameter("record", "count", "recording in which it acts, from 0", positive=False, fitted=False),
     )
+    needs = (("A",),)
     tries = 3
 
     def starts(self, scales):

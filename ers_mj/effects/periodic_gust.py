@@ -20,6 +20,7 @@ class PeriodicGust(Load):
         Parameter("f", "frequency", "frequency"),
         Parameter("phase", "phase", "phase of the sine at time zero, another in every recording", positive=False, per_record=True),
     )
+    needs = (("A",),)
     sized, tries = 1, 3
     wave = ((0,), 2)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ers_mj.effects.base import Friction, Parameter, law
-
+from ers_mj.errors import InputError
 
 ORDERS = (1, 1.5, 2, 3, 4, 6, 8)  # periods within the travel from which a fit is begun
 
@@ -27,6 +27,7 @@ class PositionDependentFriction(Friction):
         Parameter("period", "position", "period of the wave", absent=np.inf),
         Parameter("phase", "phase", "phase of the wave at angle zero", positive=False, absent=np.inf),
     )
+    needs, together = (("dF",), ("place", "period")), (("place", "width"), ("period", "phase"))
     sized, tries = 1, 3
     wave = ((0,), 4)
 
@@ -37,6 +38,8 @@ class PositionDependentFriction(Friction):
         return dents + [np.array([size, np.inf, np.inf, travel / order, 0.0]) for order in ORDERS]
 
     def constants(self, p, c):
+        if np.isfinite(p[1]) and np.isfinite(p[3]):
+            raise InputError(f"{self.name}: place and period are both given, one of them was expected")
         if np.isfinite(p[3]):
             return np.array([p[0], p[4], 2 * np.pi / p[3], 1.0])
         return np.array([p[0], p[1], p[2], 0.0]) if np.isfinite(p[1]) else np.array([0.0, 0.0, 1.0, 0.0])

@@ -24,6 +24,7 @@ class SensorNonlinearity(Sensor):
         Parameter("period", "position", "period of the wave", absent=np.inf),
         Parameter("phase", "phase", "phase of the wave at angle zero", positive=False, absent=np.inf),
     )
+    needs, together = (("bend", "twist", "A"),), (("A", "period", "phase"),)
     tries = 2
     wave = ((2,), 4)
     instant = True
@@ -36,9 +37,8 @@ class SensorNonlinearity(Sensor):
 
     def measure(self, p, t, y):
         bend, twist, amplitude, period, phase = p
-        if np.isfinite(period):
-            return y + amplitude * np.sin(2 * np.pi / period * y + phase)
-        return y + (bend * y**2 if np.isfinite(bend) else 0.0) + (twist * y**3 if np.isfinite(twist) else 0.0)
+        wave = amplitude * np.sin(2 * np.pi / period * y + phase) if np.isfinite(period) else 0.0
+        return y + wave + (bend * y**2 if np.isfinite(bend) else 0.0) + (twist * y**3 if np.isfinite(twist) else 0.0)
 
     def behind(self, p, y):
         theta = y
@@ -49,12 +49,10 @@ class SensorNonlinearity(Sensor):
     def _slope(self, p, theta):
         """Slope of the reading by the output."""
         bend, twist, amplitude, period, phase = p
-        if np.isfinite(period):
-            rate = 2 * np.pi / period
-            return 1.0 + amplitude * rate * np.cos(rate * theta + phase)
-        return 1.0 + (2.0 * bend * theta if np.isfinite(bend) else 0.0) + (3.0 * twist * theta**2 if np.isfinite(twist) else 0.0)
+        rate = 2 * np.pi / period
+        wave = amplitude * rate * np.cos(rate * theta + phase) if np.isfinite(period) else 0.0
+        return 1.0 + wave + (2.0 * bend * theta if np.isfinite(bend) else 0.0) + (3.0 * twist * theta**2 if np.isfinite(twist) else 0.0)
 
     def describe(self, values):
-        if values["period"] == "none":
-            return f"the sensor errs along the travel, by {values['bend']} times the angle squared and {values['twist']} times its cube"
-        return f"the sensor errs along the travel, by an amplitude of {values['A']} every {values['period']}"
+        terms = {"bend": "{bend} times the angle squared", "twist": "{twist} times its cube", "period": "an amplitude of {A} every {period}"}
+        return "the sensor errs along the travel, by " + " and ".join(text.format(**values) for name, text in terms.items() if values[name] != "none")

@@ -20,6 +20,7 @@ class ShaftCompliance(Transmission):
         Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.2, upper=0.9, absent=0.5),
         Parameter("phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1),
     )
+    needs = (("f_shaft",),)
     tries = 3
 
     def starts(self, scales):

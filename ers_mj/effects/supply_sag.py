@@ -26,6 +26,7 @@ class SupplySag(Drive):
         Parameter("u_most", "input", "largest input, 24 where it is not told", fitted=False, absent=24.0),
         Parameter("V_m", "supply", "median of the measured supply, 24 where it is not told", fitted=False, absent=24.0),
     )
+    needs = (("bridge", "whole", "measured"),)
     sized, tries = 3, 4
 
     def starts(self, scales):

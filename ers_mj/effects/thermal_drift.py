@@ -24,6 +24,7 @@ class ThermalDrift(Drive):
         Parameter("T_w", "time", "time constant of the warm-up", upper=1e4),
         Parameter("u", "input", "largest input, 24 where it is not told", fitted=False, absent=24.0),
     )
+    needs = (("rise",),)
     sized, tries = 1, 2
 
     def starts(self, scales):

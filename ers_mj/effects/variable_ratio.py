@@ -22,6 +22,7 @@ class VariableRatio(Transmission):
         Parameter("bend", "per_position_squared", "relative change of the ratio per angle squared", positive=False),
         Parameter("rho", "ratio", "motor side's share of the inertia at theta_0", lower=0.1, upper=0.9, absent=0.5),
     )
+    needs = (("slope", "bend"),)
     sized, tries = 2, 2
 
     def starts(self, scales):

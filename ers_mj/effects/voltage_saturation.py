@@ -17,6 +17,7 @@ class VoltageSaturation(Drive):
         Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),
         Parameter("sharpness", "ratio", "exponent of a soft knee; a plain clip where there is none", lower=2.0, upper=100.0, absent=np.inf),
     )
+    needs = (("u_max",),)
     tries = 2
 
     def starts(self, scales):
