@@ -67,7 +67,7 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(*pairs[n], p[n]))
                   and not _halves(pooled(after), without[n], parts)
                   and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))
-                  or _may_be_none(n, model, start.traces, selection.tau)]
+                  or _may_be_none(n, model, start.traces, selection.tau) or _is_a_converters(n, model, start.traces)]
         if not failed:
             before = _scores(base_models, parts)
             shown = [(b, a, fold.held_out.sigma) for b, a, fold in zip(before, after, parts) if fold.record not in by_halves]
@@ -116,6 +116,17 @@ def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -
     layout, size = model.layout(), BY_NAME[name].parameters[0].name
     z, widths = model.vector(layout), half_widths(model, traces, (), tau)
     return all(abs(z[k]) <= widths[k] for k, f in enumerate(layout) if f.owner == name and f.name == size)
+
+
+def _is_a_converters(name: str, model: Model, traces: Sequence[Trace]) -> bool:
+    """Whether a sensor's error along the travel is within half a step of a converter that makes most of the noise: it is that converter's own."""
+    if name != "sensor_nonlinearity" or not all(t.is_coarse for t in traces):
+        return False
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    error = BY_NAME[name].measure(dict(model.effects)[name], None, y) - y
+    beside = np.stack([np.ones(y.size), y], axis=1)  # an offset and a gain are no error that position can tell
+    error = error - beside @ np.linalg.lstsq(beside, error, rcond=None)[0]
+    return float(np.max(np.abs(error))) < 0.5 * max(t.quantum for t in traces)
 
 
 def _halved(model: Model, less: Model, after: Sequence[Score], without: Sequence[Score], start: Start, tau: float,

@@ -25,7 +25,6 @@ from ers_mj.traces import Trace, trace_of
 
 FEWEST_LOST = 3  # dropouts from which a sensor is said to have them
 AT_BOUND = 0.95  # share of the most that the baseline allows of a known inductance, from which it may be more than an ordinary one
-MOST = 0.5  # of the noise's power
 COARSE = 1 / 300  # a converter whose step is more than this share of the travel is an effect, not an ordinary one
 
 Progress = Callable[[str, float], None]
@@ -85,7 +84,7 @@ def _symptoms(recordings: Sequence[Recording], traces: Sequence[Trace], travel: 
         seconds = sum(float(t.t[-1] - t.t[0]) for t in traces)
         found["sensor_dropout"] = np.array([len(lost) / seconds, np.mean([(s.stop - s.start) * t.sample_time for t, s in lost])])
     quantum = max(t.quantum for t in traces)
-    ahead = all(r.behind > 0 and r.quantum**2 / 12 > MOST * t.sigma**2 for r, t in zip(recordings, traces, strict=True))
+    ahead = all(r.behind > 0 and t.is_coarse for r, t in zip(recordings, traces, strict=True))
     if quantum > COARSE * travel or ahead:
         found["sensor_quantisation"] = np.array([quantum])
     return found

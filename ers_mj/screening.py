@@ -19,6 +19,8 @@ PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from wh
 LEAST_PROMISE = 2.5  # of C that the secant of a candidate must promise where a model is quiet
 LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the screening may scale it
 HOTTEST, KNOCKS, NEARER = 3, (0.08, 0.25), 60  # blocks in which a knock is looked for, the lengths [s] from which its fit is begun, and simulations of it
+PEAK = 30.0  # factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
+USUAL = 0.95  # share of the blocks that are no worse than a bad one
 IDLE, HALVINGS = 1e-3, 6  # of C that a push which moves nothing changes; of the way from it to the next that throws the rudder
 
 
@@ -74,7 +76,8 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         (known, targets), scales = _targets(light, left, traces, tau), replace(place.scales, hot=_hot(left, traces, tau))
         for effect in (BY_NAME[name] for name in names):
             if effect.once:
-                found = _knocks(light, effect, effect.starts(scales), e, targets[0][2], traces, tau)
+                whole = light is not place and stands_out(Blocks.of(traces).misfit(left), tau)
+                found = _knocks(*((place, effect, effect.starts(scales), left) if whole else (light, effect, effect.starts(scales), e)), targets[0][2], traces, tau)
             else:
                 starts = _hopeful(alone, effect, effect.starts(scales), targets, traces)
                 found = [p for start in starts if (p := _promise(light, effect, start, e, targets, traces))]
@@ -92,6 +95,12 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         if not bent:
             names = Screened(promises, begins, floor, most).promising()
     return Screened(promises, begins, floor, most)
+
+
+def stands_out(misfit: np.ndarray, tau: float) -> bool:
+    """Whether a block (B,) is PEAK times beyond what a model that is wrong leaves in many others."""
+    scores = score(misfit, tau)
+    return float(scores.max()) >= max(float(np.quantile(scores, USUAL)), 0.0) + math.log(PEAK)
 
 
 def _light(place: Model) -> Model:

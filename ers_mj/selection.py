@@ -19,7 +19,7 @@ from ers_mj.identification import Fit, converged, fit, hopped, near_noise, score
 from ers_mj.isolability import PARAMETER_PRICE, probabilities
 from ers_mj.model import STATES
 from ers_mj.remainder import left_by_sensor, more_is_missing
-from ers_mj.screening import Begin, screen
+from ers_mj.screening import PEAK, Begin, screen, stands_out
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 3.0  # decrease of C that an effect must buy: one servo in forty without missing physics offers as much (evaluation.NULL_GAIN)
@@ -28,8 +28,7 @@ LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 LATER_Z = 2.0  # and beside an effect
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
-ONCE = 6.0  # of C that an effect which acts once must buy
-PEAK = 30.0  # or the factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
+ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
 QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
 RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
@@ -38,13 +37,16 @@ PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well; what cannot be scaled is in any case
 FAILED = 0.05  # share of the best first refit's gain below which a promise was none
-FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent
+FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
+# an effect all that promise and are not dear: there a borrowed Jacobian has been bent by two)
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 TIE, NEAR_TIE = 1.0, 0.02  # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
+NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) that this other must win itself to be told in its place
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
+REVERSED, MOST_REVERSED = 0.1, 5  # share of the leader's gain from which a rival is begun with, the leader put in, and how many are
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
@@ -130,7 +132,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     states = [((s, 0), [Begin(base.model.with_state(s, len(traces)), {})]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
-        quiet, bent = reference <= QUIET * base.misfit.size, not near_noise(base) or reference > BENT * base.misfit.size
+        quiet, bent = _quiet(base, tau), not near_noise(base) or reference > BENT * base.misfit.size
         screened = screen(places, traces, tau, exclude, bent, quiet)
         if quiet and not screened.promising():
             return []
@@ -145,7 +147,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             failed = {name for name, found in leaders(first).items() if reference - total(found) <= FAILED * max(most, 0.0)}
         most = max((reference - total(f) for f in first.values()), default=0.0)
         foremost = [name for name in screened.promising(failed) if name not in failed][:FOREMOST]
-        best, ahead = dict(first), [(name, 0) for name in foremost] if bent else []
+        own = {*foremost, *(name for name in screened.promising() if base.model.names and not BY_NAME[name].dear)}  # where bent
+        best, ahead = dict(first), [label for label in starts if label[1] == 0 and label[0] in own] if bent else []
         for label, found in pool.map(finish, [(label, begin) for label in ahead for begin in starts[label]]):
             best[label] = min(best[label], found, key=total)
         worth = {name for name, found in leaders(best).items() if bent or reference - total(found) >= AGAIN * most}
@@ -222,7 +225,9 @@ def _likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
     if _clocked(ranked[0].name):
         lawful = [c for c in ranked if not _clocked(c.name) and c.gain >= CLOCKED * ranked[0].gain and c.z >= LEAST_Z]
         ranked = sorted(ranked, key=lambda c: c not in lawful)
-    rivals = _rivals(ranked) or ranked[:1]
+    gains = {c.name: c.gain for c in ranked}
+    ranked = sorted(ranked, key=lambda c: (real := _really(c.name, c.fit)) != c.name and gains.get(real, 0.0) >= NEARLY * c.gain)
+    rivals = [c for c in _rivals(ranked) if _really(c.name, c.fit) != ranked[0].name or c is ranked[0]] or ranked[:1]
     name = _likeliest({c.name: c.fit for c in rivals})
     first = next(c for c in rivals if c.name == name)
     return [first, *(c for c in ranked if c is not first)]
@@ -233,6 +238,11 @@ def _likeliest(fits: Mapping[str, Fit]) -> str:
     chances = probabilities(fits)
     kinds = {name: next((group for group in EQUIVALENT if name in group), {name}) for name in fits}
     return max(fits, key=lambda name: (not _clocked(name), sum(chances[other] for other in kinds[name] if other in chances), chances[name]))
+
+
+def _really(name: str, found: Fit) -> str:
+    """The effect of which a fit's is a form (see Effect.really)."""
+    return BY_NAME[name].really(dict(found.model.effects)[name], found.model.values.get("c_2", 0.0)) if name in BY_NAME else name
 
 
 def _clocked(name: str) -> bool:
@@ -264,12 +274,17 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
                 base, current, mended = base if current.model.names else again, again, mended + 1
                 continue
         least_z = LATER_Z if current.model.names else LEAST_Z
-        if not (ranked and _asked_for(ranked[0], least, least_z)) and _is_cheap_and_wrong(current, base, traces):
+        outstanding = stands_out(current.misfit, tau)
+        if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and _is_cheap_and_wrong(current, base, traces):
             found = _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs)
             ranked = _likeliest_first(sorted([*ranked, *found], key=lambda c: -c.worth))
-        rounds.append(tuple(ranked))
-        if not ranked or not _asked_for(ranked[0], least, least_z):
+        if rounds and ranked and not _quiet(current, tau):
+            ranked = _other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
+        asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME) and _asked_for(c, least, least_z, outstanding)]
+        rounds.append(tuple(sorted(ranked, key=lambda c: c not in asked[:1])))
+        if not asked:
             break
+        ranked = rounds[-1]
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
         current = fit(current.model, traces, tau=tau, steps=20)
@@ -308,6 +323,31 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
     return [c for c in ended if sum(c.fit.model.at_bound(f) for f in c.fit.model.layout() if f.owner == c.name) <= AT_BOUND]
 
 
+def _quiet(current: Fit, tau: float) -> bool:
+    """Whether little is left."""
+    return float(score(current.misfit, tau).sum()) <= QUIET * current.misfit.size
+
+
+def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float,
+                     jobs: int) -> list[Candidate]:
+    """The candidates with those that come of the last round's rivals, each with the newest effect put into its own fit: a baseline that was bent by one of
+    two effects leads away from the other, and not both ways alike.
+    """
+    newest, names = earlier[0].name, current.model.names
+    if newest not in names or BY_NAME[newest].dear or BY_NAME[newest].local:
+        return list(ranked)
+    p = dict(current.model.effects)[newest]
+    rivals = [c for c in earlier[1:] if c.name in BY_NAME and c.name not in names and not BY_NAME[c.name].dear and not BY_NAME[c.name].once
+              and c.gain >= REVERSED * earlier[0].gain][:MOST_REVERSED]
+    with ThreadPoolExecutor(jobs) as pool:
+        ends = list(pool.map(lambda c: judged(c.name, fit(c.fit.model.with_effect(newest, p), traces, tau=tau, steps=20), current, tau), rivals))
+    best = {c.name: c for c in ranked}
+    for c in ends:
+        if c.name not in best or c.worth > best[c.name].worth:
+            best[c.name] = c
+    return _likeliest_first(sorted(best.values(), key=lambda c: -c.worth))
+
+
 def _most_rounds(current: Fit) -> int:
     """How many rounds there are at most: fewer where the model itself stays wrong."""
     return MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS
@@ -321,15 +361,16 @@ def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
     return fit(replace(model, states={k: v for k, v in model.states.items() if k != candidate.name} or None), traces, tau=tau, steps=12)
 
 
-def _asked_for(candidate: Candidate, least: float, least_z: float) -> bool:
+def _asked_for(candidate: Candidate, least: float, least_z: float, outstanding: bool) -> bool:
     """Whether the gain matters and is more than chance: over the blocks, or, of what acts in few of them, since hardly any is worse.
 
     A knock must gain ONCE, or take away what no fork of stick and slip makes (PEAK): that is enough where little else is left, so that the
-    ``least`` gain is no share of it.
+    ``least`` gain is no share of it, and where a block is ``outstanding`` among much that is (see screening.py).
     """
     if candidate.name in BY_NAME and BY_NAME[candidate.name].once:
         if candidate.best < math.log(PEAK):
             return candidate.gain >= max(least, ONCE)
+        least = min(least, ONCE) if outstanding else least
         return candidate.gain >= (least if least > LEAST_GAIN else NEAR_LEAST * least)
     return candidate.gain >= least and (candidate.z >= least_z or candidate.lost <= LOST * candidate.gain)
 
@@ -347,7 +388,7 @@ def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequen
         leader = ranked[0].name
         if leader not in current.model.names:
             continue
-        rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names
+        rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names and _really(c.name, c.fit) != leader
                   and c.gain >= RIVAL * ranked[0].gain][:MOST_RIVALS]
         without = current.model.without_effect(leader)
         with ThreadPoolExecutor(jobs) as pool:

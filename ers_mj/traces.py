@@ -18,6 +18,7 @@ START_SAMPLES = 10
 FEWEST_SEEN = 6  # samples that a start is told from
 KNOWN = 0.8  # share of the samples that a further sensor must have seen
 LEAST_SAG = 0.005  # of the supply, from which it varies
+MOST = 0.5  # of the noise's power, from which a converter makes most of it
 FIRST = 2  # changes by which a speed at the start must show
 SURE_SPEED = 3.0  # standard deviations within which a speed at the start may lie
 
@@ -54,6 +55,11 @@ class Trace:
     lost: tuple[slice, ...] = ()
     channels: tuple[Channel, ...] = ()
     supply: np.ndarray | None = None
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether the converter makes most of the noise."""
+        return self.quantum**2 / 12 > MOST * self.sigma**2
 
     @cached_property
     def sample_time(self) -> float:

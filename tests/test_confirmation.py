@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ers_mj.baseline import baseline
-from ers_mj.confirmation import _halved, _may_be_none, _no_closer, _p_of, _scores
+from ers_mj.confirmation import _halved, _is_a_converters, _may_be_none, _no_closer, _p_of, _scores
 from ers_mj.datasheet import Datasheet
 from ers_mj.evaluation import Score, folds, halves, refits
 from ers_mj.identification import fit
@@ -55,6 +55,16 @@ def test_a_hold_behind_a_coarse_converter_is_betrayed_by_the_model(plain):
     moving = [b for b in begins if abs(coarse.y[b + 12] - coarse.y[b]) > 6 * step]
     masked = [b for b in moving if not found.valid[b + 1:b + 12].any()]
     assert len(coarse.lost) >= 3 and len(moving) >= 8 and len(masked) >= 0.8 * len(moving)
+
+
+def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
+    """A wave of less than half a step along the travel is the converter's, where it makes the noise; a larger one is not, nor any beside a finer converter."""
+    step = 0.016
+    coarse, fine = ([trace("multisine", sensor=lambda y: s * np.round(y / s))] for s in (step, NOISE))
+    small, large = (plain.fit.model.with_effect("sensor_nonlinearity", np.array([np.inf, np.inf, size * step, 0.043, 0.3])) for size in (0.3, 0.8))
+    assert _is_a_converters("sensor_nonlinearity", small, coarse)
+    assert not _is_a_converters("sensor_nonlinearity", large, coarse) and not _is_a_converters("sensor_nonlinearity", small, fine)
+    assert not _is_a_converters("bias_torque", small, coarse)
 
 
 def test_a_rudder_that_sticks_is_not_held(plain):

@@ -14,8 +14,8 @@ from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
-from ers_mj.screening import Screened, screen
-from ers_mj.selection import _exchanged, _swept, judged
+from ers_mj.screening import Screened, screen, stands_out
+from ers_mj.selection import _exchanged, _likeliest_first, _other_way_round, _swept, judged
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -65,6 +65,38 @@ def test_of_two_alike_the_one_without_play_is_likelier(pushed):
     assert probabilities({"backlash": wide, "bias_torque": none})["backlash"] == pytest.approx(0.5, abs=0.01)
     better = replace(wide, misfit=wide.misfit * 0.8)
     assert probabilities({"backlash": better, "shaft_compliance": narrow})["backlash"] > 0.8
+
+
+def test_a_play_less_wide_than_its_contact_gives_way_is_a_shaft(pushed):
+    """115 rad/s^2 of friction push a contact of 80 Hz in by 0.46 mrad."""
+    def found(name, p, gain):
+        return replace(judged(name, replace(pushed.fit, model=pushed.fit.model.with_effect(name, np.array(p))), pushed.fit, 1.0), gain=gain)
+
+    shaft = found("shaft_compliance", [60.0, 0.1, 0.6, 0.2], 16.0)
+    for gap, gain, first in ((1e-4, 20.0, "shaft_compliance"), (1e-3, 20.0, "backlash"), (1e-4, 40.0, "backlash")):
+        play = found("backlash", [gap, 0.6, 0.2, 80.0, 0.1], gain)
+        assert _likeliest_first([play, shaft])[0].name == first
+    assert not BY_NAME["backlash"].grown("shaft_compliance", np.array([80.0, 0.7, 0.6, 0.2]), pushed.fit.model.scales)
+
+
+def test_two_effects_are_found_from_either(pushed):
+    """A drive that delays and sleeps: where the delay comes first, the friction takes the sleep's place and leaves it none."""
+    values, traces = {**TRUTH, "c_2": 85.0}, []
+    truth = [("drive_dead_zone", np.array([0.95, np.inf])), ("input_delay", np.array([0.0157]))]
+    for k, name in enumerate(("multisine", "steps", "chirp")):
+        y = ReducedModel(lumped(values), truth).simulate(T, INPUTS[name](T)).measured
+        traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+    start = baseline(traces, Datasheet(lumped=values), True, 1)
+    first, second = (judged(name, fit(start.fit.model.with_effect(name, p), start.traces), start.fit, 1.0) for name, p in (truth[1], truth[0]))
+    ranked = _other_way_round(first.fit, [first, second], [], start.traces, 1.0, 1)
+    assert [c.name for c in ranked] == ["drive_dead_zone"] and set(ranked[0].fit.model.names) == {"drive_dead_zone", "input_delay"}
+    found = dict(ranked[0].fit.model.effects)
+    assert found["drive_dead_zone"][0] == pytest.approx(0.95, rel=0.02) and found["input_delay"][0] == pytest.approx(0.0157, rel=0.02)
+
+
+def test_one_block_stands_out_among_bad_ones():
+    misfit = np.concatenate([np.ones(150), np.full(50, 30.0)])
+    assert not stands_out(misfit, 1.0) and not stands_out(np.append(misfit, 500.0), 1.0) and stands_out(np.append(misfit, 1000.0), 1.0)
 
 
 def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(pushed):

@@ -4,6 +4,9 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Transmission, coupled
 
+SPRINGY = 0.5  # damping ratio up to which a shaft is a spring, and a play as wide as nothing
+SEEN = 0.7  # of what the contact gives way under the friction, from which a play is seen as one
+
 
 class Backlash(Transmission):
     """Two bodies that touch at +-gap: inside, each moves on its own; at the ends, a stiff spring-damper.
@@ -32,10 +35,14 @@ class Backlash(Transmission):
 
     def grown(self, name, p, scales):
         """A twisting shaft is a contact without play: one as wide as the noise, or a third of that."""
-        if name != "shaft_compliance":
+        if name != "shaft_compliance" or p[1] > SPRINGY:
             return []
         f, zeta, rho, phi = p
         return [np.array([part * scales.noise, rho, phi, min(f, 1000.0), max(zeta, 0.05)]) for part in (1.0, 0.3)]
+
+    def really(self, p, friction):
+        """A play less wide than its contact gives way under the friction is not seen as one: a shaft, stiffer the more it twists."""
+        return "shaft_compliance" if p[0] < SEEN * friction / (2.0 * np.pi * p[3]) ** 2 else self.name
 
     def coefficients(self, p, c):
         return coupled(c, f=p[3], zeta=p[4], rho=p[1], phi=p[2], gap=p[0])

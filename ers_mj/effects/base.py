@@ -201,6 +201,10 @@ class Effect:
         """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of this one."""
         return []
 
+    def really(self, p: np.ndarray, friction: float) -> str:
+        """Name of the effect of which these numbers, beside a Coulomb friction c_2, are a form: its own but where it is hardly there."""
+        return self.name
+
     def coefficients(self, p: np.ndarray, c: Coefficients) -> Coefficients:
         """The plant's coefficients with the effect in place."""
         return c
