@@ -28,6 +28,7 @@ from ers_mj.traces import Blocks
 CONSISTENT = 0.05  # cost per block up to which a model explains the data within its noise (an error of 0.3 sigma RMS)
 TIED = 0.02  # weight from which a rival is told as an alternative
 VISIBLE = 1.5  # noise levels of free-run error from which a recording shows a mismatch
+FREE, FREE_HELD = 1.02, 1.15  # noise levels of free-run error up to which training and held-out recordings show nothing but noise
 ASTRAY = 30.0  # times the noise by which the free run of every held-out recording misses: forks of stick and slip lose one or another
 HALF = 0.5  # share of the squared held-out error that the named effects must explain
 NEARLY_ALL = 0.98  # that another form of the right law explains
@@ -114,8 +115,10 @@ class Case:
 
     @cached_property
     def more_is_missing(self) -> bool:
-        """Whether the model leaves more than noise (see remainder.py)."""
-        return more_is_missing(self.left, left_by_sensor(self.start.fit.model, self.start.traces) if self.model.names else None)
+        """Whether the model leaves more than noise (see remainder.py): of the output nothing where free runs leave none, whatever forks in the observer."""
+        free = self.fits["train_rmse_after_rad"] < FREE * self.noise and self.fits["heldout_rmse_after_rad"] < FREE_HELD * self.noise
+        left = {**self.left, "output": 0.0} if free else self.left
+        return more_is_missing(left, left_by_sensor(self.start.fit.model, self.start.traces) if self.model.names else None)
 
     @property
     def told_effects(self) -> tuple[str, ...]:

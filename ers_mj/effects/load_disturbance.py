@@ -25,7 +25,7 @@ class LoadDisturbance(Load):
     def starts(self, scales):
         """Around each hot span: pushes either way, up to four times what friction holds (a preload holds as much), begun somewhat before it or in it."""
         return [np.array([size * scales.acceleration, begin + later, length, record]) for record, begin, length in scales.hot
-                for later in (-0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2) for size in (-4.0, -2.5, -1.0, -0.3, 0.3, 1.0, 2.5, 4.0)]
+                for later in (-0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2) for size in (-4.0, -2.5, -1.0, -0.3, -0.1, -0.03, 0.03, 0.1, 0.3, 1.0, 2.5, 4.0)]
 
     def constants(self, p, c):
         return p[:3]
