@@ -77,7 +77,10 @@ def _run_in(model, trace, record, rate):
     (theta, *others), motion = model.observed(trace, record, rate)
     parts = [np.where(trace.valid, (trace.y - theta) / trace.sigma, 0.0)]
     for channel, seen in zip(trace.channels, others):
-        parts.append(np.where(np.isfinite(channel.values), (channel.values - seen) / channel.sigma, 0.0))
+        known = np.isfinite(channel.values)
+        if channel.kind == "current":  # before the dead time is over it follows a command that was not recorded
+            known &= trace.t >= trace.t[0] + model.dead_time
+        parts.append(np.where(known, (channel.values - seen) / channel.sigma, 0.0))
     return np.concatenate(parts), motion
 
 

@@ -197,6 +197,11 @@ class Model:
         neutral = np.zeros(records) if state == "offset" else np.ones(records)
         return replace(self, states={**(self.states or {}), state: neutral})
 
+    @property
+    def dead_time(self) -> float:
+        """By how much the command reaches the motor late [s]."""
+        return float(dict(self.effects)["input_delay"][0]) if "input_delay" in self.names else 0.0
+
     def plant(self, record: int = 0, supply: np.ndarray | None = None) -> ReducedModel:
         """The reduced model of one recording (its record state applied), with the supply (N,) that was measured there."""
         c = lumped(self.values)

@@ -17,7 +17,7 @@ import numpy as np
 from ers_mj.effects import BY_NAME, EQUIVALENT
 from ers_mj.identification import Fit, converged, fit, hopped, near_noise, score, tau_of
 from ers_mj.isolability import PARAMETER_PRICE, probabilities
-from ers_mj.model import STATES
+from ers_mj.model import STATES, Model
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, Begin, screen, stands_out
 from ers_mj.traces import Blocks, Trace
@@ -173,7 +173,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         finished = dict(pool.map(finish, rough[:close]))
-        for name, found in pool.map(finish, _wider(finished, exclude)):
+        others = _other_forms(finished, {name: begins for (name, place), begins in starts.items() if place == 0})
+        for name, found in pool.map(finish, [*others, *_wider(finished, exclude)]):
             if name not in best or priced(found) < priced(finished.get(name, best[name])):
                 finished[name] = found
         ranked = sorted((judged(*item, base, tau) for item in {**dict(rough), **finished}.items()), key=lambda c: -c.worth)
@@ -194,6 +195,22 @@ def _attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
     level = min(1.0, float(np.median(misfit)))
     left = float(np.sum(np.maximum(score(misfit, tau) - score(level, tau), 0.0)))
     return left - HALF_NORMAL * level / (tau + level) * float(np.sum(np.sqrt(2.0 / counts)))
+
+
+def _other_forms(finished: Mapping[str, Fit], starts: Mapping[str, Sequence[Begin]]) -> list[tuple[str, Begin]]:
+    """The best start of each other form (which of its numbers are absent) of the finished effects: after a few steps forms are no more alike than effects."""
+    out = []
+    for name in (n for n in finished if n in BY_NAME):
+        known = [_form(finished[name].model, name)]
+        for begin in starts.get(name, ()):
+            if (form := _form(begin.model, name)) not in known:
+                known.append(form)
+                out.append((name, begin))
+    return out
+
+
+def _form(model: Model, name: str) -> tuple[bool, ...]:
+    return tuple(np.isfinite(dict(model.effects)[name]).tolist())
 
 
 def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:

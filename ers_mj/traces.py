@@ -185,7 +185,8 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
     """The least and the largest speed at the first of the samples (N,) that they allow, without a model: both 0 where rest is allowed.
 
     Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no more than their noise; the best one
-    where none does. A speed against which the very first samples go is none: it is how a polynomial meets a rudder that is thrown from rest.
+    where none does. A speed against which the very first samples go, or the whole head without one sample that goes along, is none: it is how a
+    polynomial meets a rudder that is thrown from rest.
     """
     known = np.isfinite(y)
     t, y = t[known] - t[0], y[known]
@@ -201,8 +202,9 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
             found.append((missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1]))
     enough = max(1.0, min(missed for missed, *_ in found))
     low, high = (pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:]))
-    against = -np.sign(low) * (y[1:1 + FIRST] - y[0])
-    return (0.0, 0.0) if low <= 0.0 <= high or np.max(against) > SURE_SPEED * math.sqrt(2.0) * sigma else (float(low), float(high))
+    along, seen = np.sign(low) * (y - y[0]), SURE_SPEED * math.sqrt(2.0) * sigma
+    thrown = -np.min(along[1:1 + FIRST]) > seen or -along[-1] > seen >= np.max(along)
+    return (0.0, 0.0) if low <= 0.0 <= high or thrown else (float(low), float(high))
 
 
 def noise_sigma(y: np.ndarray, quantum: float) -> float:

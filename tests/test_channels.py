@@ -57,6 +57,14 @@ def test_the_current_says_on_which_side_of_the_motor_a_delay_lies(name, size):
     assert "n K_t/J" in document["parameters"]
 
 
+def test_the_current_of_a_command_that_was_not_recorded_is_no_evidence():
+    """Of a dead time, the first of which follows what was asked for before the recording began."""
+    trace = trace_of(recordings((), "current")[1], None)
+    model = baseline([trace], read_datasheet("table1"), True).fit.model.with_effect("input_delay", np.array([0.0205]))
+    left = residuals(model, [trace], OBSERVER_RATE)[T.size:]
+    assert not left[:21].any() and np.all(left[21:] != 0.0)
+
+
 def sagging(told):
     """Three recordings of a servo whose supply sinks with what it draws and with time; ``told`` is what is written down as the input and the supply."""
     out = []

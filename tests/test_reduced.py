@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete
 
 from ers_mj.datasheet import read_datasheet
@@ -138,9 +139,24 @@ def linear_motion(c, u):
 
 @pytest.mark.parametrize("name", ["steps", "multisine"])
 @pytest.mark.parametrize("tau", [0.0, 9.4e-4])
-@pytest.mark.parametrize("effects", [(), [("shaft_compliance", np.array([20.0, 0.1, 0.55, 0.15]))]], ids=["rigid", "shaft"])
+@pytest.mark.parametrize("effects", [(), [("shaft_compliance", np.array([20.0, 0.1, 0.55, 0.15, np.inf]))]], ids=["rigid", "shaft"])
 def test_without_dry_friction_it_is_the_linear_system_from_rest_on(name, tau, effects):
     """From rest at theta_0, where no force says which way it will go."""
     model = ReducedModel(table_1(c_1=0.0, c_2=0.0, tau_e=tau).coefficients, effects)
     c, u = Coefficients(*model._lowered[0]), INPUTS[name](T)
     assert np.degrees(np.max(np.abs(model.simulate(T, u).theta - c.theta_0 - linear_motion(c, u)))) < 1e-7
+
+
+def test_a_shaft_that_hardens_obeys_its_equations():
+    model = ReducedModel(table_1(c_1=0.0, c_2=0.0, tau_e=0.0).coefficients, [("shaft_compliance", np.array([12.0, 0.1, 0.55, 0.15, 0.02]))])
+    c, u = Coefficients(*model._lowered[0]), np.full(T.size, 6.0)
+
+    def slope(t, x):
+        twist, rate = x[2] - x[0], x[3] - x[1]
+        push = (2.0 * np.pi * 12.0) ** 2 * twist * (1.0 + (twist / 0.02) ** 2) + c.d_twist * rate
+        a = (-c.a_1 * x[0] - 0.45 * c.a_mech_plus * x[1] + push) / 0.45
+        return x[1], a, x[3], (c.b * 6.0 - c.a_emf * x[3] - 0.55 * c.a_mech_plus * x[3] - push) / 0.55
+
+    exact = solve_ivp(slope, (0.0, T[-1]), np.zeros(4), t_eval=T, rtol=1e-9, atol=1e-10).y
+    assert np.max(np.abs(exact[2] - exact[0])) > 0.02
+    assert np.degrees(np.max(np.abs(model.simulate(T, u).theta - c.theta_0 - exact[0]))) < 1e-3

@@ -14,8 +14,8 @@ from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
-from ers_mj.screening import Screened, screen, stands_out
-from ers_mj.selection import _exchanged, _likeliest_first, _other_way_round, _swept, judged
+from ers_mj.screening import Begin, Screened, screen, stands_out
+from ers_mj.selection import _exchanged, _likeliest_first, _other_forms, _other_way_round, _swept, _wider, judged
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -48,7 +48,7 @@ def test_a_promise_that_failed_is_no_measure_for_the_others():
 
 def test_a_wider_effect_begins_where_its_limit_ended(pushed):
     model, traces = pushed.fit.model, pushed.traces
-    twisting = np.array([80.0, 0.2, 0.6, 0.2])
+    twisting = np.array([80.0, 0.2, 0.6, 0.2, np.inf])
     starts = BY_NAME["backlash"].grown("shaft_compliance", twisting, model.scales)
     one, other = (residuals(model.with_effect(name, p), traces, 5.0) for name, p in (("shaft_compliance", twisting), ("backlash", starts[0])))
     apart = np.sqrt(np.mean((one - other) ** 2))
@@ -56,10 +56,27 @@ def test_a_wider_effect_begins_where_its_limit_ended(pushed):
     assert not BY_NAME["backlash"].grown("bias_torque", np.array([0.5]), model.scales)
 
 
+def test_a_shaft_may_harden_once_it_is_there(pushed):
+    shaft = replace(pushed.fit, model=pushed.fit.model.with_effect("shaft_compliance", np.array([80.0, 0.2, 0.6, 0.2, np.inf])))
+    grown = [begin.model for name, begin in _wider({"shaft_compliance": shaft}, ("backlash",)) if name == "shaft_compliance"]
+    assert len(grown) == 1 and 0.0 < dict(grown[0].effects)["shaft_compliance"][4] < np.inf
+    assert not _wider({"shaft_compliance": replace(shaft, model=grown[0])}, ("backlash",))
+
+
+def test_forms_are_compared_at_the_end(pushed):
+    """Of a supply that sags, the law by duty beside that by current, whichever was ahead after a few steps; each form once."""
+    model = pushed.fit.model
+    ways = [np.array([bridge, whole, np.inf, T_c, 14.0, 24.0]) for bridge, whole, T_c in
+            ((np.inf, 0.2, 0.1), (0.2, np.inf, 0.1), (0.3, np.inf, 0.1), (0.2, np.inf, np.inf))]
+    begins = [Begin(model.with_effect("supply_sag", p), {}) for p in ways]
+    found = replace(pushed.fit, model=begins[0].model)
+    assert [begin for _, begin in _other_forms({"supply_sag": found, "gain": pushed.fit}, {"supply_sag": begins})] == [begins[1], begins[3]]
+
+
 def test_of_two_alike_the_one_without_play_is_likelier(pushed):
     """One has the other as its limit: it must do better, and not as well, to be named."""
     wide, narrow, none = (replace(pushed.fit, model=pushed.fit.model.with_effect(name, np.array(p))) for name, p in
-                          (("backlash", [1e-4, 0.6, 0.2, 80.0, 0.2]), ("shaft_compliance", [80.0, 0.2, 0.6, 0.2]), ("bias_torque", [0.1])))
+                          (("backlash", [1e-4, 0.6, 0.2, 80.0, 0.2]), ("shaft_compliance", [80.0, 0.2, 0.6, 0.2, np.inf]), ("bias_torque", [0.1])))
     alike = probabilities({"backlash": wide, "shaft_compliance": narrow})
     assert alike["shaft_compliance"] == pytest.approx(1 / (1 + np.exp(-0.75)), abs=0.01)
     assert probabilities({"backlash": wide, "bias_torque": none})["backlash"] == pytest.approx(0.5, abs=0.01)
@@ -72,11 +89,11 @@ def test_a_play_less_wide_than_its_contact_gives_way_is_a_shaft(pushed):
     def found(name, p, gain):
         return replace(judged(name, replace(pushed.fit, model=pushed.fit.model.with_effect(name, np.array(p))), pushed.fit, 1.0), gain=gain)
 
-    shaft = found("shaft_compliance", [60.0, 0.1, 0.6, 0.2], 16.0)
+    shaft = found("shaft_compliance", [60.0, 0.1, 0.6, 0.2, np.inf], 16.0)
     for gap, gain, first in ((1e-4, 20.0, "shaft_compliance"), (1e-3, 20.0, "backlash"), (1e-4, 40.0, "backlash")):
         play = found("backlash", [gap, 0.6, 0.2, 80.0, 0.1], gain)
         assert _likeliest_first([play, shaft])[0].name == first
-    assert not BY_NAME["backlash"].grown("shaft_compliance", np.array([80.0, 0.7, 0.6, 0.2]), pushed.fit.model.scales)
+    assert not BY_NAME["backlash"].grown("shaft_compliance", np.array([80.0, 0.7, 0.6, 0.2, np.inf]), pushed.fit.model.scales)
 
 
 def test_two_effects_are_found_from_either(pushed):

@@ -17,6 +17,7 @@ SIZES = {  # where the first start of an effect is too small to be seen beside t
     "end_stop": [0.15, 0.35, 100.0, 0.3], "sensor_quantisation": [0.0213], "voltage_saturation": [5.0, 8.0],
     "load_disturbance": [150.0, 0.6, 0.5, 0.0], "sensor_dropout": [4.0, 0.08], "sensor_lag": [0.01, 0.0103],
     "cogging": [22.0, 0.125, 0.0, 0.3, 1.0], "sensor_nonlinearity": [0.2, 0.1, np.inf, np.inf, np.inf],
+    "shaft_compliance": [12.0, 0.1, 0.6, 0.2, 0.03],
 }
 
 
@@ -70,7 +71,7 @@ def test_both_plants_read_the_recordings_own_clock():
 
 def test_a_shaft_beside_a_play_softens_its_contact():
     """Both at once are one play with the shaft's spring, in either plant and whichever is named first."""
-    both = [("backlash", np.array([0.012, 0.6, 0.2, 120.0, 0.2])), ("shaft_compliance", np.array([20.0, 0.2, 0.6, 0.2]))]
+    both = [("backlash", np.array([0.012, 0.6, 0.2, 120.0, 0.2])), ("shaft_compliance", np.array([20.0, 0.2, 0.6, 0.2, np.inf]))]
     u = INPUTS["multisine"](T)
     law, stiff = ReducedModel(EQ_5, both).simulate(T, u), ReducedModel(EQ_5, both[:1]).simulate(T, u)
     twin = MechanicalPlant(EQ_5, both, parameters=SHEET.parameters).simulate(T, u)

@@ -37,7 +37,7 @@ class Backlash(Transmission):
         """A twisting shaft is a contact without play: one as wide as the noise, or a third of that."""
         if name != "shaft_compliance" or p[1] > SPRINGY:
             return []
-        f, zeta, rho, phi = p
+        f, zeta, rho, phi, _ = p
         return [np.array([part * scales.noise, rho, phi, min(f, 1000.0), max(zeta, 0.05)]) for part in (1.0, 0.3)]
 
     def really(self, p, friction):

@@ -27,9 +27,9 @@ class Coefficients(NamedTuple):
 
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
-    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``. With rho = 0 it
-    is the foot of a bristle instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder, and
-    the bristle's damping is d_twist exp(-(w / fade)^2).
+    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or, without a gap, gets stiffer
+    the more it is twisted: k_twist (x + ``harden`` x^3). With rho = 0 it is the foot of a bristle instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the
+    rudder, and the bristle's damping is d_twist exp(-(w / fade)^2).
     """
 
     a_1: float = 0.0
@@ -56,6 +56,7 @@ class Coefficients(NamedTuple):
     d_twist: float = 0.0
     gap: float = 0.0
     fade: float = np.inf
+    harden: float = 0.0
 
     @property
     def has_motor_side(self) -> bool:
@@ -275,16 +276,17 @@ class Sensor(Effect):
     subsystem = "sensor"
 
 
-def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap: float = 0.0) -> Coefficients:
-    """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta, slack within +-gap.
+def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap: float = 0.0, harden: float = 0.0) -> Coefficients:
+    """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta, slack within +-gap,
+    or stiffer by harden [1/output unit^2].
 
-    Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones named.
+    Where c has two bodies already, the springs, the dampers and the slacks are in series, and nothing hardens; the shares are the last ones named.
     A bristle gives way to them: friction is then rigid.
     """
     k, d = (2 * np.pi * f) ** 2, 4 * np.pi * zeta * f
     if c.has_motor_side and c.k_twist > 0:
-        k, d = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist)
-    return c._replace(two_body=1.0, gap=c.gap + gap, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d)
+        k, d, harden = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist), 0.0
+    return c._replace(two_body=1.0, gap=c.gap + gap, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d, harden=harden)
 
 
 def recursive(decay: np.ndarray, driven: np.ndarray) -> np.ndarray:

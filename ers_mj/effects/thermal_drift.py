@@ -6,6 +6,7 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter, law, recursive
 
+SHORTEST = 0.5  # [s] warm-up: windings of small motors take seconds
 COLDEST = -0.9  # of the resistance, by which it may fall at most
 
 
@@ -21,14 +22,14 @@ class ThermalDrift(Drive):
     mjcf = "none: the torque is set step by step (the thermal of a dcmotor knows heat in watts, which no recording of an angle tells)"
     parameters = (
         Parameter("rise", "ratio", "relative rise of the resistance, once warm at a standstill under the largest input", positive=False, lower=-3.0, upper=30.0),
-        Parameter("T_w", "time", "time constant of the warm-up", upper=1e4),
+        Parameter("T_w", "time", "time constant of the warm-up", lower=SHORTEST, upper=1e4),
         Parameter("u", "input", "largest input, 24 where it is not told", fitted=False, absent=24.0),
     )
     needs = (("rise",),)
     sized, tries = 1, 2
 
     def starts(self, scales):
-        return [np.array([0.4, part * scales.duration, scales.input]) for part in (0.3, 1.5, 0.06)]
+        return [np.array([0.4, max(part * scales.duration, SHORTEST), scales.input]) for part in (0.3, 1.5, 0.06)]
 
     def constants(self, p, c):
         return np.array([p[0], p[1], abs(c.b) * p[2], 0.0, 0.0])

@@ -94,20 +94,26 @@ def residual(c: Coefficients, h: float, centre: float, C: complex, f_hz: float, 
 
 def _passed(c: Coefficients, w: float, torque: float) -> complex | None:
     """N of the contact [1/s^2] at the twist by which it passes this much [rad/s^2]; None where no twist does."""
-    if c.gap <= 0:
+    if c.gap <= 0 and c.harden <= 0:
         return c.k_twist + 1j * w * c.d_twist
-    torques, N = _contacts(c.k_twist, c.d_twist, c.gap, w)
-    if not torques[0] <= torque <= torques[-1]:
+    torques, N = _contacts(c.k_twist, c.d_twist, c.gap, c.harden, w)
+    if torque > torques[-1] or torque < torques[0] and c.gap > 0:
         return None
     at = math.log(torque)
     return complex(np.interp(at, np.log(torques), N.real), np.interp(at, np.log(torques), N.imag))
 
 
 @lru_cache(maxsize=4 * LOOKED_HZ)
-def _contacts(k: float, d: float, gap: float, w: float) -> tuple[np.ndarray, np.ndarray]:
-    """What the contact passes (X,) [rad/s^2] of twists just beyond the play up to WIDEST times it, and its N (X,)."""
-    twist = gap * (1.0 + np.geomspace(1e-4, WIDEST, TWISTS))
-    N = contact(k, d, gap, twist, w)
+def _contacts(k: float, d: float, gap: float, harden: float, w: float) -> tuple[np.ndarray, np.ndarray]:
+    """What the contact passes (X,) [rad/s^2] of twists just beyond the play up to WIDEST times it, and its N (X,); of a shaft that hardens, of twists as small
+    against that at which it takes twice the torque."""
+    spread = np.geomspace(1e-4, WIDEST, TWISTS)
+    if harden > 0:
+        twist = spread / np.sqrt(harden)
+        N = k * (1.0 + 0.75 * harden * twist**2) + 1j * w * d  # of a cube: Gelb and Vander Velde 1968
+    else:
+        twist = gap * (1.0 + spread)
+        N = contact(k, d, gap, twist, w)
     return np.abs(N) * twist, N
 
 

@@ -12,7 +12,7 @@ preload's corner does not hold it. Its slip s_m is 0 while the bristle bends, wh
 once the bristle is bent to the full: from there to the next reversal friction is Coulomb's and the flow linear. Where a law moves
 the level F, the bristle lags behind it and s_m stays 0.
 
-Within a mode the plant itself is linear: a precomputed map over a whole segment of a sample, a Taylor series to machine
+Within a mode the plant itself is linear (but for a shaft that hardens, which is stepped as a law is): a precomputed map over a whole segment of a sample, a Taylor series to machine
 precision over a part of one. What the laws of effects add is a force; over a segment it enters the same maps as a parabola in time
 through three evaluations (an exponential integrator), over a part of one by a fourth-order Runge-Kutta step.
 """
@@ -30,7 +30,7 @@ from ers_mj.plants.laws import friction_level, moved, remember, total_torque
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
- BETA, PHI, K_TWIST, D_TWIST, GAP, FADE) = range(len(Coefficients._fields))
+ BETA, PHI, K_TWIST, D_TWIST, GAP, FADE, HARDEN) = range(len(Coefficients._fields))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
@@ -62,13 +62,20 @@ def _twist_force(c, twist, theta, w, theta_m, w_m):
     """Acceleration (per total inertia) that the motor's side exerts on the rudder through the contact."""
     if twist == 0:
         return 0.0
-    return c[K_TWIST] * (theta_m - theta - twist * c[GAP]) + c[D_TWIST] * (w_m - w)
+    x = theta_m - theta - twist * c[GAP]
+    return c[K_TWIST] * x * (1.0 + c[HARDEN] * x * x) + c[D_TWIST] * (w_m - w)
 
 
 @inlined
 def _has_bristle(c):
     """Whether the second body is the foot of a bristle, which has no inertia."""
     return c[TWO] > 0 and c[RHO] <= 0
+
+
+@inlined
+def _bends(c, m):
+    """Whether a bristle that has not yet let go, or a shaft that hardens, keeps the mode from being linear: it is stepped as a law is."""
+    return m[3] == 0 if _has_bristle(c) else c[HARDEN] > 0
 
 
 @inlined
@@ -396,8 +403,8 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
 
 
 @part
-def _rate(c, m, w, tau, a_emf):
-    """An upper bound [1/s] of the fastest rate in a mode."""
+def _rate(c, m, x, tau, a_emf):
+    """An upper bound [1/s] of the fastest rate in a mode, at the state x."""
     rate = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
     if tau > 0:
         rate = max(rate, 1.0 / tau) + math.sqrt(a_emf / tau)
@@ -405,22 +412,22 @@ def _rate(c, m, w, tau, a_emf):
         rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
     if _has_bristle(c):
         if m[3] == 0:
-            rate += math.sqrt(c[K_TWIST]) + c[D_TWIST] + 2.0 * c[K_TWIST] * abs(w) / (c[C_PLUS] + c[C_MINUS])
+            rate += math.sqrt(c[K_TWIST]) + c[D_TWIST] + 2.0 * c[K_TWIST] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS])
     elif c[TWO] > 0:
         rate = rate / min(c[RHO], 1.0 - c[RHO])
         if m[4] != 0:
             share = c[RHO] * (1.0 - c[RHO])
-            rate = max(rate, math.sqrt(c[K_TWIST] / share) + c[D_TWIST] / share)
+            stiffer = 1.0 + 3.0 * c[HARDEN] * (x[3] - x[0]) ** 2
+            rate = max(rate, math.sqrt(c[K_TWIST] * stiffer / share) + c[D_TWIST] / share)
     return rate
 
 
 @part
 def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     """The state dt later within the mode."""
-    bends = _has_bristle(c) and m[3] == 0
-    if not bends and (not lawful or (m[0] == 0 and c[TWO] <= 0)):
+    if not _bends(c, m) and (not lawful or (m[0] == 0 and c[TWO] <= 0)):
         return _linear(c, x, m, drive, tau, a_emf, dt, 1.0)
-    n = int(_rate(c, m, x[1], tau, a_emf) * dt / RATE_STEP) + 1
+    n = int(_rate(c, m, x, tau, a_emf) * dt / RATE_STEP) + 1
     for k in range(n):
         x = _runge_kutta(c, on, p, lawful, t + k * dt / n, x, m, drive, tau, a_emf, dt / n)
     return x
@@ -642,7 +649,7 @@ def _extra(c, on, p, load, t, x, s):
 def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
     """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they add now (NaN: unknown)."""
     two = c[TWO] > 0
-    if _has_bristle(c) and m[3] == 0:
+    if _bends(c, m):
         bias = c[BIAS]
         c[BIAS] = bias + load
         z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, h)
@@ -866,7 +873,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     tau, a_emf = c[TAU], c[A_EMF]
     ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
     late, early = _maps(c, tau, a_emf, _last(ends)), _maps(c, tau, a_emf, ends[0])
-    leaps = c[TWO] > 0 and not _has_bristle(c) and not lawful and ends.size > 1 and fresh[0] == 1
+    leaps = c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0 and not lawful and ends.size > 1 and fresh[0] == 1
     whole = _maps(c, tau, a_emf, h0) if leaps else early
     _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out)
 

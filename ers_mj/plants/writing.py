@@ -135,7 +135,8 @@ def _write_play(skeleton: Skeleton, c: Coefficients) -> None:
     joint, (rocker, rudder) = skeleton.spec.joint("gap"), skeleton.local
     if c.gap <= 0:
         joint.limited = False
-        joint.stiffness, joint.damping = [skeleton.inertia * c.k_twist, 0.0, 0.0], [skeleton.inertia * c.d_twist, 0.0, 0.0]
+        stiffness = skeleton.inertia * c.k_twist
+        joint.stiffness, joint.damping = [stiffness, 0.0, stiffness * c.harden], [skeleton.inertia * c.d_twist, 0.0, 0.0]
         return
     joint.limited, joint.range, joint.solimp_limit = True, [-c.gap, c.gap], PLAY
     joint.solref_limit = [2 * skeleton.spec.option.timestep, OVERDAMPED]

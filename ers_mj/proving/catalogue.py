@@ -144,6 +144,7 @@ def put_position(p, s, shape, record):
 # ---- transmission -----------------------------------------------------------------------------------------------------
 
 CONTACT = ("spring and damper", "Hunt-Crossley")
+SHAFT = ("linear", "sinh", "in stages")
 RIGID = "rigid limit"
 """Of MuJoCo; the quick simulator takes a spring and damper."""
 
@@ -169,15 +170,15 @@ def put_backlash(p, s, shape, record):
 
 
 def draw_compliance(rng, context):
-    """A linear or a hardening shaft."""
-    return {"form": choose(rng, "linear", "hardening"), "zeta": float(rng.uniform(0.03, 0.2)),
+    """A linear shaft, or one that gets stiffer."""
+    return {"form": choose(rng, *SHAFT), "zeta": float(rng.uniform(0.03, 0.2)),
             "motor_friction_share": float(rng.uniform(0.15, 0.4))}
 
 
 def put_compliance(p, s, shape, record):
     """Strength [deg per N m]."""
     split(p, 1.0 / (s * DEG), shape["zeta"], shape["motor_friction_share"])
-    p["con_form"] = 2.0 if shape.get("form") == "hardening" else 0.0
+    p["con_form"] = 2.0 * index(SHAFT, shape.get("form", SHAFT[0]))
 
 
 def draw_ratio(rng, context):

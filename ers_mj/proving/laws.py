@@ -286,10 +286,13 @@ def motor_torque(p, y):
 @njit(cache=True)
 def contact_torque(p, y):
     """[N m] joint between motor and rudder: 0 (and 3, rigid in MuJoCo) spring and damper in a gap, never pulling;
-    1 Hunt-Crossley; 2 hardening shaft."""
+    1 Hunt-Crossley; 2 a shaft of rubber, 4 one whose stiffness rises in stages, as a strain wave gear's."""
     d, speed = y[THM] - y[TH], y[WM] - y[W]
     if p.con_form == 2.0:
-        return p.con_k * d * (1.0 + (d / 0.03) ** 2) + p.con_c * speed
+        return p.con_k * 0.02 * np.sinh(d / 0.02) + p.con_c * speed
+    if p.con_form == 4.0:
+        staged = d + 0.6 * (max(d - 0.008, 0.0) + min(d + 0.008, 0.0)) + 0.9 * (max(d - 0.024, 0.0) + min(d + 0.024, 0.0))
+        return p.con_k * staged + p.con_c * speed
     if p.gap <= 0.0:
         return p.con_k * d + p.con_c * speed
     side = 1.0 if d > 0.0 else -1.0
