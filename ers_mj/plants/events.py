@@ -12,9 +12,10 @@ preload's corner does not hold it. Its slip s_m is 0 while the bristle bends, wh
 once the bristle is bent to the full: from there to the next reversal friction is Coulomb's and the flow linear. Where a law moves
 the level F, the bristle lags behind it and s_m stays 0.
 
-Within a mode the plant itself is linear (but for a shaft that hardens, which is stepped as a law is): a precomputed map over a whole segment of a sample, a Taylor series to machine
+Within a mode the plant itself is linear: a precomputed map over a whole segment of a sample, a Taylor series to machine
 precision over a part of one. What the laws of effects add is a force; over a segment it enters the same maps as a parabola in time
-through three evaluations (an exponential integrator), over a part of one by a fourth-order Runge-Kutta step.
+through three evaluations (an exponential integrator), over a part of one by a fourth-order Runge-Kutta step. What a shaft that hardens adds
+to its spring's force goes the same ways.
 """
 
 from __future__ import annotations
@@ -74,8 +75,14 @@ def _has_bristle(c):
 
 @inlined
 def _bends(c, m):
-    """Whether a bristle that has not yet let go, or a shaft that hardens, keeps the mode from being linear: it is stepped as a law is."""
-    return m[3] == 0 if _has_bristle(c) else c[HARDEN] > 0
+    """Whether a bristle has not yet let go, which keeps the mode from being linear: it is stepped as a law is."""
+    return _has_bristle(c) and m[3] == 0
+
+
+@inlined
+def _hardening(c, x):
+    """What a shaft that hardens adds to the force of its spring, per total inertia."""
+    return c[K_TWIST] * c[HARDEN] * (x[3] - x[0]) ** 3
 
 
 @inlined
@@ -425,7 +432,7 @@ def _rate(c, m, x, tau, a_emf):
 @part
 def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     """The state dt later within the mode."""
-    if not _bends(c, m) and (not lawful or (m[0] == 0 and c[TWO] <= 0)):
+    if not _bends(c, m) and c[HARDEN] <= 0 and (not lawful or (m[0] == 0 and c[TWO] <= 0)):
         return _linear(c, x, m, drive, tau, a_emf, dt, 1.0)
     n = int(_rate(c, m, x, tau, a_emf) * dt / RATE_STEP) + 1
     for k in range(n):
@@ -572,7 +579,8 @@ def _unit(k):
 
 @part
 def _fill_map(e, c, m, tau, a_emf, h):
-    """The exact map over h in a mode with side 0: e (5, 11), columns x (5), constant, drive, side, force 1, s, s^2 (s = t/h)."""
+    """The exact map over h in a mode with side 0: e (5, 14), columns x (5), constant, drive, side, force on the rudder 1, s, s^2 (s = t/h), and the same
+    of a force between the two bodies where their shaft hardens."""
     for k in range(5):
         z = _linear(c, _unit(k), m, 0.0, tau, a_emf, h, 0.0)
         for i in range(5):
@@ -583,7 +591,8 @@ def _fill_map(e, c, m, tau, a_emf, h):
     share = 1.0 - c[RHO] if c[TWO] > 0 else 1.0
     for i in range(5):
         e[i, 5], e[i, 6] = base[i], pull[i] - base[i]
-        e[i, 8] = e[i, 9] = e[i, 10] = 0.0
+        for k in range(8, 14):
+            e[i, k] = 0.0
     if m[0] != 0:
         for g in range(GAUSS_X.size):
             z = _linear(c, (0.0, 1.0 / share, 0.0, 0.0, 0.0), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0)
@@ -592,14 +601,21 @@ def _fill_map(e, c, m, tau, a_emf, h):
                 e[i, 8] += v
                 e[i, 9] += v * GAUSS_X[g]
                 e[i, 10] += v * GAUSS_X[g] ** 2
+    if c[HARDEN] > 0:
+        push = (0.0, 1.0 / share if m[0] != 0 else 0.0, 0.0, 0.0, -1.0 / c[RHO] if m[3] != 0 else 0.0)
+        for g in range(GAUSS_X.size):
+            z = _linear(c, push, m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0)
+            for i in range(5):
+                for k in range(3):
+                    e[i, 11 + k] += z[i] * h * GAUSS_W[g] * GAUSS_X[g] ** k
     for i in range(5):
         e[i, 7] = -c[C_1] * e[i, 8]
 
 
 @njit(nogil=True)
 def _maps(c, tau, a_emf, h):
-    """Maps over h and over h/2 for every mode away from the stops: (2, 3, 3, 3, 5, 11), indices s + 1, s_m + 1, twist + 1."""
-    e = np.zeros((2, 3, 3, 3, 5, 11))
+    """Maps over h and over h/2 for every mode away from the stops: (2, 3, 3, 3, 5, 14), indices s + 1, s_m + 1, twist + 1."""
+    e = np.zeros((2, 3, 3, 3, 5, 14))
     for half in range(2):
         for s in range(-1, 2):
             for s_m in range(-1, 2):
@@ -632,6 +648,15 @@ def _mapped(e, two, x, drive, side, f0, f1, f2):
 
 
 @inlined
+def _twisted(e, x, drive, side, f, q):
+    """The same of a shaft that hardens, under the force f (3,) on the rudder and q (3,) between the two bodies."""
+    z = _mapped(e, True, x, drive, side, f[0], f[1], f[2])
+    return (z[0] + e[0, 11] * q[0] + e[0, 12] * q[1] + e[0, 13] * q[2], z[1] + e[1, 11] * q[0] + e[1, 12] * q[1] + e[1, 13] * q[2],
+            z[2] + e[2, 11] * q[0] + e[2, 12] * q[1] + e[2, 13] * q[2], z[3] + e[3, 11] * q[0] + e[3, 12] * q[1] + e[3, 13] * q[2],
+            z[4] + e[4, 11] * q[0] + e[4, 12] * q[1] + e[4, 13] * q[2])
+
+
+@inlined
 def _extra(c, on, p, load, t, x, s):
     """What the laws of effects add to the force on a slipping rudder under a known ``load``, per total inertia; what they take of its inertia of one body only."""
     level = c[C_PLUS] if s > 0 else c[C_MINUS]
@@ -656,6 +681,15 @@ def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
         c[BIAS] = bias
         return z, np.nan
     whole, half = e[0, m[0] + 1, m[3] + 1, m[4] + 1], e[1, m[0] + 1, m[3] + 1, m[4] + 1]
+    if c[HARDEN] > 0:
+        laws = lawful and m[0] != 0
+        g0, q0 = load + (_extra(c, on, p, load, t, x, m[0]) if laws else 0.0), _hardening(c, x)
+        z = _twisted(half, x, drive, m[1], (g0, 0.0, 0.0), (q0, 0.0, 0.0))
+        ga, qa = load + (_extra(c, on, p, load, t + 0.5 * h, z, m[0]) if laws else 0.0), _hardening(c, z)
+        z = _twisted(whole, x, drive, m[1], (g0, 2.0 * (ga - g0), 0.0), (q0, 2.0 * (qa - q0), 0.0))
+        gb, qb = load + (_extra(c, on, p, load, t + h, z, m[0]) if laws else 0.0), _hardening(c, z)
+        return _twisted(whole, x, drive, m[1], (g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0)),
+                        (q0, 4.0 * qa - 3.0 * q0 - qb, 2.0 * (qb - 2.0 * qa + q0))), np.nan
     if not lawful or m[0] == 0:
         return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0), np.nan
     g0 = load + (extra if extra == extra else _extra(c, on, p, load, t, x, m[0]))

@@ -133,7 +133,7 @@ class ReducedModel:
         c, on, p = self._lowered
         enable = np.ones(t.size, np.bool_) if enable is None else enable
         load = np.zeros(t.size) if load is None else load
-        maps, slopes, terminal, out = np.empty((2, 3, 5, 11)), np.zeros((t.size, 3)), self.terminal(u), []
+        maps, slopes, terminal, out = np.empty((2, 3, 5, 14)), np.zeros((t.size, 3)), self.terminal(u), []
         prepare_kernel(t, load, path, c.copy(), on, p.copy(), maps, slopes)
         for other in others:
             c_2, on_2, p_2 = other._lowered

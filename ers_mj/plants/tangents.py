@@ -51,7 +51,7 @@ def _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, load, t, x, s, side):
 
 
 def _prepare(t, load, path, c, on, p, maps, out):
-    """Fill maps (2, 3, 5, 11) for a closed and an open circuit, by slip (see events), and out (N, 3) with the slopes of the laws' force
+    """Fill maps (2, 3, 5, 14) for a closed and an open circuit, by slip (see events), and out (N, 3) with the slopes of the laws' force
     by theta, w and j along the motion."""
     h = t[1] - t[0]
     closed, opened = _maps(c, c[TAU], c[A_EMF], h)[0], _maps(c, 0.0, 0.0, h)[0]
