@@ -64,9 +64,9 @@ def probabilities(fits: Mapping[str, Fit]) -> dict[str, float]:
 
 
 def _is_limit(narrow: Fit, wide: Fit) -> bool:
-    """Whether an effect of the wide model, which the narrow one lacks, has one of the narrow model's as its limit."""
-    return any(BY_NAME[name].grown(other, p, wide.model.scales) for name in wide.model.names if name not in narrow.model.names
-               for other, p in narrow.model.effects if other not in wide.model.names)
+    """Whether an effect of the wide model, which the narrow one lacks, has one of the narrow model's as its limit, and is not seen to be more."""
+    return any(BY_NAME[name].grown(other, p, wide.model.scales) for name, at in wide.model.effects if name not in narrow.model.names
+               and not BY_NAME[name].seen(at, wide.model.values.get("c_2", 0.0)) for other, p in narrow.model.effects if other not in wide.model.names)
 
 
 def _runs(d: np.ndarray) -> np.ndarray:

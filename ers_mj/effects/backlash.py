@@ -40,9 +40,13 @@ class Backlash(Transmission):
         f, zeta, rho, phi, _ = p
         return [np.array([part * scales.noise, rho, phi, min(f, 1000.0), max(zeta, 0.05)]) for part in (1.0, 0.3)]
 
+    def seen(self, p, friction):
+        """A play that is wider than its contact gives way under the friction, or nearly."""
+        return p[0] >= SEEN * friction / (2.0 * np.pi * p[3]) ** 2
+
     def really(self, p, friction):
         """A play less wide than its contact gives way under the friction is not seen as one: a shaft, stiffer the more it twists."""
-        return "shaft_compliance" if p[0] < SEEN * friction / (2.0 * np.pi * p[3]) ** 2 else self.name
+        return self.name if self.seen(p, friction) else "shaft_compliance"
 
     def coefficients(self, p, c):
         return coupled(c, f=p[3], zeta=p[4], rho=p[1], phi=p[2], gap=p[0])

@@ -202,6 +202,10 @@ class Effect:
         """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of this one."""
         return []
 
+    def seen(self, p: np.ndarray, friction: float) -> bool:
+        """Whether these numbers, beside a Coulomb friction c_2, are clearly not those of an effect that is a limit of this one (see grown)."""
+        return False
+
     def really(self, p: np.ndarray, friction: float) -> str:
         """Name of the effect of which these numbers, beside a Coulomb friction c_2, are a form: its own but where it is hardly there."""
         return self.name
