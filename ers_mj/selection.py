@@ -38,7 +38,7 @@ FINISHED = 3  # of those, how many at most are fitted to the end: those with hal
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well; what cannot be scaled is in any case
 FAILED = 0.05  # share of the best first refit's gain below which a promise was none
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
-# an effect all that promise and are not dear: there a borrowed Jacobian has been bent by two)
+# an effect that is not dear all that promise and are not: there a borrowed Jacobian has been bent by two)
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 TIE, NEAR_TIE = 1.0, 0.02  # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
 NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) that this other must win itself to be told in its place
@@ -48,7 +48,7 @@ AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
 REVERSED, MOST_REVERSED = 0.1, 5  # share of the leader's gain from which a rival is begun with, the leader put in, and how many are
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
-MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often
+MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (once if dear)
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
 
@@ -147,7 +147,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             failed = {name for name, found in leaders(first).items() if reference - total(found) <= FAILED * max(most, 0.0)}
         most = max((reference - total(f) for f in first.values()), default=0.0)
         foremost = [name for name in screened.promising(failed) if name not in failed][:FOREMOST]
-        own = {*foremost, *(name for name in screened.promising() if base.model.names and not BY_NAME[name].dear)}  # where bent
+        own = {*foremost, *(name for name in screened.promising() if base.model.names and not _is_dear(base) and not BY_NAME[name].dear)}  # where bent
         best, ahead = dict(first), [label for label in starts if label[1] == 0 and label[0] in own] if bent else []
         for label, found in pool.map(finish, [(label, begin) for label in ahead for begin in starts[label]]):
             best[label] = min(best[label], found, key=total)
@@ -285,7 +285,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
-        if ranked and least <= ranked[0].gain <= MODEST and mended < MOST_MENDED:
+        if ranked and least <= ranked[0].gain <= MODEST and mended < (1 if _is_dear(current) else MOST_MENDED):
             again = _less(ranked[0], traces, tau)
             if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT:
                 base, current, mended = base if current.model.names else again, again, mended + 1
@@ -305,7 +305,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
         current = fit(current.model, traces, tau=tau, steps=20)
-        if not any(BY_NAME[name].dear for name in current.model.names):
+        if not _is_dear(current):
             current, _ = hopped(current, traces, tau, jobs)
         if near_noise(current):
             current = _exchanged(current, rounds, traces, tau, jobs)
@@ -338,6 +338,11 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
                 best[candidate.name] = candidate
         ended = list(pool.map(lambda c: judged(c.name, fit(c.fit.model, traces, tau=tau, steps=20), base, tau), best.values()))
     return [c for c in ended if sum(c.fit.model.at_bound(f) for f in c.fit.model.layout() if f.owner == c.name) <= AT_BOUND]
+
+
+def _is_dear(current: Fit) -> bool:
+    """Whether the model takes many times as long to simulate as others."""
+    return any(BY_NAME[name].dear for name in current.model.names)
 
 
 def _quiet(current: Fit, tau: float) -> bool:
