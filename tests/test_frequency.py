@@ -13,7 +13,7 @@ from ers_mj import cli
 from ers_mj.controllers import CONTROLLERS, PidGains, Servo
 from ers_mj.datasheet import read_datasheet, write_model
 from ers_mj.effects.base import Coefficients
-from ers_mj.frequency.cycle import balanced, lasting, predicted, simulated
+from ers_mj.frequency.cycle import _passed, balanced, lasting, predicted, simulated
 from ers_mj.frequency.describing import contact, controller_response, coulomb, leaning, preload, rubbing, saturation
 from ers_mj.frequency.linear import at, linearised
 from ers_mj.frequency.loop import ask, close_loop, judged
@@ -256,3 +256,10 @@ def test_bad_input_is_one_sentence_and_code_2(arguments, says, capsys):
     assert cli.main(["frequency", "--json", *arguments]) == 2
     error = capsys.readouterr().err
     assert says in error and error.count("\n") == 1
+
+
+def test_a_shaft_that_hardens_passes_more_the_wider_it_swings():
+    """k (1 + 3/4 (A / twist_2)^2) of a cube; a linear spring's where it hardly twists."""
+    c = Coefficients(two_body=1.0, k_twist=1e4, harden=1e4)
+    assert _passed(c, 0.0, 1e-6) == pytest.approx(1e4, rel=1e-6)
+    assert _passed(c, 0.0, 1.75e4 * 0.01) == pytest.approx(1.75e4, rel=2e-3)

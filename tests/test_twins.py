@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from ers_mj.effects import EFFECTS
+from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.play import rigid_play
 from ers_mj.plants.reduced import ReducedModel
 from test_mechanical import EQ_1, EQ_5, SHEET, T, rms_deg
 from test_reduced import SCALES
@@ -78,3 +79,10 @@ def test_a_shaft_beside_a_play_softens_its_contact():
     assert rms_deg(law.theta - stiff.theta) > VISIBLE
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - stiff.theta)
     assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(T, u).theta - law.theta) < 1e-9
+
+
+def test_a_shaft_beside_a_play_does_not_harden():
+    shaft, play = (lambda c: BY_NAME["shaft_compliance"].coefficients(np.array([20.0, 0.2, 0.6, 0.2, 0.01]), c),
+                   lambda c: BY_NAME["backlash"].coefficients(np.array([0.012, 0.6, 0.2, 120.0, 0.2]), c))
+    assert shaft(EQ_5).harden == pytest.approx(1e4)
+    assert shaft(play(EQ_5)).harden == play(shaft(EQ_5)).harden == shaft(rigid_play(EQ_5, 0.01)).harden == 0.0

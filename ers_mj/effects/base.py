@@ -27,9 +27,9 @@ class Coefficients(NamedTuple):
 
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
-    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or, without a gap, gets stiffer
-    the more it is twisted: k_twist (x + ``harden`` x^3). With rho = 0 it is the foot of a bristle instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the
-    rudder, and the bristle's damping is d_twist exp(-(w / fade)^2).
+    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or, without
+    a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3). With rho = 0 it is the foot of a bristle instead (effect
+    ``presliding``), which carries the Coulomb friction; the drive acts on the rudder, and the bristle's damping is d_twist exp(-(w / fade)^2).
     """
 
     a_1: float = 0.0
@@ -284,13 +284,15 @@ def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap:
     """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta, slack within +-gap,
     or stiffer by harden [1/output unit^2].
 
-    Where c has two bodies already, the springs, the dampers and the slacks are in series, and nothing hardens; the shares are the last ones named.
+    Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones named. Beside a
+    slack nothing hardens.
     A bristle gives way to them: friction is then rigid.
     """
     k, d = (2 * np.pi * f) ** 2, 4 * np.pi * zeta * f
     if c.has_motor_side and c.k_twist > 0:
-        k, d, harden = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist), 0.0
-    return c._replace(two_body=1.0, gap=c.gap + gap, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d, harden=harden)
+        k, d = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist)
+    slack = c.gap + gap
+    return c._replace(two_body=1.0, gap=slack, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d, harden=0.0 if slack > 0 else harden)
 
 
 def recursive(decay: np.ndarray, driven: np.ndarray) -> np.ndarray:
