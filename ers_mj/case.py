@@ -13,7 +13,7 @@ from ers_mj.baseline import Start
 from ers_mj.confirmation import Confirmed
 from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME
-from ers_mj.evaluation import pooled, recalibrated, scored
+from ers_mj.evaluation import Score, pooled, recalibrated, scored
 from ers_mj.identification import Fit, residuals, score
 from ers_mj.intervals import half_widths, unseen_widths
 from ers_mj.isolability import probabilities
@@ -82,14 +82,19 @@ class Case:
         """The errors before and after, as diagnosis.json has them."""
         c, base, model = self.confirmed, self.start.fit.model, self.model
         train = [pooled([scored(m, t, k) for k, t in enumerate(self.start.traces)]).rmse for m in (base, model)]
-        again = [[recalibrated(m, fold.held_out)[0] for m, fold in zip(models, c.parts)] for models in (c.base_models, c.models)]
         return {"train_rmse_before_rad": train[0], "train_rmse_after_rad": train[1],
                 "heldout_rmse_before_rad": pooled(c.before).rmse, "heldout_rmse_after_rad": pooled(c.after).rmse,
-                "recalibrated_rmse_before_rad": pooled(again[0]).rmse, "recalibrated_rmse_after_rad": pooled(again[1]).rmse,
+                "recalibrated_rmse_before_rad": self._again[0].rmse, "recalibrated_rmse_after_rad": self._again[1].rmse,
                 "mujoco_heldout_rmse_before_rad": self.multibody[0], "mujoco_heldout_rmse_after_rad": self.multibody[1],
                 "noise_floor_rad": self.noise, "heldout_from": c.sentence,
                 "mujoco_heldout_from": f"the MuJoCo plant ran {', '.join(fold.held_out.name for fold in run_in_mujoco(c.parts))} of what was held out",
                 "selection_cost_before": self.start.fit.cost, "selection_cost_after": self.selection.chosen.cost}
+
+    @cached_property
+    def _again(self) -> tuple[Score, Score]:
+        """The held-out scores before and after, recalibrated."""
+        c = self.confirmed
+        return tuple(pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(models, c.parts)]) for models in (c.base_models, c.models))
 
     @cached_property
     def explained(self) -> float:
@@ -98,9 +103,10 @@ class Case:
         Where the rig has changed between the days (held-out recordings of their own), raw or recalibrated, whichever tells more. Where stick
         and slip fork in one recording its free run is lost with any model and swamps the rest: the mean over recordings tells more then.
         """
-        shares = []
-        for kind in ("heldout", "recalibrated") if self.holdout else ("heldout",):
-            above, left = (self.fits[f"{kind}_rmse_{when}_rad"] ** 2 - self.noise**2 for when in ("before", "after"))
+        shares, c = [], self.confirmed
+        noise = math.sqrt(float(np.mean([fold.held_out.sure_noise**2 for fold in c.parts])))
+        for ends in ((pooled(c.before), pooled(c.after)), *([self._again] if self.holdout else [])):
+            above, left = (score.sure**2 - noise**2 for score in ends)
             shares.append(min(max(1.0 - left / above, 0.0), 1.0) if above > 0 else 0.0)
         return max(*shares, self._explained_each())
 
@@ -109,7 +115,7 @@ class Case:
 
         One whose free run is lost with and without them (ASTRAY) tells nothing, as long as there are others.
         """
-        above = [(b.rmse / noise, a.rmse / noise) for b, a, noise in self.confirmed.shown if b.rmse > VISIBLE * noise]
+        above = [(b.sure / noise, a.sure / noise) for b, a, noise in self.confirmed.shown if b.sure > VISIBLE * noise]
         told = [ends for ends in above if min(ends) < ASTRAY] or above
         return float(np.mean([min(max(1.0 - (a**2 - 1.0) / (b**2 - 1.0), 0.0), 1.0) for b, a in told])) if told else 0.0
 

@@ -70,11 +70,11 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
                   or _may_be_none(n, model, start.traces, selection.tau) or _is_a_converters(n, model, start.traces)]
         if not failed:
             before = _scores(base_models, parts)
-            shown = [(b, a, fold.held_out.sigma) for b, a, fold in zip(before, after, parts) if fold.record not in by_halves]
+            shown = [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(before, after, parts) if fold.record not in by_halves]
             for record in sorted(by_halves):
                 cut = halves(start.traces, record)
                 ends = (_scores(refits(some, cut, selection.tau, jobs), cut) for some in (start.fit.model, model))
-                shown += [(b, a, fold.held_out.sigma) for b, a, fold in zip(*ends, cut)]
+                shown += [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(*ends, cut)]
                 sentence += f"; {start.traces[record].name}, which teaches most of an effect, by halves as well"
             return selection, Confirmed(before, after, without, p, after_models, base_models, parts, sentence, shown)
         worst = max(failed, key=lambda n: p[n])
@@ -92,10 +92,10 @@ def _no_closer(after: Sequence[Score], without: Sequence[Score], p: float) -> bo
     Where its blocks leave no doubt, an error that forks of stick and slip make somewhat larger counts as closer, and so does one that falls in the
     geometric mean of the recordings: one of them may teach so much that the others, without it, know the rest of the model badly.
     """
-    ratio = pooled(after).rmse / pooled(without).rmse
+    ratio = pooled(after).sure / pooled(without).sure
     if p >= SURE_P or ratio < WORSE:
         return ratio >= (WORSE if p < SURE_P else 1.0)
-    return float(np.mean([math.log(a.rmse / b.rmse) for a, b in zip(after, without, strict=True)])) >= 0.0
+    return float(np.mean([math.log(a.sure / b.sure) for a, b in zip(after, without, strict=True)])) >= 0.0
 
 
 def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:

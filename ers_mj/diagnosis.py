@@ -13,6 +13,7 @@ import numpy as np
 from ers_mj.baseline import baseline
 from ers_mj.case import Case
 from ers_mj.confirmation import confirmed
+from ers_mj.converter import COARSE
 from ers_mj.datasheet import Datasheet
 from ers_mj.document import Diagnosis, told
 from ers_mj.identification import polished
@@ -21,11 +22,10 @@ from ers_mj.starts import without_spikes
 from ers_mj.multibody import Rig
 from ers_mj.recording import Recording
 from ers_mj.selection import select
-from ers_mj.traces import Trace, trace_of
+from ers_mj.traces import Trace, counted, trace_of
 
 FEWEST_LOST = 3  # dropouts from which a sensor is said to have them
 AT_BOUND = 0.95  # share of the most that the baseline allows of a known inductance, from which it may be more than an ordinary one
-COARSE = 1 / 300  # a converter whose step is more than this share of the travel is an effect, not an ordinary one
 
 Progress = Callable[[str, float], None]
 
@@ -48,15 +48,17 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     jobs = jobs or _cores()
     first = recordings[0]
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
-    traces = [trace_of(r, inertia) for r in recordings]
+    plain = [trace_of(r, inertia) for r in recordings]
+    travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in plain])))
+    traces = counted(plain, travel)
     progress("fitting the baseline", 0.03)
     start = baseline(traces, datasheet, first.output_unit == "rad", jobs)
-    sensors = _symptoms(recordings, start.traces, 2 * start.fit.model.scales.position)
+    sensors = _symptoms(recordings, start.traces, travel)
     chosen = select(start.fit, start.traces, anchors=start.anchors, exclude=_ordinary(start.fit.model), jobs=jobs, progress=progress)
-    start = replace(start, fit=polished(chosen.base, start.traces))
+    start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
     chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
     progress("judging on held-out data", 0.75)
-    held = without_spikes(start.fit.model, [trace_of(r, inertia) for r in holdout])
+    held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs)
     progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")

@@ -26,21 +26,31 @@ LAST_PART = 0.7  # where the only recording is cut into training and held out
 
 @dataclass(frozen=True)
 class Score:
-    """Squared free-run error summed over samples, their number, and block misfits (B,) of the observer form, of all channels."""
+    """Squared free-run error summed over samples, their number, and block misfits (B,) of the observer form, of all channels.
+
+    ``sure_squares`` are those of the error that no coarse converter has made (None: there is none).
+    """
 
     squares: float
     samples: int
     misfit: np.ndarray
+    sure_squares: float | None = None
 
     @property
     def rmse(self) -> float:
         """Root mean square of the free-run error [output unit]."""
         return math.sqrt(self.squares / self.samples) if self.samples else math.nan
 
+    @property
+    def sure(self) -> float:
+        """The same of the error that no coarse converter has made."""
+        return self.rmse if self.sure_squares is None or not self.samples else max(math.sqrt(self.sure_squares / self.samples), 1e-300)
+
 
 def pooled(scores: Sequence[Score]) -> Score:
     """One score of several recordings."""
-    return Score(sum(s.squares for s in scores), sum(s.samples for s in scores), np.concatenate([s.misfit for s in scores]))
+    sure = sum(s.squares if s.sure_squares is None else s.sure_squares for s in scores)
+    return Score(sum(s.squares for s in scores), sum(s.samples for s in scores), np.concatenate([s.misfit for s in scores]), sure)
 
 
 def free_run(model: Model, trace: Trace, record: int = 0) -> np.ndarray:
@@ -53,7 +63,8 @@ def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0) -> Score
     e = np.where(trace.valid, trace.y - free_run(model, trace, record), 0.0)[begin:]
     e = np.nan_to_num(e, nan=10 * float(np.nanstd(trace.y)))
     local = residuals_in(model, trace, record, OBSERVER_RATE)
-    return Score(float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)))
+    sure = None if trace.converter is None else float(np.sum(trace.converter.beyond(e) ** 2))
+    return Score(float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)), sure)
 
 
 def settled(model: Model, trace: Trace, tau: float) -> Model:

@@ -75,7 +75,7 @@ def residuals_in(model: Model, trace: Trace, record: int, rate: float) -> np.nda
 
 def _run_in(model, trace, record, rate):
     (theta, *others), motion = model.observed(trace, record, rate)
-    parts = [np.where(trace.valid, (trace.y - theta) / trace.sigma, 0.0)]
+    parts = [np.where(trace.valid, trace.weighed(theta), 0.0)]
     for channel, seen in zip(trace.channels, others):
         known = np.isfinite(channel.values)
         if channel.kind == "current":  # before the dead time is over it follows a command that was not recorded

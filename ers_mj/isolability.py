@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import Fit, residuals, score
+from ers_mj.identification import Fit, residuals_in, score
 from ers_mj.model import OBSERVER_RATE
 from ers_mj.traces import Trace
 
@@ -35,10 +35,13 @@ class Distance:
 
 def isolability(leader: Fit, others: Sequence[Fit], traces: Sequence[Trace]) -> list[Distance]:
     """The distance of each other explanation: one simulation of the recordings each, and one of the leader."""
-    e, out = residuals(leader.model, traces, OBSERVER_RATE), []
+    def shown(model):
+        return np.concatenate([trace.plain(residuals_in(model, trace, k, OBSERVER_RATE)) for k, trace in enumerate(traces)])
+
+    e, out = shown(leader.model), []
     seen = np.concatenate([t.seen for t in traces])
     for other in others:
-        apart = (residuals(other.model, traces, OBSERVER_RATE) - e)[seen]
+        apart = (shown(other.model) - e)[seen]
         d = _runs(score(other.misfit, 1.0) - score(leader.misfit, 1.0))
         spread = float(np.std(d, ddof=1)) * math.sqrt(d.size) if d.size > 1 else math.inf
         out.append(Distance(float(d.sum()), float(d.sum()) / spread if spread > 0 else 0.0, float(np.sqrt(np.mean(apart**2))),

@@ -270,8 +270,11 @@ class Model:
             plants = [other.plant(k, trace.supply) for other in others]
             moved = plant.tangents(trace.t, trace.u, path, plants, scale, **clock)
             here, unseen = self.shown(trace, plant, path), np.flatnonzero(~trace.valid)
+            slope = trace.converter and trace.converter.slope(trace.y - plant.read(trace.t, path[:, 0]) - self.offset(k))
             for other, its, move, row in zip(others, plants, moved, changes[:, ends[k]:ends[k + 1]]):
                 np.divide(move[:, 0] + (other.offset(k) - self.offset(k)) * scale, trace.sigma, out=row[:trace.t.size])
+                if slope is not None:
+                    row[:trace.t.size] *= slope
                 row[unseen] = 0.0
                 if trace.channels:
                     there = other.shown(trace, its, path + np.column_stack([move, move[:, 0]]) / scale)
@@ -285,4 +288,4 @@ class Model:
         theta, omega = trace.start if start is None else start
         drive = 0.0 if omega == 0 else plant.coefficients.b * trace.u[0] - plant.coefficients.a_emf * omega
         return plant, {"start": (plant.behind(theta - shift), omega, drive), "enable": trace.enable, "load": trace.load,
-                       "y": trace.y - shift if gain > 0 else None, "gain": gain, "every": every}
+                       "y": trace.followed - shift if gain > 0 else None, "gain": gain, "every": every}

@@ -33,7 +33,7 @@ def left_by_sensor(model: Model, traces: Sequence[Trace]) -> dict[str, float]:
     """
     logs: dict[str, list[np.ndarray]] = {}
     for record, trace in enumerate(traces):
-        parts = residuals_in(model, trace, record, OBSERVER_RATE).reshape(-1, trace.t.size)
+        parts = trace.plain(residuals_in(model, trace, record, OBSERVER_RATE)).reshape(-1, trace.t.size)
         block = trace.block // math.ceil(FEWEST * trace.sample_time / BLOCK)
         sensors = [("output", trace.y, trace.sigma, trace.quantum, trace.valid)]
         sensors += [(c.kind, c.values, c.sigma, converter_step(c.values), np.isfinite(c.values)) for c in trace.channels]

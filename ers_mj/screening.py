@@ -156,7 +156,8 @@ def _targets(place: Model, left: np.ndarray, traces: Sequence[Trace], tau: float
 def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.ndarray, target: np.ndarray, traces: Sequence[Trace],
             tau: float) -> list[tuple[float, Model]]:
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all for a small one, so that no secant
-    may be scaled. The best starts of different side, length or recording, brought nearer, with what they gain in C as a share of the residual.
+    may be scaled. The best starts of different side, length or recording, brought nearer, with what they gain in C as a share of the residual. What a coarse
+    converter's thresholds tell counts as rounding here: a knock bends to when one of them was passed.
     """
     ends, best = np.cumsum([0, *(trace.rows for trace in traces)]), {}
     column = [p.name for p in effect.parameters].index("record")
@@ -164,7 +165,7 @@ def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.nd
     def gain(start):
         k = int(start[column])
         left = e[ends[k]:ends[k + 1]], residuals_in(place.with_effect(effect.name, start), traces[k], k, OBSERVER_RATE)
-        without, beside = (float(np.sum(score(Blocks.of([traces[k]]).misfit(some), tau))) for some in left)
+        without, beside = (float(np.sum(score(Blocks.of([traces[k]]).misfit(traces[k].plain(some)), tau))) for some in left)
         return without - beside if np.isfinite(beside) else -math.inf
 
     tried: dict[tuple, list[tuple[float, np.ndarray]]] = {}

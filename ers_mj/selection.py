@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME, EQUIVALENT
-from ers_mj.identification import Fit, converged, fit, hopped, near_noise, score, tau_of
+from ers_mj.identification import Fit, converged, fit, hopped, near_noise, residuals_in, score, tau_of
 from ers_mj.isolability import PARAMETER_PRICE, probabilities
-from ers_mj.model import STATES, Model
+from ers_mj.model import OBSERVER_RATE, STATES, Model
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, Begin, screen, stands_out
+from ers_mj.starts import with_starts
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 3.0  # decrease of C that an effect must buy: one servo in forty without missing physics offers as much (evaluation.NULL_GAIN)
@@ -182,7 +183,16 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         if rivals > 1:
             lead, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau), base, tau), ranked[:rivals])
-    return _likeliest_first(sorted(ranked, key=lambda c: -c.worth))
+    return _likeliest_first(sorted((c for c in ranked if not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
+
+
+def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
+    """Whether a knock moves the reading by less than a coarse converter's step: it stands for where the rudder began within one."""
+    if candidate.name not in BY_NAME or not BY_NAME[candidate.name].once:
+        return False
+    models = candidate.fit.model, candidate.fit.model.without_effect(candidate.name)
+    moved = [(np.subtract(*(trace.plain(residuals_in(m, trace, k, OBSERVER_RATE)) for m in models)), trace) for k, trace in enumerate(traces)]
+    return all(trace.converter is not None and float(np.max(np.abs(d[:trace.t.size]))) * trace.sigma < trace.converter.step for d, trace in moved if np.any(d))
 
 
 def _priced(found: Fit) -> float:
@@ -268,12 +278,14 @@ def _clocked(name: str) -> bool:
 
 @dataclass(frozen=True)
 class Selection:
-    """The chosen model, the baseline it grew from, each round's candidates, and the tau at which the last was judged."""
+    """The chosen model, the baseline it grew from, each round's candidates, the tau at which the last was judged, and the traces with the starts that
+    the chosen model gives them."""
 
     base: Fit
     chosen: Fit
     rounds: tuple[tuple[Candidate, ...], ...]
     tau: float
+    traces: Sequence[Trace]
 
 
 def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str, float]] = (), exclude: Sequence[str] = (),
@@ -304,12 +316,18 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         ranked = rounds[-1]
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         tau = tau_of(current.misfit)
+        traces = _restarted(current.model, traces)
         current = fit(current.model, traces, tau=tau, steps=20)
         if not _is_dear(current):
             current, _ = hopped(current, traces, tau, jobs)
         if near_noise(current):
             current = _exchanged(current, rounds, traces, tau, jobs)
-    return Selection(base, current, tuple(rounds), tau)
+    return Selection(base, current, tuple(rounds), tau, traces)
+
+
+def _restarted(model: Model, traces: Sequence[Trace]) -> Sequence[Trace]:
+    """The traces with new starts where converters are coarse: within a step a model tells where the rudder began, and a wrong one tells it wrongly."""
+    return with_starts(model, traces) if any(trace.converter is not None for trace in traces) else traces
 
 
 def _is_cheap_and_wrong(current: Fit, base: Fit, traces: Sequence[Trace]) -> bool:

@@ -14,6 +14,7 @@ from ers_mj.traces import Trace, start_samples, start_seen
 SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
 SPIKE_SAMPLES, SPIKE_TIME = 3, 0.005  # length of a spike at most, and [s]
 HELD_SIGMAS, HELD_STEPS, HELD_LEAP = 6.0, 2.0, (0.6, 1.6)  # noise levels and converter steps of a model's motion during a hold; share of it in the leap after
+MOVED, WITHIN = 0.25, 17  # [s] from the first threshold of a coarse converter, up to which it tells a start; how many places within its step are tried
 FEWEST_SPIKES = 3  # that the recordings must show by themselves before the model's error is searched
 
 
@@ -58,11 +59,13 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
 
     A speed is a poor excuse for a wrong model: it starts at rest unless the recording itself shows a speed, and with one that this allows (start_seen).
     """
+    if trace.converter is not None:
+        return _start_within(model, trace, record)
     n = start_samples(trace.t)
     head = trace.part(0, n)
 
     def misses(x):
-        e = np.where(head.valid, head.y - model.predict(head, record, start=x), 0.0) / trace.sigma
+        e = np.where(head.valid, head.weighed(model.predict(head, record, start=x)), 0.0)
         return e if np.all(np.isfinite(e)) else np.full(n, 1e9)
 
     def settle(x, moving):
@@ -85,3 +88,17 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
         return float(fitted[0]), float(fitted[1])
     speed = min(max(float(fitted[1]), low), high)
     return float(settle(np.array([begun[0], speed]), moving=False)[0]), speed
+
+
+def _start_within(model: Model, trace: Trace, record: int) -> tuple[float, float]:
+    """The same behind a coarse converter: where within its first step the rudder was is told by when it passed the first thresholds."""
+    passed = np.flatnonzero(np.abs(np.diff(trace.y)) > 0.0)
+    head = trace.part(0, max(start_samples(trace.t), int(np.searchsorted(trace.t, trace.t[passed[0]] + MOVED)) if passed.size else 0))
+    theta, omega = trace.y[np.argmax(trace.valid)], trace.start[1]
+
+    def missed(place):
+        e = np.where(head.valid, head.weighed(model.predict(head, record, start=(place, omega))), 0.0)
+        return float(np.sum(np.log1p(e**2))) if np.all(np.isfinite(e)) else np.inf
+
+    half = 0.5 * trace.converter.step
+    return float(min(np.linspace(theta - half, theta + half, WITHIN), key=missed)), omega

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ers_mj.converter import COARSE, Converter
 from ers_mj.recording import Recording
 from ers_mj.symptoms import at_extreme, converter_step, frozen_spans, leapt_spans, spikes
 
@@ -37,7 +38,7 @@ class Trace:
     """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the (reading, speed) it starts with, and the spans that its sensor lost.
 
     ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output. ``supply`` is the measured one
-    [V] (N,), None where none was measured or it does not vary.
+    [V] (N,), None where none was measured or it does not vary; ``converter`` the one whose steps are coarse for the travel, where there is one.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Trace:
     lost: tuple[slice, ...] = ()
     channels: tuple[Channel, ...] = ()
     supply: np.ndarray | None = None
+    converter: Converter | None = None
 
     @property
     def is_coarse(self) -> bool:
@@ -77,7 +79,8 @@ class Trace:
         pick = lambda a: None if a is None else a[cut]  # noqa: E731
         made = make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
                           pick(self.load), self.sigma, self.quantum)
-        return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels), supply=pick(self.supply))
+        return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels), supply=pick(self.supply),
+                       converter=self.converter)
 
     def without(self, spans: Sequence[slice]) -> Trace:
         """The trace with further spans lost."""
@@ -87,12 +90,30 @@ class Trace:
         for span in spans:
             valid[span] = False
         made = make_trace(self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum)
-        return replace(made, start=self.start, channels=self.channels, supply=self.supply, lost=(*self.lost, *spans))
+        return replace(made, start=self.start, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans))
 
     @property
     def seen(self) -> np.ndarray:
         """Which of its residuals (rows,) a sensor saw."""
         return np.concatenate([self.valid, *(np.isfinite(c.values) for c in self.channels)])
+
+    @cached_property
+    def followed(self) -> np.ndarray:
+        """What an observer may follow (N,), NaN where nothing."""
+        return self.y if self.converter is None else self.converter.path(self.t, self.y)
+
+    @property
+    def sure_noise(self) -> float:
+        """The noise in what a reading surely tells (see evaluation.Score)."""
+        return self.sigma if self.converter is None else self.converter.sure_noise
+
+    def weighed(self, theta: np.ndarray) -> np.ndarray:
+        """The output less a simulated one (N,), in sigmas."""
+        return (self.y - theta) / self.sigma if self.converter is None else self.converter.weighed(self.y - theta)
+
+    def plain(self, e: np.ndarray) -> np.ndarray:
+        """Residuals (rows,) in sigmas as they would be without what a coarse converter's thresholds tell."""
+        return e if self.converter is None else np.concatenate([self.converter.plain(e[:self.t.size]), e[self.t.size:]])
 
     @property
     def rows(self) -> int:
@@ -113,6 +134,11 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     trace = make_trace(recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum)
     trace = trace.without(lost)
     return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid), supply=_supply(recording))
+
+
+def counted(traces: Sequence[Trace], travel: float) -> list[Trace]:
+    """The traces with their converters, where these are coarse for the travel [output unit]."""
+    return [replace(t, converter=Converter(t.quantum, t.sigma)) if t.quantum > COARSE * travel else t for t in traces]
 
 
 def _supply(recording: Recording) -> np.ndarray | None:
