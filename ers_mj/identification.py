@@ -107,7 +107,7 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
     ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
     given up, since its start was a bad one. ``known`` are columns of a Jacobian taken near by, with which the search begins; after
     ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further. Where their number is unlimited a search
-    ``by_tangents`` (see jacobian_of) does not end before finite differences lead no further either.
+    ``by_tangents`` (see jacobian_of) does not end before finite differences lead no further either, unless these are dear.
 
     Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
     mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
@@ -206,7 +206,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
     """
     layout, blocks = run.model.layout(), Blocks.of(traces)
     z, damping, fresh = run.model.vector(layout), 1e-3, False
-    final = not by_tangents or math.isfinite(renewals) or not _has_tangents(run.model, traces)
+    final = not by_tangents or math.isfinite(renewals) or not _has_tangents(run.model, traces) or any(BY_NAME[name].dear for name in run.model.names)
 
     def judged(run, z):
         """(run, misfits (B,), cost), the last two None and infinite of a runaway."""
@@ -278,7 +278,7 @@ def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns |
     """Slopes (N, k) of what a run leaves by the numbers fitted of its model, but for the ``known`` ones.
 
     By tangents of the motion where the model has them, else by finite differences of simulations. Where stick and slip fork
-    the two lead elsewhere, and either may be the better.
+    the two lead elsewhere, and either may be the better. Numbers whose effect on a motion hangs on what is finer than its samples go by differences.
     """
     model, layout = run.model, run.model.layout()
     z = model.vector(layout)
@@ -287,12 +287,13 @@ def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns |
     for k in set(range(z.size)) - set(wanted):
         jacobian[:, k] = known[layout[k].key]
     step = step_of(model)
-    others = [model.at(layout, z + step * (np.arange(z.size) == k)) for k in wanted]
-    if by_tangents and _has_tangents(model, traces):
-        jacobian[:, wanted] = -model.changes(traces, rate, others, 1.0 / step, run.motions)
-    else:
-        for k, other in zip(wanted, others):
-            jacobian[:, k] = (residuals(other, traces, rate) - run.left) / step
+    others = {k: model.at(layout, z + step * (np.arange(z.size) == k)) for k in wanted}
+    tangible = by_tangents and _has_tangents(model, traces)
+    along = [k for k in wanted if tangible and (layout[k].owner not in BY_NAME or BY_NAME[layout[k].owner].tangible)]
+    if along:
+        jacobian[:, along] = -model.changes(traces, rate, [others[k] for k in along], 1.0 / step, run.motions)
+    for k in (k for k in wanted if k not in along):
+        jacobian[:, k] = (residuals(others[k], traces, rate) - run.left) / step
     jacobian[~np.isfinite(jacobian)] = 0.0
     return jacobian
 

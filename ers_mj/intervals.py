@@ -22,6 +22,7 @@ from ers_mj.traces import Blocks, Trace
 UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (selection.LEAST_GAIN is what it must)
 UNSEEN = 1.0  # effects of that size that act, on average
 FEWEST_RECORDS = 3
+LOST = 1e6  # sigmas that a run leaves where it ran away
 RUN = 4  # neighbouring blocks that are resampled together
 
 
@@ -43,7 +44,7 @@ def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model]
 def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
     """95 % half-widths (k,) by H^-1 (sum of outer products of the slopes of runs of blocks) H^-1."""
     layout, blocks = model.layout(), Blocks.of(traces)
-    e, z = residuals(model, traces, OBSERVER_RATE), model.vector(layout)
+    e, z = _left(model, traces), model.vector(layout)
     jacobian = central_jacobian(model, layout, z, traces, OBSERVER_RATE)
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     weighted = jacobian * weight[:, None]
@@ -56,6 +57,11 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
     return stdtrit(max(n - len(layout), 1), 0.975) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
+def _left(model: Model, traces: Sequence[Trace]) -> np.ndarray:
+    """What the run leaves (N,); where it ran away so much that the blocks weigh nothing."""
+    return np.nan_to_num(residuals(model, traces, OBSERVER_RATE), nan=LOST)
+
+
 def unseen_widths(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
     """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move to make up for them.
 
@@ -63,7 +69,7 @@ def unseen_widths(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarr
     makes of it; any effect is as likely as the next, UNSEEN of them act.
     """
     layout, blocks = model.layout(), Blocks.of(traces)
-    e = residuals(model, traces, OBSERVER_RATE)
+    e = _left(model, traces)
     jacobian = central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     hessian = jacobian.T @ (weight[:, None] * jacobian)

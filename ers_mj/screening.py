@@ -63,27 +63,25 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth LEAST_PROMISE. (How far C
     lies above zero is no such sign: it hangs on the noise, which is an estimate.)
 
-    What is dear to simulate is refitted from its most promising place only, and beside it secants are taken along the motion without it.
+    What is dear to simulate is refitted from its most promising place only.
     """
     names, floor, most = [name for name in BY_NAME if name not in exclude], 0.0, LATER if places[0].names else MOST_BENT if bent else MOST_SENT
     promises, begins = {}, {}
     for place in places:
-        run, light = run_of(place, traces, OBSERVER_RATE), _light(place)
-        alone = run if light is place else run_of(light, traces, OBSERVER_RATE)
-        left, e = run.left, alone.left
-        if not np.all(np.isfinite((left, e))):
+        run = run_of(place, traces, OBSERVER_RATE)
+        e = run.left
+        if not np.all(np.isfinite(e)):
             continue
-        (known, targets), scales = _targets(light, left, traces, tau), replace(place.scales, hot=_hot(left, traces, tau))
+        (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
         for effect in (BY_NAME[name] for name in names):
             if effect.once:
-                whole = light is not place and stands_out(Blocks.of(traces).misfit(left), tau)
-                found = _knocks(*((place, effect, effect.starts(scales), left) if whole else (light, effect, effect.starts(scales), e)), targets[0][2], traces, tau)
+                found = _knocks(place, effect, effect.starts(scales), e, targets[0][2], traces, tau)
             else:
-                starts = _hopeful(alone, effect, effect.starts(scales), targets, traces)
-                found = [p for start in starts if (p := _promise(light, effect, start, e, targets, traces))]
+                starts = _hopeful(run, effect, effect.starts(scales), targets, traces)
+                found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
-                begun = [Begin(_onto(place, model, effect), known) for _, model in _of_each_form(found)[:effect.tries]]
+                begun = [Begin(model, known) for _, model in _of_each_form(found)[:effect.tries]]
                 if not effect.dear:
                     begins.setdefault(effect.name, []).append(begun)
                 elif found[0][0] > promises.get(effect.name, 0.0):
@@ -103,53 +101,40 @@ def stands_out(misfit: np.ndarray, tau: float) -> bool:
     return float(scores.max()) >= max(float(np.quantile(scores, USUAL)), 0.0) + math.log(PEAK)
 
 
-def _light(place: Model) -> Model:
-    """The model without the effects that are dear to simulate."""
-    for name in (n for n in place.names if BY_NAME[n].dear):
-        place = place.without_effect(name)
-    return place
-
-
-def _onto(place: Model, found: Model, effect: Effect) -> Model:
-    """The place with the effect as it was found beside fewer others."""
-    model = place.with_effect(effect.name, dict(found.effects)[effect.name])
-    return replace(model, local={**model.local, effect.name: found.local[effect.name]}) if effect.local else model
-
-
 def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]:
     """The starts, the best first of each form (which of its parameters are absent), then the others."""
     forms = [tuple(np.isfinite(model.effects[-1][1])) for _, model in found]
     return [p for k, p in enumerate(found) if forms[k] not in forms[:k]] + [p for k, p in enumerate(found) if forms[k] in forms[:k]]
 
 
-def _hopeful(alone: Run, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
+def _hopeful(run: Run, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
     """Of many starts of a law, those that promise most to first order along a place's own motion."""
-    place = alone.model
+    place = run.model
     if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or not place.has_tangents:
         return starts
     waves = 2 if effect.wave else 1
     every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
-    changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, alone.motions).T
+    changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, run.motions).T
     ends = _ends(effect, traces)
     shares = np.max([_shares(changes, waves, ends, target, effect.signed)[0] for target in targets], axis=0)
     best = sorted(np.argsort(shares)[::-1][:effect.tries])
     return [starts[i] for i in best]
 
 
-def _targets(place: Model, left: np.ndarray, traces: Sequence[Trace], tau: float):
+def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
     """The Jacobian's columns at the place, and at either weighting (weights (N,), orthonormal basis (N, k) of the
-    place's own parameters, weighted residual (N,) of ``left`` beside it).
+    place's own parameters, weighted residual (N,) of what it leaves, ``e``, beside it).
 
     A parameter that rests at its bound follows nothing: what would push it further, as an inductance does a time constant, is left to the effects.
     """
     blocks, layout = Blocks.of(traces), place.layout()
-    m = blocks.misfit(left)
+    m = blocks.misfit(e)
     jacobian = central_jacobian(place, layout, place.vector(layout), traces, OBSERVER_RATE)
     free, out = np.array([not place.at_bound(f) for f in layout], bool), []
     for level in (tau, max(tau, float(np.mean(m)))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
         basis, _ = np.linalg.qr(jacobian[:, free] * root[:, None])
-        out.append((root, basis, root * left - basis @ (basis.T @ (root * left))))
+        out.append((root, basis, root * e - basis @ (basis.T @ (root * e))))
     return {f.key: column for f, column in zip(layout, jacobian.T)}, out
 
 

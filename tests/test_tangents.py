@@ -37,7 +37,22 @@ def test_of_the_coefficients(name, inductance):
     assert agree(plant(0), plant(1), plant(-1), 1 / STEP, INPUTS["multisine"](T)) < (ROUGHLY if name == "tau_e" else CLOSE)
 
 
-@pytest.mark.parametrize("effect", LAWS, ids=lambda e: e.name)
+@pytest.mark.parametrize("bristle", [[0.01, 0.5, np.inf], [0.0017, 0.25, np.inf], [0.0003, 0.5, 0.3]], ids=["soft", "firm", "stiff"])
+@pytest.mark.parametrize("name", [*SEEN_BY_EQ_5, "cogging"])
+def test_of_a_rudder_on_a_bristle(name, bristle):
+    """The friction holds it like a spring and lets it go; what else changes it, a coefficient or another law, does so along the motion that it makes."""
+    def plant(way):
+        values = VALUES if name == "cogging" else VALUES | {name: VALUES[name] * (1.0 + 1e-3 * way)}
+        cog = [("cogging", np.array([2.0 + 2e-3 * way, 0.05, 0.3, np.inf, np.inf]))] if name == "cogging" else []
+        return ReducedModel(lumped(values), [("presliding", np.array(bristle)), *cog])
+
+    u = INPUTS["multisine"](T)
+    y = plant(0).simulate(T, u).theta.copy()
+    assert agree(plant(0), plant(1), plant(-1), 1e3, u) < 3 * CLOSE
+    assert agree(plant(0), plant(1), plant(-1), 1e3, u, y=y, gain=0.025, every=5) < CLOSE
+
+
+@pytest.mark.parametrize("effect", [e for e in LAWS if e.tangible], ids=lambda e: e.name)
 def test_of_every_effect_that_has_them(effect):
     start = effect.starts(SCALES)[0]
     finite = [k for k, p in enumerate(effect.parameters) if np.isfinite(start[k]) and p.fitted and p.kind != "count"]
@@ -63,6 +78,6 @@ def test_an_observer_forgets_a_change():
 
 def test_what_has_none_says_so():
     with_tangents = {e.name for e in LAWS}
-    assert not with_tangents & {"backlash", "shaft_compliance", "presliding", "end_stop", "input_delay", "sensor_lag", "sensor_nonlinearity"}
+    assert not with_tangents & {"backlash", "shaft_compliance", "end_stop", "input_delay", "sensor_lag", "sensor_nonlinearity"}
     assert all(type(e).measure is Effect.measure for e in LAWS)
     assert len(with_tangents) >= 15

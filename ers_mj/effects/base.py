@@ -158,6 +158,7 @@ class Effect:
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     wave: ClassVar[tuple[tuple[int, ...], int] | None] = None  # amplitudes (of which a start has one) and phase: the screening finds both from two quarter periods
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
+    tangible: ClassVar[bool] = True  # whether tangents of a motion tell what its own numbers do to it (see plants/tangents.py)
     dear: ClassVar[bool] = False  # a simulation takes many times as long as others: refitted only where it promises most
     step: ClassVar[float] = 1e-4  # of transformed parameters, over which differences of its simulation tell a slope: more where it bounces
     needs: ClassVar[tuple[tuple[str, ...], ...]] = ()  # of each of these one number at least, or it does nothing; () where any one will do

@@ -6,7 +6,7 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter, law
 
-ORDERS = (0.7, 1, 1.4, 2, *range(3, 41, 2))  # periods within the whole travel from which a fit is begun; in the half where most time is spent, one apart
+ORDERS = (0.7, 1, 1.4, 2, *range(3, 41))  # periods within the whole travel from which a fit is begun; one apart
 
 
 class Cogging(Drive):

@@ -26,7 +26,7 @@ class Presliding(Friction):
         Parameter("zeta", "ratio", "damping ratio of that spring against the inertia", lower=0.005, upper=2.0, absent=0.2),
         Parameter("w_d", "speed", "speed at which the damping has fallen to 1/e (infinite: it does not)", absent=math.inf),
     )
-    tries, dear, step = 2, True, 0.01
+    tries, dear, step, tangible = 2, True, 0.01, False
 
     def starts(self, scales):
         least, most = 2 * scales.noise, 0.05 * scales.position

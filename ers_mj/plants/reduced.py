@@ -120,9 +120,9 @@ class ReducedModel:
 
     @property
     def has_tangents(self) -> bool:
-        """Whether ``tangents`` can tell how the output changes: of one body that meets no stop, without delay, read by a plain sensor."""
+        """Whether ``tangents`` can tell how the output changes: of one body, on a bristle or not, that meets no stop, without delay, read by a plain sensor."""
         c = Coefficients(*self._lowered[0])
-        return (c.two_body <= 0 and c.lower == -np.inf and c.upper == np.inf and c.delay <= 0
+        return ((c.two_body <= 0 or c.rho <= 0) and c.lower == -np.inf and c.upper == np.inf and c.delay <= 0
                 and all(type(BY_NAME[name]).measure is Effect.measure for name, _ in self.effects))
 
     def tangents(self, t, u, path, others, scale, *, enable=None, load=None, y=None, gain=0.0, every=1) -> list[np.ndarray]:

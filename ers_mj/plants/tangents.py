@@ -9,6 +9,9 @@ each mode, driven by what the changed model adds to the forces there. Where the 
     theta_0 crossed  the preload's jump strikes earlier or later: b loses 2 c_1 (a - d theta_0) / |w|
     caught at theta_0    the angle follows it, from when the preload can stop the rudder within a sample
 
+A rudder on a bristle (see events.py) has no such instants: its friction is a force that bends, stiff while it holds, and its change is one more state,
+stepped implicitly.
+
 The instants are taken from the states at the ends of the sample, so a column is good to a few per cent: enough for the steps of a
 search, which weighs every step by a simulation. One costs about as much as a simulation of the bare plant, half of one under a law.
 """
@@ -21,13 +24,14 @@ import numpy as np
 from numba import njit, types
 
 from ers_mj.plants.compiled import compiled_cache, inlined
-from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, READ, READ_BOOL, ROWS, LAWS, TAU, THETA_0, VECTOR,
-                                  _derivative, _extra, _maps)
+from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, D_TWIST, FADE, K_TWIST, READ, READ_BOOL, ROWS, LAWS, TAU,
+                                  THETA_0, VECTOR, _derivative, _extra, _has_bristle, _level, _maps)
 from ers_mj.plants.laws import remember
 
 NUDGE = 1e-6  # of the motion's largest angle, speed and drive: step of a law's slopes
 MOST = 10.0  # times the motion's extent and largest speed by which a unit of change may move it: beyond, stick and slip only fork otherwise
 CORNER = 1e-12  # [output unit] within which a rudder at rest is held in the corner
+AHEAD = 0.6  # of a sample, at which the forces of a bristle's step are taken: beyond the middle, so that what is stiff dies out
 
 
 @inlined
@@ -54,9 +58,10 @@ def _prepare(t, load, path, c, on, p, maps, out):
     """Fill maps (2, 3, 5, 14) for a closed and an open circuit, by slip (see events), and out (N, 3) with the slopes of the laws' force
     by theta, w and j along the motion."""
     h = t[1] - t[0]
-    closed, opened = _maps(c, c[TAU], c[A_EMF], h)[0], _maps(c, 0.0, 0.0, h)[0]
-    for s in range(3):
-        maps[0, s], maps[1, s] = closed[s, 1, 1], opened[s, 1, 1]
+    if not _has_bristle(c):
+        closed, opened = _maps(c, c[TAU], c[A_EMF], h)[0], _maps(c, 0.0, 0.0, h)[0]
+        for s in range(3):
+            maps[0, s], maps[1, s] = closed[s, 1, 1], opened[s, 1, 1]
     if on[0, 0] + on[1, 0] == 0:
         return
     size = np.zeros(3)
@@ -177,6 +182,89 @@ def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p,
         a, b, d = min(max(a_1, -MOST * (high - low)), MOST * (high - low)), min(max(b_1, -MOST * fastest), MOST * fastest), d_1
 
 
+@inlined
+def _fading(c, w):
+    """The damping of a bristle at a speed, per total inertia."""
+    return c[D_TWIST] * math.exp(-((w / c[FADE]) ** 2))
+
+
+@inlined
+def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
+    """See ``_tangent``: of a rudder on a bristle, whose bend z along the path and its change bent are integrated here."""
+    n, h = t.size, t[1] - t[0]
+    lawful, k = on[0, 0] + on[1, 0] > 0, c[K_TWIST]
+    lawful_2 = on_2[0, 0] + on_2[1, 0] > 0
+    low, high, fastest = path[0, 0], path[0, 0], 0.0
+    for i in range(n):
+        low, high, fastest = min(low, path[i, 0]), max(high, path[i, 0]), max(fastest, abs(path[i, 1]))
+    full = 0.5 * (c[C_PLUS] + c[C_MINUS]) / k
+    z = min(max(path[0, 1] / math.sqrt(k), -full), full)
+    a = b = d = bent = 0.0
+    part = AHEAD * h
+    for i in range(n):
+        out[i, 0], out[i, 1], out[i, 2] = a, b, d
+        if i == n - 1:
+            break
+        theta, w, j = path[i, 0], path[i, 1], path[i, 2]
+        theta_1, w_1, j_1 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
+        remember(on, p, theta, w, j, h)
+        remember(on_2, p_2, theta, w, j, h)
+        side = 0.0 if c[C_1] <= 0 else (1.0 if theta > c[THETA_0] else (-1.0 if theta < c[THETA_0] else 0.0))
+        side_1 = 0.0 if c[C_1] <= 0 else (1.0 if theta_1 > c[THETA_0] else (-1.0 if theta_1 < c[THETA_0] else 0.0))
+        cornered, jump = w == 0.0 and c[C_1] > 0 and abs(theta - c[THETA_0]) < CORNER, 0.0
+        if gain > 0.0 and i % every == 0 and y[i] == y[i] and not cornered:
+            jump = gain * (y[i] - theta)
+            near = min(abs(theta - c[THETA_0]) / max(2.0 * abs(jump), 1e-300), 1.0) if c[C_1] > 0 else 1.0
+            a *= 1.0 - gain * near
+            jump *= near
+        rate, emf, pull = 0.0, 0.0, 0.0
+        if enable[i]:
+            rate, emf = c[TAU], c[A_EMF]
+            pull = dc[B] * u[i] + c[B] * du[i] - dc[A_EMF] * (theta_1 - theta) / h
+            if rate > 0:
+                pull -= dc[TAU] * (j_1 - j) / h
+        if cornered:
+            a, b = dc[THETA_0], 0.0
+            if w_1 == 0.0:
+                d = pull + (d - pull) * math.exp(-h / rate) if rate > 0 else 0.0
+                continue
+        way = theta_1 - theta - jump
+        s = 1 if way > 0 else -1
+        x = (0.5 * (theta + theta_1), 0.5 * (w + w_1), 0.5 * (j + j_1), 0.5 * (theta + theta_1), 0.0)
+        level = _level(c, on, p, lawful, x, float(s))
+        level_2 = _level(c_2, on_2, p_2, lawful_2, x, float(s))
+        z_1 = s * level / k + (z - s * level / k) * math.exp(-k * abs(way) / level)
+        bends = (z_1 - z) / way if abs(way) > 0.0 else 1.0
+        z_mean = 0.5 * (z + z_1)
+        lets_go = abs(way) / h * k / level
+        grows = abs(way) / h * z_mean * (k / level * (level_2 - level) * scale - dc[K_TWIST]) / level
+        passed = 1.0
+        if side_1 != side and theta_1 != theta:
+            passed = min(max((c[THETA_0] - theta) / (theta_1 - theta), 0.0), 1.0)
+        viscous, more = (c[A_PLUS], dc[A_PLUS]) if s > 0 else (c[A_MINUS], dc[A_MINUS])
+        damping = _fading(c, x[1])
+        force = (dc[BIAS] + dc[A_1] * (c[THETA_0] - x[0]) + c[A_1] * dc[THETA_0] - dc[C_1] * (side * passed + side_1 * (1.0 - passed)) - more * x[1]
+                 - dc[K_TWIST] * z_mean - (_fading(c_2, x[1]) - damping) * scale * (z_1 - z) / h)
+        if lawful or lawful_2:
+            force += (_extra(c_2, on_2, p_2, load[i], t[i] + 0.5 * h, x, s) - _extra(c, on, p, load[i], t[i] + 0.5 * h, x, s)) * scale
+        bent_0, per_speed = (bent + part * grows) / (1.0 + part * lets_go), part * bends / (1.0 + part * lets_go)
+        drawn, back = (pull, -emf) if rate <= 0 else ((d + part / rate * pull) / (1.0 + part / rate), -part / rate * emf / (1.0 + part / rate))
+        spring, share = c[A_1] - slopes[i, 0], 1.0 + slopes[i, 2]
+        b_m = ((b / part + force - spring * a + share * drawn - k * bent_0 - damping * (bent_0 - bent) / part)
+               / (1.0 / part + spring * part + viscous - slopes[i, 1] - share * back + k * per_speed + damping * per_speed / part))
+        a_1, b_1 = a + h * b_m, b + (b_m - b) / AHEAD
+        d = drawn + back * b_m if rate <= 0 else d + (drawn + back * b_m - d) / AHEAD
+        bent += (bent_0 + per_speed * b_m - bent) / AHEAD
+        if side_1 != side and side * side_1 < 0.0:
+            passing = 0.5 * abs(w + w_1)
+            if passing > 2.0 * c[C_1] * h:
+                b_1 -= 2.0 * c[C_1] * (a_1 - dc[THETA_0]) / passing
+            else:
+                a_1, b_1 = dc[THETA_0], 0.0
+        a, b = min(max(a_1, -MOST * (high - low)), MOST * (high - low)), min(max(b_1, -MOST * fastest), MOST * fastest)
+        z = z_1
+
+
 def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, scale, out):
     """Fill out (N, 3) with the change of (theta, w, j) per unit of the change that made c_2, on_2, p_2 of c, on, p, times ``scale``.
 
@@ -186,7 +274,10 @@ def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, 
     for i in range(c.size):
         if c[i] != c_2[i]:
             dc[i] = (c_2[i] - c[i]) * scale
-    _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
+    if _has_bristle(c):
+        _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
+    else:
+        _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
 
 
 TABLE, MAPS = types.float64[:, ::1], types.float64[:, :, :, ::1]
