@@ -416,7 +416,8 @@ def _asked_for(candidate: Candidate, least: float, least_z: float, outstanding: 
 
 
 def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
-    """With earlier effects exchanged for rivals of their round that are likelier beside what came later; they lead their rounds then."""
+    """With earlier effects exchanged for rivals of their round that are likelier beside what came later, and the newest where one was; they lead their rounds
+    then."""
     def instead(candidate):
         name = candidate.name
         model = without.with_effect(name, dict(candidate.fit.model.effects)[name])
@@ -424,7 +425,10 @@ def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequen
             model = replace(model, local={**model.local, name: candidate.fit.model.local[name]})
         return fit(model, traces, tau=tau, steps=12)
 
-    for k, ranked in enumerate(rounds[:-1]):
+    before = current
+    for k, ranked in enumerate(rounds):
+        if k == len(rounds) - 1 and current is before:
+            break
         leader = ranked[0].name
         if leader not in current.model.names:
             continue
