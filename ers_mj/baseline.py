@@ -15,7 +15,7 @@ from ers_mj.errors import InputError
 from ers_mj.identification import Fit, cost_of, descend, fit, hopped, run_of, tau_of
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.starts import with_starts, without_spikes
-from ers_mj.traces import Trace
+from ers_mj.traces import Trace, counted
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
 OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
@@ -78,6 +78,19 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
     drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, found.traces, OBSERVER_RATE).motions)
     scales = replace(model.scales, drive=drive, cog=2 * np.pi / (FEWEST_COGS * gear) if gear else model.scales.cog)
     return replace(found, fit=replace(found.fit, model=replace(model, scales=scales)))
+
+
+def sharpened(start: Start, travel: float) -> Start:
+    """The baseline refitted to what coarse converters tell (see converter.py), where some are coarse for the travel [output unit]: their thresholds
+    sharpen a fit that is near, and lead one astray that is not.
+    """
+    traces = counted(start.traces, travel)
+    if all(t.converter is None for t in traces):
+        return start
+    traces = with_starts(start.fit.model, traces)
+    found = fit(start.fit.model, traces)
+    traces = with_starts(found.model, traces)
+    return replace(start, fit=fit(found.model, traces, tau=tau_of(found.misfit)), traces=traces)
 
 
 def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:

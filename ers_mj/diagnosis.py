@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ers_mj.baseline import baseline
+from ers_mj.baseline import baseline, sharpened
 from ers_mj.case import Case
 from ers_mj.confirmation import confirmed
 from ers_mj.converter import COARSE
@@ -48,11 +48,10 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     jobs = jobs or _cores()
     first = recordings[0]
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
-    plain = [trace_of(r, inertia) for r in recordings]
-    travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in plain])))
-    traces = counted(plain, travel)
+    traces = [trace_of(r, inertia) for r in recordings]
+    travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))
     progress("fitting the baseline", 0.03)
-    start = baseline(traces, datasheet, first.output_unit == "rad", jobs)
+    start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
     sensors = _symptoms(recordings, start.traces, travel)
     chosen = select(start.fit, start.traces, anchors=start.anchors, exclude=_ordinary(start.fit.model), jobs=jobs, progress=progress)
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)

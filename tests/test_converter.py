@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ers_mj.baseline import Start, sharpened
 from ers_mj.converter import Converter
 from ers_mj.identification import fit, residuals, run_of, step_of
 from ers_mj.model import OBSERVER_RATE, Model
@@ -105,6 +106,17 @@ def test_what_is_smaller_than_a_step_shows():
         without = fit(model(truth), traces)
         gains.append(without.cost - fit(without.model.with_effect(*gust[0]), traces).cost)
     assert gains[0] > 6.0 and gains[0] > 4.0 * gains[1] and gains[2] < 1.0, gains
+
+
+def test_a_baseline_that_is_far_is_not_led_astray():
+    """The thresholds sharpen a fit that found its valley without them."""
+    trace, truth = recorded()
+    start = Start(fit(model({**truth, "b": 1.2 * truth["b"], "c_2": 0.8 * truth["c_2"]}), [trace]), [trace])
+    travel = float(np.ptp(trace.y))
+    sharp = sharpened(start, travel)
+    assert sharpened(start, 301 * trace.quantum) is start
+    assert abs(sharp.fit.model.values["b"] / truth["b"] - 1.0) < 0.01 and abs(sharp.fit.model.values["c_2"] / truth["c_2"] - 1.0) < 0.02
+    assert np.mean(sharp.fit.misfit) < 1.5
 
 
 def model(values):
