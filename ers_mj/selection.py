@@ -48,6 +48,7 @@ SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of st
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
 REVERSED, MOST_REVERSED = 0.1, 5  # share of the leader's gain from which a rival is begun with, the leader put in, and how many are
+OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (once if dear)
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
@@ -315,6 +316,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             break
         ranked = rounds[-1]
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
+        current, rounds = _reconsidered(current, rounds, traces, tau)
         tau = tau_of(current.misfit)
         traces = _restarted(current.model, traces)
         current = fit(current.model, traces, tau=tau, steps=20)
@@ -328,6 +330,21 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
 def _restarted(model: Model, traces: Sequence[Trace]) -> Sequence[Trace]:
     """The traces with new starts where converters are coarse: within a step a model tells where the rudder began, and a wrong one tells it wrongly."""
     return with_starts(model, traces) if any(trace.converter is not None for trace in traces) else traces
+
+
+def _reconsidered(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float) -> tuple[Fit, list[tuple[Candidate, ...]]]:
+    """Without earlier effects with a clock of their own that the newest, a law of the servo, outweighs by far: they were found in what it had bent, and
+    a round beside it finds again what is there.
+    """
+    newest = rounds[-1][0]
+    early = [ranked[0].name for ranked in rounds[:-1] if ranked[0].name in BY_NAME and ranked[0].name in current.model.names
+             and _clocked(ranked[0].name) and ranked[0].gain < OUTWEIGHED * newest.gain]
+    if not early or _clocked(newest.name):
+        return current, rounds
+    model = current.model
+    for name in early:
+        model = model.without_effect(name)
+    return fit(model, traces, tau=tau, steps=20), [ranked for ranked in rounds if ranked[0].name not in early]
 
 
 def _is_cheap_and_wrong(current: Fit, base: Fit, traces: Sequence[Trace]) -> bool:

@@ -15,7 +15,7 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, screen, stands_out
-from ers_mj.selection import _exchanged, _likeliest_first, _other_forms, _other_way_round, _swept, _wider, judged
+from ers_mj.selection import Candidate, _exchanged, _likeliest_first, _other_forms, _other_way_round, _reconsidered, _swept, _wider, judged
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -123,10 +123,11 @@ def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(push
     base, traces = pushed.fit, pushed.traces
     ranked = tuple(judged(name, fit(base.model.with_effect(name, np.array(p)), traces), base, 1.0) for name, p in
                    (("gravity_imbalance", [0.06, 0.0]), ("bias_torque", [0.06]), ("asymmetric_friction", [-0.06, 0.0])))
-    rounds = [ranked, ()]
+    newest = (replace(ranked[0], name="stribeck"),)
+    rounds = [ranked, newest]
     found = _exchanged(ranked[0].fit, rounds, traces, 1.0, 1)
     assert found.model.names == ("bias_torque",) and [c.name for c in rounds[0]][0] == "bias_torque" and len(rounds[0]) == 3
-    unlike = [(ranked[0], replace(ranked[1], gain=0.0), replace(ranked[2], gain=0.0)), ()]
+    unlike = [(ranked[0], replace(ranked[1], gain=0.0), replace(ranked[2], gain=0.0)), newest]
     assert _exchanged(ranked[0].fit, unlike, traces, 1.0, 1).model.names == ("gravity_imbalance",)
 
 
@@ -139,6 +140,19 @@ def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
     (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
     size, begin, length, record = dict(begins[0].model.effects)["load_disturbance"]
     assert size == pytest.approx(-300.0, rel=0.3) and begin == pytest.approx(2.24, abs=0.02) and length == pytest.approx(0.08, rel=0.3) and record == 0
+
+
+@pytest.mark.parametrize("newest, gain, kept", [("drive_dead_zone", 400.0, ("drive_dead_zone",)), ("drive_dead_zone", 50.0, ("load_disturbance", "drive_dead_zone")),
+                                                ("periodic_gust", 400.0, ("load_disturbance", "periodic_gust"))])
+def test_a_knock_that_a_later_law_outweighs_is_looked_for_again(pushed, newest, gain, kept):
+    """It was found in what the law had bent; beside another one with a clock of its own it stays."""
+    start, tau = pushed.fit, 1.0
+    model = start.model
+    for name in ("load_disturbance", newest):
+        model = model.with_effect(name, BY_NAME[name].starts(replace(model.scales, hot=((0, 1.0, 0.1),)))[0])
+    rounds = [(Candidate(name, start, won, 3.0, 0.0, 1.0),) for name, won in (("load_disturbance", 20.0), (newest, gain))]
+    found, left = _reconsidered(replace(start, model=model), rounds, pushed.traces, tau)
+    assert found.model.names == kept and tuple(ranked[0].name for ranked in left) == kept
 
 
 def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
