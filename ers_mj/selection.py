@@ -46,7 +46,7 @@ NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) th
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
-MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
+MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH) or is dear to simulate
 REVERSED, MOST_REVERSED = 0.1, 5  # share of the leader's gain from which a rival is begun with, the leader put in, and how many are
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
@@ -406,8 +406,8 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
 
 
 def _most_rounds(current: Fit) -> int:
-    """How many rounds there are at most: fewer where the model itself stays wrong."""
-    return MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS
+    """How many rounds there are at most: fewer where the model itself stays wrong, or is dear."""
+    return MOST_ROUNDS if near_noise(current) and not _is_dear(current) else FEWER_ROUNDS
 
 
 def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
