@@ -3,8 +3,8 @@
     reading y (N,) in whole steps -> the angle lies within half a step of y, to the noise ahead of the converter
                                   -> between two thresholds passed the same way it goes nearly straight
 
-A deviation within half a step counts as rounding does, by q / sqrt(12); what is beyond counts by the noise ahead. Taken as noise alone, rounding would
-hide all that is smaller than a step.
+A deviation within half a step hardly counts; what is beyond counts by what the noise ahead makes of it. Taken as noise of q / sqrt(12), rounding would hide
+all that is smaller than a step.
 """
 
 from __future__ import annotations
