@@ -56,7 +56,7 @@ class Converter:
 
     def path(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
         """The way (N,) [output unit] from threshold to threshold of a reading y (N,); NaN where it is not known: it turned within a step, or rested."""
-        passed = np.flatnonzero(np.abs(np.diff(y)) > 0.0)  # not where a sample is missing
+        passed = thresholds(y)
         if passed.size < 2:
             return np.full(y.size, np.nan)
         when, where = (0.5 * (x[passed] + x[passed + 1]) for x in (t, y))
@@ -65,3 +65,8 @@ class Converter:
         straight = (up[1:] == up[:-1]) & (np.diff(when) < STRAIGHT)
         within = (t >= when[0]) & (t <= when[-1]) & straight[span - 1]
         return np.where(within, np.clip(np.interp(t, when, where), y - 0.5 * self.step, y + 0.5 * self.step), np.nan)
+
+
+def thresholds(y: np.ndarray) -> np.ndarray:
+    """The samples of a reading y (N,) behind which a threshold is passed; not where one is missing."""
+    return np.flatnonzero(np.abs(np.diff(y)) > 0.0)

@@ -189,7 +189,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
 
 def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
     """Whether a knock moves the reading by less than a coarse converter's step: it stands for where the rudder began within one."""
-    if candidate.name not in BY_NAME or not BY_NAME[candidate.name].once:
+    if candidate.name not in BY_NAME or not BY_NAME[candidate.name].once or all(trace.converter is None for trace in traces):
         return False
     models = candidate.fit.model, candidate.fit.model.without_effect(candidate.name)
     moved = [(np.subtract(*(trace.plain(residuals_in(m, trace, k, OBSERVER_RATE)) for m in models)), trace) for k, trace in enumerate(traces)]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ers_mj.converter import thresholds
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.symptoms import excursions, held_spans
 from ers_mj.traces import Trace, start_samples, start_seen
@@ -92,7 +93,7 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
 
 def _start_within(model: Model, trace: Trace, record: int) -> tuple[float, float]:
     """The same behind a coarse converter: where within its first step the rudder was is told by when it passed the first thresholds."""
-    passed = np.flatnonzero(np.abs(np.diff(trace.y)) > 0.0)
+    passed = thresholds(trace.y)
     head = trace.part(0, max(start_samples(trace.t), int(np.searchsorted(trace.t, trace.t[passed[0]] + MOVED)) if passed.size else 0))
     theta, omega = trace.y[np.argmax(trace.valid)], trace.start[1]
 
