@@ -106,18 +106,23 @@ class Case:
         shares, c = [], self.confirmed
         noise = math.sqrt(float(np.mean([fold.held_out.sure_noise**2 for fold in c.parts])))
         for ends in ((pooled(c.before), pooled(c.after)), *([self._again] if self.holdout else [])):
-            above, left = (score.sure**2 - noise**2 for score in ends)
-            shares.append(min(max(1.0 - left / above, 0.0), 1.0) if above > 0 else 0.0)
+            shares.append(_share(*(score.sure**2 for score in ends), noise**2))
         return max(*shares, self._explained_each())
 
     def _explained_each(self) -> float:
         """The mean of that share over the held-out recordings, or halves of one, whose error without the effects is above the noise.
 
-        One whose free run is lost with and without them (ASTRAY) tells nothing, as long as there are others.
+        One whose free run is lost with and without them tells nothing, as long as there are others: by ASTRAY, or, where the effects leave nothing beyond the
+        noise (see remainder.py), by LOST, since stick and slip must have forked then. Where there are no others the observer's held-out error tells their share.
         """
-        above = [(b.sure / noise, a.sure / noise) for b, a, noise in self.confirmed.shown if b.sure > VISIBLE * noise]
-        told = [ends for ends in above if min(ends) < ASTRAY] or above
-        return float(np.mean([min(max(1.0 - (a**2 - 1.0) / (b**2 - 1.0), 0.0), 1.0) for b, a in told])) if told else 0.0
+        forked = not more_is_missing(self.left, None)
+        above = [(b, a, noise) for b, a, noise in self.confirmed.shown if b.sure > VISIBLE * noise]
+        told = [ends for ends in above if min(ends[0].sure, ends[1].sure) < (LOST if forked else ASTRAY) * ends[2]]
+        if told or not forked:
+            shares = [_share(b.sure**2, a.sure**2, noise**2) for b, a, noise in told or above]
+        else:
+            shares = [_share(*(float(np.mean(np.maximum(s.misfit, 1.0))) for s in (b, a)), 1.0) for b, a, _ in above]
+        return float(np.mean(shares)) if shares else 0.0
 
     @cached_property
     def more_is_missing(self) -> bool:
@@ -206,3 +211,8 @@ class Case:
         layout = self.model.layout()
         widths = half_widths(self.model, self.start.traces, (), self.selection.tau)
         return {(f.owner, f.index): f.ends(q, w) for f, q, w in zip(layout, self.model.vector(layout), widths) if f.owner in STATES}
+
+
+def _share(before: float, after: float, noise: float) -> float:
+    """Share of a squared error ``before`` that is gone ``after``, above the squared ``noise``."""
+    return min(max(1.0 - (after - noise) / (before - noise), 0.0), 1.0) if before > noise else 0.0

@@ -24,7 +24,6 @@ SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and make
 NEAR_BOUND = 1e-3  # of a bound, within which a fitted number rests at it
 LEAST_TAU, MOST_TAU = 0.1, 2.0  # of a datasheet's electrical time constant, between which the baseline's is an ordinary one
 FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
-FEWEST_TURNS = 0.8  # periods of a wave over position within the travel: a longer one is no wave but a slope
 CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 
 
@@ -123,7 +122,7 @@ class Model:
 
     def _of_effect(self, name: str, parameter: Parameter, index: int, value: float, local: bool = False) -> Free:
         scale = 1.0 if parameter.positive else CLOCKED.get(parameter.kind, max(abs(value), 1e-12))
-        most = {"frequency": 1.0 / self.scales.sample_time, "period": 2.0 * self.scales.position / FEWEST_TURNS}
+        most = {"frequency": 1.0 / self.scales.sample_time, "period": 2.0 * self.scales.position / BY_NAME[name].fewest_turns}
         most = most.get(parameter.name if parameter.kind == "position" else parameter.kind, np.inf)
         least = {"position": SMALLEST * self.scales.noise, "frequency": FEWEST_CYCLES / self.scales.duration}.get(parameter.kind, 1e-12)
         lower = max(parameter.lower, least) if parameter.positive else parameter.lower

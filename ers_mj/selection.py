@@ -28,6 +28,7 @@ LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the o
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 LATER_Z = 2.0  # and beside an effect
+MISSED = 100.0  # of C by which a model is worse without an effect that nothing else will stand for
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
@@ -131,6 +132,18 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         least = reference - min(map(total, ends.values()), default=reference)
         return [label for label in labels if reference - least > QUIET * base.misfit.size or reference - total(ends[label]) >= RIVAL * least]
 
+    def overlooked(best):
+        """The cheap laws, with models to refit, that explain less than CLOCKED of what leads with a clock of its own: on a borrowed Jacobian, or seen by its
+        secant, what has a threshold (a stop, a limit) does nothing until that is passed.
+        """
+        leader = min(best, key=lambda name: total(best[name]), default=None)
+        if leader is None or not _clocked(leader) or reference - total(best[leader]) < least:
+            return []
+        laws = [effect for effect in BY_NAME.values() if not (_clocked(effect.name) or effect.dear or effect.name in exclude)
+                and (effect.name not in best or reference - total(best[effect.name]) < CLOCKED * (reference - total(best[leader])))]
+        own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)] for effect in laws if not effect.sized}
+        return [(name, begin) for name in (effect.name for effect in laws) for begin in starts.get((name, 0), own.get(name, []))]
+
     states = [((s, 0), [Begin(base.model.with_state(s, len(traces)), {})]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
@@ -169,6 +182,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
             running = contending(running, best)
         best = leaders(best)
+        for name, found in pool.map(finish, overlooked(best)):
+            best[name] = min(best.get(name, found), found, key=total)
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
@@ -462,9 +477,11 @@ def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequen
 
 
 def _pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> Fit:
-    """Without the earlier effects that no longer pay."""
+    """Without the earlier effects that no longer pay; what a few steps along one Jacobian show to be sorely MISSED is not tried to the end."""
     for name in (n for n in current.model.names if n != newest):
-        without = fit(current.model.without_effect(name), traces, tau=tau, steps=12)
+        without = fit(current.model.without_effect(name), traces, tau=tau, steps=4, renewals=1)
+        if without.cost - current.cost < MISSED:
+            without = fit(without.model, traces, tau=tau, steps=12, ceiling=current.misfit)
         if without.cost - current.cost < LEAST_GAIN:
             current = without
     return current

@@ -169,11 +169,18 @@ def test_where_every_free_run_is_lost_the_parameters_are_not_all_that_was_off(er
     assert Case._astray(case) is lost
 
 
-@pytest.mark.parametrize("lost, explained", [((60.0, 80.0), 0.99), ((20.0, 25.0), 0.495)])
-def test_a_free_run_that_is_lost_with_and_without_the_effects_tells_nothing(lost, explained):
+@pytest.mark.parametrize("lost, left, explained", [((60.0, 80.0), 0.5, 0.99), ((20.0, 25.0), 0.5, 0.495), ((20.0, 25.0), 0.0, 0.99), ((7.0, 5.0), 0.0, 0.745)])
+def test_a_free_run_that_is_lost_with_and_without_the_effects_tells_nothing(lost, left, explained):
     n = 100
     shown = [(*(Score(n * e**2, n, np.ones(1)) for e in ends), 1.0) for ends in ((10.0, np.sqrt(1.99)), lost)]
-    assert Case._explained_each(SimpleNamespace(confirmed=SimpleNamespace(shown=shown))) == pytest.approx(explained)
+    case = SimpleNamespace(confirmed=SimpleNamespace(shown=shown), left={"output": left})
+    assert Case._explained_each(case) == pytest.approx(explained)
+
+
+def test_where_all_free_runs_fork_the_observer_tells_what_is_explained():
+    forked = [(Score(100 * 11.0**2, 100, np.array([9.0, 0.5])), Score(100 * 9.0**2, 100, np.array([2.0, 0.5])), 1.0)]
+    case = SimpleNamespace(confirmed=SimpleNamespace(shown=forked), left={"output": 0.0})
+    assert Case._explained_each(case) == pytest.approx(0.875)
 
 
 @pytest.mark.parametrize("explained, left, after, part", [(0.95, 0.2, 3.0, True), (0.99, 0.2, 3.0, False), (0.95, 0.05, 3.0, False), (0.95, 0.2, 9.0, False)])

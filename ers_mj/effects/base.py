@@ -18,6 +18,8 @@ from scipy.linalg.blas import dtbsv
 if TYPE_CHECKING:
     import mujoco
 
+RETURNS = 0.95  # periods of a torque that returns with the angle which the travel must hold, overshoots set aside: less is a spring, a weight or a cubic
+
 
 class Coefficients(NamedTuple):
     """The lumped plant: Eq. (6) with inductance, asymmetric friction, stops and a second body as options.
@@ -157,6 +159,7 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     wave: ClassVar[tuple[tuple[int, ...], int] | None] = None  # amplitudes (of which a start has one) and phase: the screening finds both from two quarter periods
+    fewest_turns: ClassVar[float] = 0.8  # periods of a wave over position within the travel: a longer one is no wave but a slope
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
     tangible: ClassVar[bool] = True  # whether tangents of a motion tell what its own numbers do to it (see plants/tangents.py)
     dear: ClassVar[bool] = False  # a simulation takes many times as long as others: refitted only where it promises most

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from ers_mj.effects.base import Drive, Parameter, law
+from ers_mj.effects.base import RETURNS, Drive, Parameter, law
 
-ORDERS = (0.7, 1, 1.4, 2, *range(3, 41))  # periods within the whole travel from which a fit is begun; one apart
+ORDERS = (1, 1.4, 2, *range(3, 41))  # periods within the whole travel from which a fit is begun; one apart
 
 
 class Cogging(Drive):
@@ -25,7 +25,7 @@ class Cogging(Drive):
         Parameter("phase_2", "phase", "phase of the second harmonic against the first", positive=False, absent=np.inf),
     )
     needs, together = (("A",),), (("second", "phase_2"),)
-    sized, tries = 1, 3
+    sized, tries, fewest_turns = 1, 3, RETURNS
     wave = ((0,), 2)
 
     def starts(self, scales):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ers_mj.effects.base import Parameter, Transmission, law
+from ers_mj.effects.base import RETURNS, Parameter, Transmission, law
 from ers_mj.errors import InputError
 
 ORDERS = range(1, 13)  # periods within the travel from which a fit is begun: slower than cogging, of which poles make many a turn
@@ -31,7 +31,7 @@ class TransmissionRipple(Transmission):
         Parameter("phase_2", "phase", "phase of the second harmonic against the first", positive=False, absent=np.inf),
     )
     needs, together = (("ripple", "A"),), (("second", "phase_2"),)
-    sized, tries = 1, 3
+    sized, tries, fewest_turns = 1, 3, RETURNS
     wave = ((0, 3), 2)
 
     def starts(self, scales):
@@ -40,8 +40,8 @@ class TransmissionRipple(Transmission):
                 *(np.array([np.inf, period, 0.0, 0.2 * scales.acceleration, np.inf, np.inf]) for period in periods if period > scales.cog)]
 
     def grown(self, name, p, scales):
-        """From a plain torque: with a second harmonic."""
-        plain = name == self.name and np.isfinite(p[3]) and not np.isfinite(p[4])
+        """From a plain torque: with a second harmonic, where a whole period is seen: less of five numbers stands for any smooth torque."""
+        plain = name == self.name and np.isfinite(p[3]) and not np.isfinite(p[4]) and p[1] <= scales.high - scales.low
         return [np.array([*p[:4], 0.1, phase]) for phase in (0.0, 0.5 * np.pi)] if plain else []
 
     def constants(self, p, c):
