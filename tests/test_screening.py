@@ -5,17 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ers_mj import selection
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.errors import InputError
-from ers_mj.identification import fit, residuals
+from ers_mj.identification import fit, residuals, tau_of
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, screen, stands_out
-from ers_mj.selection import Candidate, _exchanged, _likeliest_first, _other_forms, _other_way_round, _reconsidered, _swept, _wider, judged
+from ers_mj.selection import (LEAST_GAIN, Candidate, _exchanged, _likeliest_first, _other_forms, _other_way_round, _reconsidered, _swept, _wider, candidates,
+                              judged)
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -186,6 +188,48 @@ def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
     torques = [p for p in gears if np.isfinite(p[3])]
     assert max(p[1] for p in cogs) <= scales.cog < min(p[1] for p in torques) and len(torques) < len(gears)
     assert not any(np.isfinite(p[3]) for p in BY_NAME["transmission_ripple"].starts(replace(scales, cog=np.inf)))
+
+
+def test_a_torque_that_returns_must_be_seen_to_return(pushed):
+    """Less than a period of it is any smooth torque; with a second harmonic even a whole one is. A friction that changes along the travel may be slower."""
+    model, ripple = pushed.fit.model, BY_NAME["transmission_ripple"]
+    travel = 2.0 * model.scales.position
+    longest = {name: next(f.upper for f in model.with_effect(name, p).layout() if (f.owner, f.name) == (name, "period")) / travel for name, p in
+               (("cogging", [1.0, 0.1, 0.0, np.inf, np.inf]), ("transmission_ripple", [np.inf, 0.1, 0.0, 1.0, np.inf, np.inf]),
+                ("position_dependent_friction", [1.0, np.inf, np.inf, 0.1, 0.0]))}
+    assert longest["cogging"] == longest["transmission_ripple"] == pytest.approx(1 / 0.95) and longest["position_dependent_friction"] == pytest.approx(1.25)
+    assert [len(ripple.grown(ripple.name, np.array([np.inf, turns * travel, 0.0, 1.0, np.inf, np.inf]), model.scales)) for turns in (0.9, 1.03)] == [2, 0]
+
+
+def test_a_shaft_whose_motor_bears_nothing_is_a_filter_in_the_drive(pushed):
+    def found(name, p, gain):
+        return replace(judged(name, replace(pushed.fit, model=pushed.fit.model.with_effect(name, np.array(p))), pushed.fit, 1.0), gain=gain)
+
+    winding = found("inductance", [2e-3], 17.0)
+    for rho, first in ((0.2, "inductance"), (0.4, "shaft_compliance")):
+        assert _likeliest_first([found("shaft_compliance", [50.0, 0.7, rho, 0.0, np.inf], 21.0), winding])[0].name == first
+    assert not BY_NAME["shaft_compliance"].grown("shaft_compliance", np.array([50.0, 0.7, 0.2, 0.0, np.inf]), pushed.fit.model.scales)
+
+
+def test_a_stop_that_is_touched_once_is_no_knock(monkeypatch):
+    """Only the steps reach it, and the rudder sticks there. Where its secant, taken from a stop too early, promises nothing, a knock explains as much."""
+    values, traces, t = {**TRUTH, "c_2": 60.0}, [], T[::5]
+    free = {name: ReducedModel(lumped(values)).simulate(t, INPUTS[name](t)).theta for name in ("multisine", "steps", "chirp")}
+    upper = free["steps"].max() - 0.01
+    for k, name in enumerate(free):
+        u = INPUTS[name](t)
+        y = ReducedModel(lumped(values), [("end_stop", np.array([-np.inf, upper, 60.0, 0.3]))]).simulate(t, u).measured
+        traces.append(trace_of(from_arrays(t, u, y + 1e-4 * np.random.default_rng(k).standard_normal(t.size), name=name), None))
+    start = baseline(traces, Datasheet(lumped=values), True, 1)
+
+    def knocks(*arguments):
+        found = screen(*arguments)
+        return replace(found, promises={"load_disturbance": found.promises["load_disturbance"]})
+
+    monkeypatch.setattr(selection, "screen", knocks)
+    ranked = candidates(start.fit, start.traces, tau_of(start.fit.misfit), 1, (), (), LEAST_GAIN)
+    assert ranked[0].name == "end_stop" and dict(ranked[0].fit.model.effects)["end_stop"][1] == pytest.approx(upper, abs=1e-3)
+    assert "load_disturbance" in [c.name for c in ranked]
 
 
 def test_a_datasheets_gear_bounds_the_period_of_cogging(pushed):
