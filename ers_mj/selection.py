@@ -1,9 +1,4 @@
-"""Which effects does the data ask for? Screen all by simulated secants, refit the promising, add greedily, test removals.
-
-A candidate's worth is the decrease of the block cost C (identification.py) after every baseline parameter has been refitted with it.
-Two models are compared block by block on the same noise (a paired test in the manner of Vuong 1989), so that the verdict
-does not rest on a model of the noise.
-"""
+"""Which effects does the data ask for? A round at a time (race.py), as long as the winner buys more than chance offers; removals and exchanges are tested."""
 
 from __future__ import annotations
 
@@ -12,284 +7,29 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from ers_mj.effects import BY_NAME, EQUIVALENT
-from ers_mj.identification import Fit, converged, fit, hopped, near_noise, residuals_in, score, tau_of
-from ers_mj.isolability import PARAMETER_PRICE, probabilities
-from ers_mj.model import OBSERVER_RATE, STATES, Model
+from ers_mj.effects import BY_NAME
+from ers_mj.identification import Fit, fit, hopped, near_noise, score, tau_of
+from ers_mj.model import Model
+from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, candidates, is_clocked, is_dear, is_quiet, judged, likeliest, likeliest_first,
+                         priced, really)
 from ers_mj.remainder import left_by_sensor, more_is_missing
-from ers_mj.screening import PEAK, Begin, screen, stands_out
+from ers_mj.screening import PEAK, stands_out
 from ers_mj.starts import with_starts
-from ers_mj.traces import Blocks, Trace
+from ers_mj.traces import Trace
 
-LEAST_GAIN = 3.0  # decrease of C that an effect must buy: one servo in forty without missing physics offers as much (evaluation.NULL_GAIN)
 LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the one that acts
 LEAST_SHARE = 0.1  # and the share of what is left to explain
-LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 LATER_Z = 2.0  # and beside an effect
 MISSED = 100.0  # of C by which a model is worse without an effect that nothing else will stand for
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
-BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
-QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
-RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
-LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
-PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
-FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
-AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well; what cannot be scaled is in any case
-FAILED = 0.05  # share of the best first refit's gain below which a promise was none
-FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
-# an effect that is not dear all that promise and are not: there a borrowed Jacobian has been bent by two)
-NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
-TIE, NEAR_TIE = 1.0, 0.02  # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
-NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) that this other must win itself to be told in its place
-CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH) or is dear to simulate
 REVERSED, MOST_REVERSED = 0.1, 5  # share of the leader's gain from which a rival is begun with, the leader put in, and how many are
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
-RIVAL, MOST_RIVALS = 0.3, 3  # share of the leader's gain from which a candidate may take its place later, and how many are tried
+MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (once if dear)
-QUICK = 8  # steps of a first refit, on a borrowed Jacobian
-HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A model that adds one effect to another: the fit, its gain in C over the reference, the paired z of that gain.
-
-    ``lost`` is the C that the blocks which the effect makes worse lose together, ``best`` what it wins in the block that it serves best.
-    """
-
-    name: str
-    fit: Fit
-    gain: float
-    z: float
-    lost: float
-    best: float
-
-    @property
-    def worth(self) -> float:
-        """Gain less the price of the parameters."""
-        return self.gain - PARAMETER_PRICE * self.fit.size
-
-
-def paired_z(better: np.ndarray, worse: np.ndarray, tau: float) -> float:
-    """z-score over blocks of the mean decrease in score from ``worse`` to ``better`` (misfits (B,) on the same data)."""
-    d = score(worse, tau) - score(better, tau)
-    spread = float(np.std(d, ddof=1)) if d.size > 1 else math.inf
-    return float(np.mean(d)) * math.sqrt(d.size) / spread if spread > 0 else 0.0
-
-
-def judged(name: str, found: Fit, base: Fit, tau: float) -> Candidate:
-    """What a fit has won over the model that it extends."""
-    won = score(base.misfit, tau) - score(found.misfit, tau)
-    lost = -float(np.sum(np.minimum(won, 0.0)))
-    return Candidate(name, found, float(np.sum(won)), paired_z(found.misfit, base.misfit, tau), lost, float(won.max()))
-
-
-def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str],
-               anchors: Sequence[Mapping[str, float]] = (), least: float = 0.0) -> list[Candidate]:
-    """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
-
-    They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow and a
-    mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that
-    matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for.
-    """
-    if _attainable(base.misfit, Blocks.of(traces).counts, tau) < LEAST_GAIN and score(base.misfit, tau).max() < math.log(PEAK):
-        return []
-    reference = float(score(base.misfit, tau).sum())
-
-    def total(found):
-        return float(score(found.misfit, tau).sum())
-
-    def priced(found):
-        return total(found) + PARAMETER_PRICE * found.size
-
-    def quick(begin):
-        return fit(begin.model, traces, tau=tau, steps=QUICK, ceiling=base.misfit, known=begin.known, renewals=0)
-
-    def refitted(starts):
-        """The best fit by label from pairs (label, Begin), those with the most parameters begun first since they take longest."""
-        order = sorted(starts, key=lambda start: -len(start[1].model.layout()))
-        ends = list(zip((label for label, _ in order), pool.map(quick, (begin for _, begin in order))))
-        return {label: min((found for other, found in ends if other == label), key=total) for label, _ in starts}
-
-    def leaders(ends):
-        """The best fit by name of those by (name, place)."""
-        return {name: min((found for (other, _), found in ends.items() if other == name), key=total) for name, _ in ends}
-
-    def onward(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=RENEWALS)
-
-    def finish(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
-
-    def contending(labels, ends):
-        """Those labels that may still be the explanation: all while none explains everything, then those with RIVAL of the best one's gain."""
-        least = reference - min(map(total, ends.values()), default=reference)
-        return [label for label in labels if reference - least > QUIET * base.misfit.size or reference - total(ends[label]) >= RIVAL * least]
-
-    def overlooked(best):
-        """The cheap laws, with models to refit, that explain less than CLOCKED of what leads with a clock of its own: on a borrowed Jacobian, or seen by its
-        secant, what has a threshold (a stop, a limit) does nothing until that is passed.
-        """
-        leader = min(best, key=lambda name: total(best[name]), default=None)
-        if leader is None or not _clocked(leader) or reference - total(best[leader]) < least:
-            return []
-        laws = [effect for effect in BY_NAME.values() if not (_clocked(effect.name) or effect.dear or effect.name in exclude)
-                and (effect.name not in best or reference - total(best[effect.name]) < CLOCKED * (reference - total(best[leader])))]
-        own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)] for effect in laws if not effect.sized}
-        return [(name, begin) for name in (effect.name for effect in laws) for begin in starts.get((name, 0), own.get(name, []))]
-
-    states = [((s, 0), [Begin(base.model.with_state(s, len(traces)), {})]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
-    places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
-    with ThreadPoolExecutor(jobs) as pool:
-        quiet, bent = _quiet(base, tau), not near_noise(base) or reference > BENT * base.misfit.size
-        screened = screen(places, traces, tau, exclude, bent, quiet)
-        if quiet and not screened.promising():
-            return []
-        starts = dict(states)
-        first = refitted([(label, begins[0]) for label, begins in starts.items()])
-        failed: set[str] = set()
-        while new := [name for name in screened.promising(failed) if (name, 0) not in starts]:
-            added = {(name, place): begins for name in new for place, begins in enumerate(screened.begins[name])}
-            starts |= added
-            first |= refitted([(label, begins[0]) for label, begins in added.items()])
-            most = max((reference - total(f) for f in first.values()), default=0.0)
-            failed = {name for name, found in leaders(first).items() if reference - total(found) <= FAILED * max(most, 0.0)}
-        most = max((reference - total(f) for f in first.values()), default=0.0)
-        foremost = [name for name in screened.promising(failed) if name not in failed][:FOREMOST]
-        own = {*foremost, *(name for name in screened.promising() if base.model.names and not _is_dear(base) and not BY_NAME[name].dear)}  # where bent
-        best, ahead = dict(first), [label for label in starts if label[1] == 0 and label[0] in own] if bent else []
-        for label, found in pool.map(finish, [(label, begin) for label in ahead for begin in starts[label]]):
-            best[label] = min(best[label], found, key=total)
-        worth = {name for name, found in leaders(best).items() if bent or reference - total(found) >= AGAIN * most}
-        worth = {*contending(worth, leaders(best)), *foremost, *(name for name in screened.promising(failed) if not BY_NAME[name].sized)}
-        again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth and label not in ahead for begin in begins[1:]])
-        best |= {label: min(best[label], found, key=total) for label, found in again.items()}
-        if not bent:
-            best = {(name, 0): found for name, found in leaders(best).items()}
-        running = contending(best, best)
-        for _ in range(LATER_LAPS if base.model.names else LAPS):
-            leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
-            pace = max(PACE * least, PACE_SHARE * leading)
-            ends = dict(pool.map(onward, ((label, best[label]) for label in running)))
-            running = [label for label in running if total(best[label]) - total(ends[label]) > pace
-                       and not (label[0] in BY_NAME and BY_NAME[label[0]].dear)]
-            best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
-            running = contending(running, best)
-        best = leaders(best)
-        for name, found in pool.map(finish, overlooked(best)):
-            best[name] = min(best.get(name, found), found, key=total)
-        rough = sorted(best.items(), key=lambda item: total(item[1]))
-        gains = [reference - total(f) for _, f in rough]
-        if not gains or gains[0] < NEAR_LEAST * least:
-            return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
-        close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
-        finished = dict(pool.map(finish, rough[:close]))
-        others = _other_forms(finished, {name: begins for (name, place), begins in starts.items() if place == 0})
-        for name, found in pool.map(finish, [*others, *_wider(finished, exclude)]):
-            if name not in best or priced(found) < priced(finished.get(name, best[name])):
-                finished[name] = found
-        ranked = sorted((judged(*item, base, tau) for item in {**dict(rough), **finished}.items()), key=lambda c: -c.worth)
-        rivals = len(_rivals(ranked))
-        if rivals > 1:
-            lead, second = ranked[0].fit, ranked[1].fit
-            ranked[:rivals] = pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau), base, tau), ranked[:rivals])
-    return _likeliest_first(sorted((c for c in ranked if not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
-
-
-def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
-    """Whether a knock moves the reading by less than a coarse converter's step: it stands for where the rudder began within one."""
-    if candidate.name not in BY_NAME or not BY_NAME[candidate.name].once or all(trace.converter is None for trace in traces):
-        return False
-    models = candidate.fit.model, candidate.fit.model.without_effect(candidate.name)
-    moved = [(np.subtract(*(trace.plain(residuals_in(m, trace, k, OBSERVER_RATE)) for m in models)), trace) for k, trace in enumerate(traces)]
-    return all(trace.converter is not None and float(np.max(np.abs(d[:trace.t.size]))) * trace.sigma < trace.converter.step for d, trace in moved if np.any(d))
-
-
-def _priced(found: Fit) -> float:
-    """The cost and the price of the parameters."""
-    return found.cost + PARAMETER_PRICE * found.size
-
-
-def _attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
-    """What C would fall by, were no block (B,) worse than the noise, or than half of them where that is less; beyond what noise makes of ``counts`` samples."""
-    level = min(1.0, float(np.median(misfit)))
-    left = float(np.sum(np.maximum(score(misfit, tau) - score(level, tau), 0.0)))
-    return left - HALF_NORMAL * level / (tau + level) * float(np.sum(np.sqrt(2.0 / counts)))
-
-
-def _other_forms(finished: Mapping[str, Fit], starts: Mapping[str, Sequence[Begin]]) -> list[tuple[str, Begin]]:
-    """The best start of each other form (which of its numbers are absent) of the finished effects: after a few steps forms are no more alike than effects."""
-    out = []
-    for name in (n for n in finished if n in BY_NAME):
-        known = [_form(finished[name].model, name)]
-        for begin in starts.get(name, ()):
-            if (form := _form(begin.model, name)) not in known:
-                known.append(form)
-                out.append((name, begin))
-    return out
-
-
-def _form(model: Model, name: str) -> tuple[bool, ...]:
-    return tuple(np.isfinite(dict(model.effects)[name]).tolist())
-
-
-def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:
-    """Effects that have a finished one as their limit, with the models that begin there: what is wider is no worse, if its fit finds it."""
-    out = []
-    for name, found in finished.items():
-        if name in BY_NAME:
-            without, p = found.model.without_effect(name), dict(found.model.effects)[name]
-            out += [(effect.name, Begin(without.with_effect(effect.name, start), {})) for effect in BY_NAME.values()
-                    if effect.name not in exclude for start in effect.grown(name, p, found.model.scales)]
-    return out
-
-
-def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates that the best one does not beat clearly, itself among them."""
-    least = max(ranked[0].worth - max(TIE, NEAR_TIE * ranked[0].gain), 0.0)
-    return [c for c in ranked if c.worth > least]
-
-
-def _likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
-    """Of rivals the most probable leads (see isolability.probabilities), together with those that are one with it (effects.EQUIVALENT): which of them the
-    worth prefers may rest on one stick or slip.
-
-    What has a clock of its own (a gust, a knock) or differs from recording to recording leads only where no law of the servo itself explains
-    CLOCKED of what it does: a swing bends to whatever a repeated excitation leaves over, a friction of each recording's own to any law of its speed.
-    """
-    if not ranked:
-        return ranked
-    if _clocked(ranked[0].name):
-        lawful = [c for c in ranked if not _clocked(c.name) and c.gain >= CLOCKED * ranked[0].gain and c.z >= LEAST_Z]
-        ranked = sorted(ranked, key=lambda c: c not in lawful)
-    gains = {c.name: c.gain for c in ranked}
-    ranked = sorted(ranked, key=lambda c: (real := _really(c.name, c.fit)) != c.name and gains.get(real, 0.0) >= NEARLY * c.gain)
-    rivals = [c for c in _rivals(ranked) if _really(c.name, c.fit) != ranked[0].name or c is ranked[0]] or ranked[:1]
-    name = _likeliest({c.name: c.fit for c in rivals})
-    first = next(c for c in rivals if c.name == name)
-    return [first, *(c for c in ranked if c is not first)]
-
-
-def _likeliest(fits: Mapping[str, Fit]) -> str:
-    """The most probable of what is not clocked, or else of all; the probabilities of those that are one with it count as its own."""
-    chances = probabilities(fits)
-    kinds = {name: next((group for group in EQUIVALENT if name in group), {name}) for name in fits}
-    return max(fits, key=lambda name: (not _clocked(name), sum(chances[other] for other in kinds[name] if other in chances), chances[name]))
-
-
-def _really(name: str, found: Fit) -> str:
-    """The effect of which a fit's is a form (see Effect.really)."""
-    return BY_NAME[name].really(dict(found.model.effects)[name], found.model.values.get("c_2", 0.0)) if name in BY_NAME else name
-
-
-def _clocked(name: str) -> bool:
-    return name in STATES or BY_NAME[name].local
 
 
 @dataclass(frozen=True)
@@ -313,7 +53,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
-        if ranked and least <= ranked[0].gain <= MODEST and mended < (1 if _is_dear(current) else MOST_MENDED):
+        if ranked and least <= ranked[0].gain <= MODEST and mended < (1 if is_dear(current) else MOST_MENDED):
             again = _less(ranked[0], traces, tau)
             if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT:
                 base, current, mended = base if current.model.names else again, again, mended + 1
@@ -322,8 +62,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         outstanding = stands_out(current.misfit, tau)
         if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and _is_cheap_and_wrong(current, base, traces):
             found = _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs)
-            ranked = _likeliest_first(sorted([*ranked, *found], key=lambda c: -c.worth))
-        if rounds and ranked and not _quiet(current, tau):
+            ranked = likeliest_first(sorted([*ranked, *found], key=lambda c: -c.worth))
+        if rounds and ranked and not is_quiet(current, tau):
             ranked = _other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
         asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME) and _asked_for(c, least, least_z, outstanding)]
         rounds.append(tuple(sorted(ranked, key=lambda c: c not in asked[:1])))
@@ -335,7 +75,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         tau = tau_of(current.misfit)
         traces = _restarted(current.model, traces)
         current = fit(current.model, traces, tau=tau, steps=20)
-        if not _is_dear(current):
+        if not is_dear(current):
             current, _ = hopped(current, traces, tau, jobs)
         if near_noise(current):
             current = _exchanged(current, rounds, traces, tau, jobs)
@@ -353,8 +93,8 @@ def _reconsidered(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Seq
     """
     newest = rounds[-1][0]
     early = [ranked[0].name for ranked in rounds[:-1] if ranked[0].name in BY_NAME and ranked[0].name in current.model.names
-             and _clocked(ranked[0].name) and ranked[0].gain < OUTWEIGHED * newest.gain]
-    if not early or _clocked(newest.name):
+             and is_clocked(ranked[0].name) and ranked[0].gain < OUTWEIGHED * newest.gain]
+    if not early or is_clocked(newest.name):
         return current, rounds
     model = current.model
     for name in early:
@@ -390,16 +130,6 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
     return [c for c in ended if sum(c.fit.model.at_bound(f) for f in c.fit.model.layout() if f.owner == c.name) <= AT_BOUND]
 
 
-def _is_dear(current: Fit) -> bool:
-    """Whether the model takes many times as long to simulate as others."""
-    return any(BY_NAME[name].dear for name in current.model.names)
-
-
-def _quiet(current: Fit, tau: float) -> bool:
-    """Whether little is left."""
-    return float(score(current.misfit, tau).sum()) <= QUIET * current.misfit.size
-
-
 def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float,
                      jobs: int) -> list[Candidate]:
     """The candidates with those that come of the last round's rivals, each with the newest effect put into its own fit: a baseline that was bent by one of
@@ -417,12 +147,12 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
     for c in ends:
         if c.name not in best or c.worth > best[c.name].worth:
             best[c.name] = c
-    return _likeliest_first(sorted(best.values(), key=lambda c: -c.worth))
+    return likeliest_first(sorted(best.values(), key=lambda c: -c.worth))
 
 
 def _most_rounds(current: Fit) -> int:
     """How many rounds there are at most: fewer where the model itself stays wrong, or is dear."""
-    return MOST_ROUNDS if near_noise(current) and not _is_dear(current) else FEWER_ROUNDS
+    return MOST_ROUNDS if near_noise(current) and not is_dear(current) else FEWER_ROUNDS
 
 
 def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
@@ -464,13 +194,13 @@ def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequen
         leader = ranked[0].name
         if leader not in current.model.names:
             continue
-        rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names and _really(c.name, c.fit) != leader
+        rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names and really(c.name, c.fit) != leader
                   and c.gain >= RIVAL * ranked[0].gain][:MOST_RIVALS]
         without = current.model.without_effect(leader)
         with ThreadPoolExecutor(jobs) as pool:
             fits = {leader: current} | dict(zip((c.name for c in rivals), pool.map(instead, rivals)))
-        least = min(map(_priced, fits.values())) + TIE
-        if (name := _likeliest({n: found for n, found in fits.items() if _priced(found) < least})) != leader:
+        least = min(map(priced, fits.values())) + TIE
+        if (name := likeliest({n: found for n, found in fits.items() if priced(found) < least})) != leader:
             current = fits[name]
             rounds[k] = tuple(sorted(ranked, key=lambda c: c.name != name))
     return current

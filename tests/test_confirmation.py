@@ -15,7 +15,7 @@ from ers_mj.intervals import half_widths, unseen_widths
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
-from ers_mj.selection import candidates
+from ers_mj.race import candidates
 from ers_mj.starts import without_spikes
 from ers_mj.traces import trace_of
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj import selection
+from ers_mj import race
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
@@ -14,10 +14,10 @@ from ers_mj.identification import fit, residuals, tau_of
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, screen, stands_out
-from ers_mj.selection import (LEAST_GAIN, Candidate, _exchanged, _likeliest_first, _other_forms, _other_way_round, _reconsidered, _swept, _wider, candidates,
-                              judged)
+from ers_mj.selection import _exchanged, _other_way_round, _reconsidered, _swept
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -96,7 +96,7 @@ def test_a_play_less_wide_than_its_contact_gives_way_is_a_shaft(pushed):
     shaft = found("shaft_compliance", [60.0, 0.1, 0.6, 0.2, np.inf], 16.0)
     for gap, gain, first in ((1e-4, 20.0, "shaft_compliance"), (1e-3, 20.0, "backlash"), (1e-4, 40.0, "backlash")):
         play = found("backlash", [gap, 0.6, 0.2, 80.0, 0.1], gain)
-        assert _likeliest_first([play, shaft])[0].name == first
+        assert likeliest_first([play, shaft])[0].name == first
     assert not BY_NAME["backlash"].grown("shaft_compliance", np.array([80.0, 0.7, 0.6, 0.2, np.inf]), pushed.fit.model.scales)
 
 
@@ -207,7 +207,7 @@ def test_a_shaft_whose_motor_bears_nothing_is_a_filter_in_the_drive(pushed):
 
     winding = found("inductance", [2e-3], 17.0)
     for rho, first in ((0.2, "inductance"), (0.4, "shaft_compliance")):
-        assert _likeliest_first([found("shaft_compliance", [50.0, 0.7, rho, 0.0, np.inf], 21.0), winding])[0].name == first
+        assert likeliest_first([found("shaft_compliance", [50.0, 0.7, rho, 0.0, np.inf], 21.0), winding])[0].name == first
     assert not BY_NAME["shaft_compliance"].grown("shaft_compliance", np.array([50.0, 0.7, 0.2, 0.0, np.inf]), pushed.fit.model.scales)
 
 
@@ -226,7 +226,7 @@ def test_a_stop_that_is_touched_once_is_no_knock(monkeypatch):
         found = screen(*arguments)
         return replace(found, promises={"load_disturbance": found.promises["load_disturbance"]})
 
-    monkeypatch.setattr(selection, "screen", knocks)
+    monkeypatch.setattr(race, "screen", knocks)
     ranked = candidates(start.fit, start.traces, tau_of(start.fit.misfit), 1, (), (), LEAST_GAIN)
     assert ranked[0].name == "end_stop" and dict(ranked[0].fit.model.effects)["end_stop"][1] == pytest.approx(upper, abs=1e-3)
     assert "load_disturbance" in [c.name for c in ranked]
