@@ -47,7 +47,7 @@ class Selection:
 def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str, float]] = (), exclude: Sequence[str] = (),
            jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless."""
-    current, rounds, mended = base, [], 0
+    current, rounds, mended, swept = base, [], 0, False
     tau = tau_of(base.misfit)
     while len(rounds) - len(current.model.states or {}) < _most_rounds(current):
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
@@ -61,7 +61,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         least_z = LATER_Z if current.model.names else LEAST_Z
         outstanding = stands_out(current.misfit, tau)
         if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and _is_cheap_and_wrong(current, base, traces):
-            found = _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs)
+            found, swept = _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, again=swept), True
             ranked = likeliest_first(sorted([*ranked, *found], key=lambda c: -c.worth))
         if rounds and ranked and not is_quiet(current, tau):
             ranked = _other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
@@ -108,14 +108,17 @@ def _is_cheap_and_wrong(current: Fit, base: Fit, traces: Sequence[Trace]) -> boo
     return not current.model.plant().coupled and more_is_missing(left_by_sensor(current.model, traces), without)
 
 
-def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int) -> list[Candidate]:
+def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int,
+           again: bool = False) -> list[Candidate]:
     """What a screening missed when it found nothing to add: where stick and slip fork, the secant of the very effect that acts may promise nothing.
 
     Every effect that is cheap to simulate and has few starts is refitted from these as they are, whatever they make worse on the way; those are returned that
     gain more than the screening's refit of the same effect. One with several numbers at their bounds is none: a shaft of 1000 Hz without a resonance.
+    The second body, which takes most of the time, is tried once a case and not ``again``.
     """
     effects = [effect for effect in BY_NAME.values() if not effect.dear and not effect.once and effect.name not in exclude]
     starts = [(effect.name, start) for effect in effects if len(few := effect.starts(base.model.scales)) < BY_SCREEN for start in few]
+    starts = [start for start in starts if not (again and base.model.with_effect(*start).plant().coupled)]
     known = {c.name: c.gain for c in ranked}
 
     def refitted(item):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj import race
+from ers_mj import race, selection
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
@@ -179,6 +179,16 @@ def test_a_sweep_finds_what_secants_miss(pushed):
     (size,) = dict(best.fit.model.effects)["bias_torque"]
     assert best.name == "bias_torque" and size == pytest.approx(0.06, rel=0.3) and best.gain > 2.0
     assert not [c for c in _swept(pushed.fit, [best], pushed.traces, 1.0, others, 1) if c.name == "bias_torque" and c.gain > best.gain + 0.1]
+
+
+def test_a_second_sweep_leaves_two_bodies_out(pushed, monkeypatch):
+    tried = []
+    monkeypatch.setattr(selection, "fit", lambda model, *_, **__: tried.append(model.names) or pushed.fit)
+    others = [name for name in BY_NAME if name not in ("bias_torque", "backlash", "shaft_compliance")]
+    for again, names in ((False, {("bias_torque",), ("backlash",), ("shaft_compliance",)}), (True, {("bias_torque",)})):
+        tried.clear()
+        _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, again=again)
+        assert set(tried) == names
 
 
 def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
