@@ -147,6 +147,20 @@ def test_without_dry_friction_it_is_the_linear_system_from_rest_on(name, tau, ef
     assert np.degrees(np.max(np.abs(model.simulate(T, u).theta - c.theta_0 - linear_motion(c, u)))) < 1e-7
 
 
+def test_an_inductance_that_falls_with_the_current_obeys_its_equation():
+    c = table_1(c_1=0.0, c_2=0.0, tau_e=0.0).coefficients
+    u, half = np.full(300, 12.0), 300.0
+    t = 1e-3 * np.arange(u.size)
+
+    def slope(t, x):
+        faster = min(1.0 + (x[2] / half) ** 2, 4.0)
+        return x[1], -c.a_1 * x[0] - c.a_mech_plus * x[1] + x[2], (c.b * 12.0 - c.a_emf * x[1] - x[2]) / 0.004 * faster
+
+    exact = solve_ivp(slope, (0.0, t[-1]), np.zeros(3), t_eval=t, rtol=1e-9, atol=1e-10).y
+    falls, stays = (ReducedModel(c, [("inductance", np.array([0.004, j]))]).simulate(t, u).theta - c.theta_0 for j in (half, np.inf))
+    assert np.max(np.abs(falls - exact[0])) < 0.02 * np.max(np.abs(stays - exact[0]))
+
+
 def test_a_shaft_that_hardens_obeys_its_equations():
     model = ReducedModel(table_1(c_1=0.0, c_2=0.0, tau_e=0.0).coefficients, [("shaft_compliance", np.array([12.0, 0.1, 0.55, 0.15, 0.02]))])
     c, u = Coefficients(*model._lowered[0]), np.full(T.size, 6.0)

@@ -162,7 +162,7 @@ def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
     traces, t = [], T[::4]
     for k, name in enumerate(("multisine", "steps", "chirp")):
         u = INPUTS[name](t)
-        y = ReducedModel(lumped({**TRUTH, "tau_e": 1.1e-3}), [("inductance", np.array([2.0e-3]))]).simulate(t, u).measured
+        y = ReducedModel(lumped({**TRUTH, "tau_e": 1.1e-3}), [("inductance", np.array([2.0e-3, np.inf]))]).simulate(t, u).measured
         traces.append(trace_of(from_arrays(t, u, y + 1.5e-4 * np.random.default_rng(k).standard_normal(t.size), name=name), None))
     start = baseline(traces, read_datasheet("table1"), True, 1)
     model = start.fit.model
@@ -215,7 +215,7 @@ def test_a_shaft_whose_motor_bears_nothing_is_a_filter_in_the_drive(pushed):
     def found(name, p, gain):
         return replace(judged(name, replace(pushed.fit, model=pushed.fit.model.with_effect(name, np.array(p))), pushed.fit, 1.0), gain=gain)
 
-    winding = found("inductance", [2e-3], 17.0)
+    winding = found("inductance", [2e-3, np.inf], 17.0)
     for rho, first in ((0.2, "inductance"), (0.4, "shaft_compliance")):
         assert likeliest_first([found("shaft_compliance", [50.0, 0.7, rho, 0.0, np.inf], 21.0), winding])[0].name == first
     assert not BY_NAME["shaft_compliance"].grown("shaft_compliance", np.array([50.0, 0.7, 0.2, 0.0, np.inf]), pushed.fit.model.scales)

@@ -14,7 +14,7 @@ from test_reduced import SCALES
 TOLERANCE = 0.05  # of the effect's own size
 VISIBLE = 0.2  # [deg] RMS
 SIZES = {  # where the first start of an effect is too small to be seen beside the two plants' own difference, or has not all of its terms
-    "inductance": [0.004], "input_delay": [0.0043], "backlash": [0.012, 0.6, 0.2, 120.0, 0.2], "stribeck": [40.0, 0.6, 1.4],
+    "inductance": [0.008, 300.0], "input_delay": [0.0043], "backlash": [0.012, 0.6, 0.2, 120.0, 0.2], "stribeck": [40.0, 0.6, 1.4],
     "end_stop": [0.15, 0.35, 100.0, 0.3], "sensor_quantisation": [0.0213], "voltage_saturation": [5.0, 8.0],
     "load_disturbance": [150.0, 0.6, 0.5, 0.0], "sensor_dropout": [4.0, 0.08], "sensor_lag": [0.01, 0.0103],
     "cogging": [22.0, 0.125, 0.0, 0.3, 1.0], "sensor_nonlinearity": [0.2, 0.1, np.inf, np.inf, np.inf],

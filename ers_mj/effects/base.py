@@ -18,6 +18,7 @@ from scipy.linalg.blas import dtbsv
 if TYPE_CHECKING:
     import mujoco
 
+LEAST_IRON = 0.25  # share of an inductance that no current saturates
 RETURNS = 0.95  # periods of a torque that returns with the angle which the travel must hold, overshoots set aside: less is a spring, a weight or a cubic
 
 
@@ -30,7 +31,7 @@ class Coefficients(NamedTuple):
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
     spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or, without
-    a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3). With rho = 0 it is the foot of a bristle instead (effect
+    a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3). With a falling inductance tau_e is tau_e / (1 + (``fall`` j)^2), but LEAST_IRON of it. With rho = 0 it is the foot of a bristle instead (effect
     ``presliding``), which carries the Coulomb friction; the drive acts on the rudder, and the bristle's damping is d_twist exp(-(w / fade)^2).
     """
 
@@ -59,6 +60,7 @@ class Coefficients(NamedTuple):
     gap: float = 0.0
     fade: float = np.inf
     harden: float = 0.0
+    fall: float = 0.0
 
     @property
     def has_motor_side(self) -> bool:

@@ -25,13 +25,13 @@ import math
 import numpy as np
 from numba import njit, types
 
-from ers_mj.effects.base import Coefficients
+from ers_mj.effects.base import LEAST_IRON, Coefficients
 from ers_mj.plants.compiled import compiled_cache, inlined, part
 from ers_mj.plants.laws import friction_level, moved, remember, total_torque
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
- BETA, PHI, K_TWIST, D_TWIST, GAP, FADE, HARDEN) = range(len(Coefficients._fields))
+ BETA, PHI, K_TWIST, D_TWIST, GAP, FADE, HARDEN, FALL) = range(len(Coefficients._fields))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
@@ -43,6 +43,7 @@ LEAST_LEVEL = 0.2  # of the mean friction, which laws cannot lower a bristle's b
 FULL = 1.0 - 1e-4  # share of its friction's level at which a bristle counts as bent to the full
 CALM = 0.2  # share of a speed, or of a twist's distance to the ends of the play, that a leap over a whole sample must leave
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
+FALL_STEP = 0.1  # length of a segment over the electrical time constant where the inductance falls with the current
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
 ORDER = (0, 4, 1, 2, 3, 5, 6)  # speeds first: between their zeros angles are monotone, so that later events have one root
@@ -740,6 +741,8 @@ def _cuts(c, h0, tau, a_emf, lawful, refine):
     if lawful:
         mechanical = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
         step = min(step, LAW_STEP / mechanical)
+    if c[FALL] > 0 and c[TAU] > 0:
+        step = min(step, FALL_STEP * c[TAU])
     if c[TWO] > 0:
         step = min(step, CONTACT_STEP / math.sqrt(c[K_TWIST] / (c[RHO] * (1.0 - c[RHO]) if c[RHO] > 0 else 1.0)))
     step /= refine
@@ -781,6 +784,25 @@ def _calm(c, x, h):
 def _steady(x, z):
     """Whether neither body comes near rest between the states x and z."""
     return abs(z[1]) >= CALM * abs(x[1]) and abs(z[4]) >= CALM * abs(x[4])
+
+
+@inlined
+def _fallen(c, on, p, lawful, t, x, m, drive, h):
+    """The constant drive under which a current whose inductance does not fall comes as far within h as one whose inductance does under ``drive``, with
+    the back-EMF of the segment's middle and what the inductance has fallen to there.
+    """
+    d = _derivative(c, on, p, lawful, t, x, m, drive, c[TAU], c[A_EMF])
+    speed = _drive_speed(c, x) + 0.5 * h * _drive_speed(c, d)
+    short, rate = x[2] - (drive - c[A_EMF] * speed), h / c[TAU]
+    middle = x[2] + short * (math.exp(-0.5 * rate * (1.0 + _faster(c, x[2]))) - 1.0)
+    kept = math.exp(-rate)
+    return drive + short * (math.exp(-rate * (1.0 + _faster(c, middle))) - kept) / (1.0 - kept)
+
+
+@inlined
+def _faster(c, j):
+    """How much faster, in shares, a current rises whose inductance falls: the iron keeps LEAST_IRON of it."""
+    return min((c[FALL] * j) ** 2, 1.0 / LEAST_IRON - 1.0)
 
 
 @inlined
@@ -838,6 +860,8 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
             now = t[k] + start * stretch
             start = ends[i]
             drive = c[B] * u[max(k - skip - 1 + fresh[i], 0)]
+            if c[FALL] > 0 and tau > 0:
+                drive = _fallen(c, on, p, lawful, now, x, m, drive, h)
             if uniform and enable[k] and m[2] == 0:
                 e = late if fresh[i] == 1 else early
                 if m[0] == 0 and not two:
@@ -907,7 +931,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     tau, a_emf = c[TAU], c[A_EMF]
     ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
     late, early = _maps(c, tau, a_emf, _last(ends)), _maps(c, tau, a_emf, ends[0])
-    leaps = c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0 and not lawful and ends.size > 1 and fresh[0] == 1
+    leaps = c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0 and c[FALL] <= 0 and not lawful and ends.size > 1 and fresh[0] == 1
     whole = _maps(c, tau, a_emf, h0) if leaps else early
     _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out)
 

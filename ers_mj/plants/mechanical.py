@@ -103,7 +103,8 @@ class MechanicalPlant:
     @property
     def stepped(self) -> tuple[str, ...]:
         """What the MJCF does not carry and the stepping applies."""
-        return tuple(law.name for law in self._laws)
+        falls = self._lowered.fall > 0 and self._lowered.tau_e > 0
+        return (*(law.name for law in self._laws), *(("inductance",) if falls else ()))
 
     def spec(self) -> mujoco.MjSpec:
         """The model for a plain viewer: with the command's delay, and a keyframe ``home`` at rest at theta_0."""

@@ -11,10 +11,11 @@ import mujoco
 import mujoco.batch
 import numpy as np
 
-from ers_mj.effects.base import Coefficients
+from ers_mj.effects.base import LEAST_IRON, Coefficients
 from ers_mj.plants.mjcf import unlogged
 
 MOTOR_GROUP = 1  # actuator group that an open circuit disables
+TIME_CONSTANT = 0  # where MuJoCo keeps a motor's electrical time constant in its actuator's dynprm
 LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dynprm
 
 
@@ -74,6 +75,7 @@ class Stepper:
         self.torques = [(law.torque, p) for law, p in laws if law.torque]
         self.frictions = [(law.friction, p) for law, p in laws if law.friction]
         self.inertias = [(law.inertia, p) for law, p in laws if law.inertia and not self.c.has_motor_side]
+        self.falls = self.current >= 0 and self.c.fall > 0
         self.memories = [(law.memory, p) for law, p in laws if law.memory]
         self.turning = self.model.joint("rocker").dofadr[0]
         self.armature = float(self.model.dof_armature[self.turning])
@@ -145,7 +147,7 @@ class Stepper:
     def _advance(self, v: float, load: float, steps: int) -> None:
         data = self.data
         data.ctrl[self.motor], data.ctrl[self.load] = v, self.inertia * load
-        if self.laws:
+        if self.laws or self.falls:
             for _ in range(steps):
                 self._apply_laws(v, load)
                 mujoco.mj_step(self.model, data)
@@ -169,9 +171,11 @@ class Stepper:
         return theta, omega, theta, v[self.rotor] / self.ratio, self.drive
 
     def _apply_laws(self, v: float, load: float) -> None:
-        """Set load torque, frictionloss and armature from the laws at the present state, per step."""
+        """Set load torque, frictionloss, armature and inductance from the laws at the present state, per step."""
         theta, w, _, _, _ = self._observe()
         j, t, c = self._drive(v), self.data.time, self.c
+        if self.falls:
+            self.model.actuator_dynprm[self.motor, TIME_CONSTANT] = c.tau_e * max(1.0 / (1.0 + (c.fall * j) ** 2), LEAST_IRON)
         for memory, p in self.memories:
             p[-1] = memory(p, theta, w, j, self.model.opt.timestep)
         force = load + sum(torque(p, theta, w, j, t) for torque, p in self.torques)
