@@ -31,8 +31,11 @@ class Coefficients(NamedTuple):
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
     spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or, without
-    a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3). With a falling inductance tau_e is tau_e / (1 + (``fall`` j)^2), but LEAST_IRON of it. With rho = 0 it is the foot of a bristle instead (effect
-    ``presliding``), which carries the Coulomb friction; the drive acts on the rudder, and the bristle's damping is d_twist exp(-(w / fade)^2).
+    a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3). With rho = 0 it is the foot of a bristle
+    instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder, and the bristle's
+    damping is d_twist exp(-(w / fade)^2).
+
+    Where the inductance falls with the current tau_e is divided by 1 + (``fall`` j)^2, until LEAST_IRON of it is left.
     """
 
     a_1: float = 0.0

@@ -33,5 +33,9 @@ class Inductance(Drive):
         """One that falls with the current, from one that does not."""
         return [np.array([p[0], HALVED * (scales.drive or scales.acceleration)])] if name == self.name and not np.isfinite(p[1]) else []
 
+    def describe(self, values):
+        falls = "" if values["half"] == "none" else f"; it falls with the current, to half where that makes a torque of {values['half']}"
+        return super().describe(values) + falls
+
     def coefficients(self, p, c):
         return c._replace(tau_e=c.tau_e + p[0], fall=1.0 / p[1] if np.isfinite(p[1]) else 0.0)
