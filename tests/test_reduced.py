@@ -7,7 +7,7 @@ from scipy.signal import cont2discrete
 
 from ers_mj.datasheet import read_datasheet
 from ers_mj.effects import EFFECTS
-from ers_mj.effects.base import Coefficients, Scales
+from ers_mj.effects.base import Coefficients, Scales, coupled
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.proving import quick
@@ -159,6 +159,17 @@ def test_an_inductance_that_falls_with_the_current_obeys_its_equation():
     exact = solve_ivp(slope, (0.0, t[-1]), np.zeros(3), t_eval=t, rtol=1e-9, atol=1e-10).y
     falls, stays = (ReducedModel(c, [("inductance", np.array([0.004, j]))]).simulate(t, u).theta - c.theta_0 for j in (half, np.inf))
     assert np.max(np.abs(falls - exact[0])) < 0.02 * np.max(np.abs(stays - exact[0]))
+
+
+def test_a_motor_that_creeps_to_rest_at_the_limit_of_its_friction_lets_the_servo_go_on():
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, 3.0, 2e-3)
+    for _ in range(30):
+        c = Coefficients(a_1=rng.uniform(0, 100), a_mech_plus=2.9, a_mech_minus=2.9, a_emf=rng.uniform(10, 100), b=88.0, c_2_plus=130.0,
+                         c_2_minus=130.0, tau_e=2e-3)
+        c = coupled(c, f=rng.uniform(15, 60), zeta=rng.uniform(0.1, 0.5), rho=rng.uniform(0.2, 0.8), phi=rng.uniform(0.1, 0.6))
+        u = np.repeat(rng.uniform(-8, 8, 6), 250)
+        assert np.all(np.isfinite(ReducedModel(c).theta(t, u, (0.1, 0.0))))
 
 
 def test_a_shaft_that_hardens_obeys_its_equations():

@@ -35,6 +35,7 @@ INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
+CREPT = 1e-12  # share of its friction by which a motor that has crept to rest may be pulled further
 ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
 EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows
 BRISTLE_CORNER = 0.03  # the same for a rudder that no friction slows: share of c_1 h below which it bounces out of sight
@@ -352,7 +353,7 @@ def _violation(e, c, on, p, lawful, t, x, m):
     if m[3] != 0:
         return -1.0
     a, level = _held_motor(c, x, m)
-    return abs(a) - level
+    return abs(a) - level * (1.0 + CREPT)
 
 
 @inlined
@@ -516,7 +517,8 @@ def _advance(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt, h_max, corner):
             else:
                 m = m_new
             if events > 4 * RELEASE_LIMIT:
-                return (x[0], 0.0, x[2], x[3], 0.0), (0, m[1], m[2], 0, m[4]), events
+                j = drive + (x[2] - drive) * math.exp(-left / tau) if tau > 0 else x[2]
+                return (x[0], 0.0, j, x[3], 0.0), (0, m[1], m[2], 0, m[4]), events
         if not _bounded(x):
             return x, m, events
         t += first
