@@ -39,6 +39,7 @@ NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) th
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 RIVAL = 0.3  # share of the leader's gain from which a candidate may take its place later
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
+ANEW = 8  # starts from which a wave that leaves the model bent is fitted again
 HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
 
 
@@ -176,6 +177,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         finished = dict(pool.map(finish, rough[:close]))
+        for name, found in pool.map(finish, _anew(finished, traces, tau)):
+            finished[name] = min(finished[name], found, key=total)
         others = _other_forms(finished, {name: begins for (name, place), begins in starts.items() if place == 0})
         for name, found in pool.map(finish, [*others, *_wider(finished, exclude)]):
             if name not in best or priced(found) < priced(finished.get(name, best[name])):
@@ -207,6 +210,19 @@ def _attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
     level = min(1.0, float(np.median(misfit)))
     left = float(np.sum(np.maximum(score(misfit, tau) - score(level, tau), 0.0)))
     return left - HALF_NORMAL * level / (tau + level) * float(np.sum(np.sqrt(2.0 / counts)))
+
+
+def _anew(finished: Mapping[str, Fit], traces: Sequence[Trace], tau: float) -> list[tuple[str, Begin]]:
+    """More starts of the finished waves along the travel that leave the model bent, from where they have brought the baseline: which of many periods is
+    the true one shows badly beside parameters that stand for all of it.
+    """
+    out = []
+    for name, found in finished.items():
+        if name in BY_NAME and BY_NAME[name].wave and not is_clocked(name) and found.cost > BENT * found.misfit.size:
+            others = [other for other in BY_NAME if other != name]
+            places = screen([found.model.without_effect(name)], traces, tau, others, True, False, tries=ANEW).begins.get(name, [])
+            out += [(name, begin) for begins in places for begin in begins]
+    return out
 
 
 def _other_forms(finished: Mapping[str, Fit], starts: Mapping[str, Sequence[Begin]]) -> list[tuple[str, Begin]]:

@@ -52,7 +52,7 @@ class Screened:
         return [name for name in best if self.promises[name] >= max(self.floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * bar)]
 
 
-def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str], bent: bool, quiet: bool) -> Screened:
+def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude: Sequence[str], bent: bool, quiet: bool, tries: int = 0) -> Screened:
     """The promises of all effects, and the models to refit.
 
     From each place (the refitted baseline first, and where else a fit may start from) the secant e(with effect) - e(without) is taken
@@ -63,7 +63,7 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth LEAST_PROMISE. (How far C
     lies above zero is no such sign: it hangs on the noise, which is an estimate.)
 
-    What is dear to simulate is refitted from its most promising place only.
+    What is dear to simulate is refitted from its most promising place only, and each effect from as many starts as it declares, or ``tries`` if more.
     """
     names, floor, most = [name for name in BY_NAME if name not in exclude], 0.0, LATER if places[0].names else MOST_BENT if bent else MOST_SENT
     promises, begins = {}, {}
@@ -77,11 +77,11 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
             if effect.once:
                 found = _knocks(place, effect, effect.starts(scales), e, targets[0][2], traces, tau)
             else:
-                starts = _hopeful(run, effect, effect.starts(scales), targets, traces)
+                starts = _hopeful(run, effect, effect.starts(scales), targets, traces, max(effect.tries, tries))
                 found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
-                begun = [Begin(model, known) for _, model in _of_each_form(found)[:effect.tries]]
+                begun = [Begin(model, known) for _, model in _of_each_form(found)[:max(effect.tries, tries)]]
                 if not effect.dear:
                     begins.setdefault(effect.name, []).append(begun)
                 elif found[0][0] > promises.get(effect.name, 0.0):
@@ -107,17 +107,17 @@ def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]
     return [p for k, p in enumerate(found) if forms[k] not in forms[:k]] + [p for k, p in enumerate(found) if forms[k] in forms[:k]]
 
 
-def _hopeful(run: Run, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace]) -> list[np.ndarray]:
+def _hopeful(run: Run, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace], tries: int) -> list[np.ndarray]:
     """Of many starts of a law, those that promise most to first order along a place's own motion."""
     place = run.model
-    if len(starts) <= effect.tries + 1 or not (effect.torque or effect.friction) or not place.has_tangents:
+    if len(starts) <= tries + 1 or not (effect.torque or effect.friction) or not place.has_tangents:
         return starts
     waves = 2 if effect.wave else 1
     every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
     changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, run.motions).T
     ends = _ends(effect, traces)
     shares = np.max([_shares(changes, waves, ends, target, effect.signed)[0] for target in targets], axis=0)
-    best = sorted(np.argsort(shares)[::-1][:effect.tries])
+    best = sorted(np.argsort(shares)[::-1][:tries])
     return [starts[i] for i in best]
 
 
