@@ -32,6 +32,16 @@ def test_baseline_equals_an_independent_scheme_at_a_far_smaller_step(name, induc
     assert np.degrees(np.max(np.abs(ours - truth))) < 1e-3
 
 
+@pytest.mark.parametrize("x_s_deg, delta", [(1.0, 1.5), (0.2, 1.5), (0.2, 2.0), (0.04, 1.5), (0.2, 0.8)])
+@pytest.mark.parametrize("name", ["multisine", "steps"])
+def test_presliding_equals_an_independent_dahl(name, x_s_deg, delta):
+    u, shape = INPUTS[name](T), {"form": "Dahl", "bristle_damping_ratio": 0.0, "delta": delta}
+    dahl = {"label": "presliding", "strength": x_s_deg, "shape": shape}
+    truth = quick.simulate(dict(TABLE_1.parameters), [dahl], T, u, step=5e-6, stand=0.0).true
+    ours = ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.0, np.inf, delta]))]).simulate(T, u).theta
+    assert np.degrees(np.max(np.abs(ours - truth))) < 3e-3
+
+
 @pytest.mark.parametrize("x_s_deg, w_d", [(1.0, np.inf), (0.2, np.inf), (0.2, 0.15)])
 @pytest.mark.parametrize("name", ["multisine", "steps"])
 def test_presliding_equals_an_independent_lugre(name, x_s_deg, w_d):
@@ -39,7 +49,7 @@ def test_presliding_equals_an_independent_lugre(name, x_s_deg, w_d):
     u, shape = INPUTS[name](T), {**form, "bristle_damping_ratio": 0.4}
     lugre = {"label": "presliding", "strength": x_s_deg, "shape": shape}
     truth = quick.simulate(dict(TABLE_1.parameters), [lugre], T, u, step=5e-6, stand=0.0).true
-    ours = ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.4, w_d]))]).simulate(T, u).theta
+    ours = ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.4, w_d, np.inf]))]).simulate(T, u).theta
     assert np.degrees(np.max(np.abs(ours - truth))) < 3e-3
 
 
@@ -71,7 +81,7 @@ def test_nothing_creeps_in_the_stick_band():
 def test_a_bent_bristle_holds_still():
     """Constant forces bend it once, by about x_s at nine tenths of the friction, and it does not creep; the preload's corner still holds."""
     c = table_1().coefficients
-    sprung = ReducedModel(c, [("presliding", np.array([0.008, 0.2, np.inf]))])
+    sprung = ReducedModel(c, [("presliding", np.array([0.008, 0.2, np.inf, np.inf]))])
     away = sprung.simulate(T, (0.3 * c.c_2_plus + c.c_1 + c.a_1 * 0.1) / c.b * np.ones(T.size), start=(c.theta_0 + 0.1, 0.0)).theta
     assert 0.3 * 0.008 < away[-1] - away[0] < 2 * 0.008
     assert np.ptp(away[2000:]) < 1e-9

@@ -37,7 +37,8 @@ def test_of_the_coefficients(name, inductance):
     assert agree(plant(0), plant(1), plant(-1), 1 / STEP, INPUTS["multisine"](T)) < (ROUGHLY if name == "tau_e" else CLOSE)
 
 
-@pytest.mark.parametrize("bristle", [[0.01, 0.5, np.inf], [0.0017, 0.25, np.inf], [0.0003, 0.5, 0.3]], ids=["soft", "firm", "stiff"])
+@pytest.mark.parametrize("bristle", [[0.01, 0.5, np.inf, np.inf], [0.0017, 0.25, np.inf, np.inf], [0.0003, 0.5, 0.3, np.inf], [0.0017, 0.25, np.inf, 1.5]],
+                         ids=["soft", "firm", "stiff", "Dahl's"])
 @pytest.mark.parametrize("name", [*SEEN_BY_EQ_5, "cogging"])
 def test_of_a_rudder_on_a_bristle(name, bristle):
     """The friction holds it like a spring and lets it go; what else changes it, a coefficient or another law, does so along the motion that it makes."""

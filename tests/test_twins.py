@@ -70,6 +70,16 @@ def test_both_plants_read_the_recordings_own_clock():
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - early.theta)
 
 
+@pytest.mark.parametrize("delta", [1.5, 2.0, 0.7])
+def test_a_bristle_of_another_exponent_agrees(delta):
+    """MuJoCo's bristle has the exponent 1; the level that it is given at every step makes it bend as Dahl's."""
+    u = INPUTS["multisine"](T)
+    chosen = [("presliding", np.array([0.005, 0.1, np.inf, delta]))]
+    law, plain = ReducedModel(EQ_5, chosen).simulate(T, u), ReducedModel(EQ_5, [("presliding", np.array([0.005, 0.1, np.inf, np.inf]))]).simulate(T, u)
+    twin = MechanicalPlant(EQ_5, chosen, parameters=SHEET.parameters).simulate(T, u)
+    assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - plain.theta)
+
+
 def test_a_shaft_beside_a_play_softens_its_contact():
     """Both at once are one play with the shaft's spring, in either plant and whichever is named first."""
     both = [("backlash", np.array([0.012, 0.6, 0.2, 120.0, 0.2])), ("shaft_compliance", np.array([20.0, 0.2, 0.6, 0.2, np.inf]))]

@@ -33,7 +33,7 @@ class Coefficients(NamedTuple):
     spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or, without
     a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3). With rho = 0 it is the foot of a bristle
     instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder, and the bristle's
-    damping is d_twist exp(-(w / fade)^2).
+    damping is d_twist exp(-(w / fade)^2); it gives way as in Dahl (1968): its bend moves with (1 - force over level)^``dahl`` of the rudder's speed.
 
     Where the inductance falls with the current tau_e is divided by 1 + (``fall`` j)^2, until LEAST_IRON of it is left.
     """
@@ -62,6 +62,7 @@ class Coefficients(NamedTuple):
     d_twist: float = 0.0
     gap: float = 0.0
     fade: float = np.inf
+    dahl: float = 1.0
     harden: float = 0.0
     fall: float = 0.0
 

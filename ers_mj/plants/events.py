@@ -31,7 +31,7 @@ from ers_mj.plants.laws import friction_level, moved, remember, total_torque
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
- BETA, PHI, K_TWIST, D_TWIST, GAP, FADE, HARDEN, FALL) = range(len(Coefficients._fields))
+ BETA, PHI, K_TWIST, D_TWIST, GAP, FADE, DAHL, HARDEN, FALL) = range(len(Coefficients._fields))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
@@ -108,6 +108,14 @@ def _level(c, on, p, lawful, x, direction):
     return max(level, LEAST_LEVEL * 0.5 * (c[C_PLUS] + c[C_MINUS]))
 
 
+@inlined
+def _bending(c, share):
+    """Speed at which a bristle bends over the rudder's, under this share of the level along the motion."""
+    if c[DAHL] == 1.0:
+        return 1.0 - share
+    return math.copysign(abs(1.0 - share) ** c[DAHL], 1.0 - share)
+
+
 @part
 def _bristle(c, on, p, lawful, x, s_m):
     """(force of the bristle on the rudder, per total inertia; the speed of its foot)."""
@@ -115,7 +123,8 @@ def _bristle(c, on, p, lawful, x, s_m):
         return -s_m * _level(c, on, p, lawful, x, float(s_m)), x[1]
     pull, speed = c[K_TWIST] * (x[0] - x[3]), 0.0
     if x[1] != 0.0:
-        speed = abs(x[1]) * pull / _level(c, on, p, lawful, x, 1.0 if x[1] > 0 else -1.0)
+        way = 1.0 if x[1] > 0 else -1.0
+        speed = x[1] * (1.0 - _bending(c, way * pull / _level(c, on, p, lawful, x, way)))
     return -pull - c[D_TWIST] * math.exp(-(x[1] / c[FADE]) ** 2) * (x[1] - speed), speed
 
 
@@ -421,7 +430,7 @@ def _rate(c, m, x, tau, a_emf):
         rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
     if _has_bristle(c):
         if m[3] == 0:
-            rate += math.sqrt(c[K_TWIST]) + c[D_TWIST] + 2.0 * c[K_TWIST] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS])
+            rate += math.sqrt(c[K_TWIST]) + c[D_TWIST] + c[DAHL] * 2.0 ** c[DAHL] * c[K_TWIST] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS])
     elif c[TWO] > 0:
         rate = rate / min(c[RHO], 1.0 - c[RHO])
         if m[4] != 0:

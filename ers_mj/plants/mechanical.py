@@ -170,8 +170,8 @@ class MechanicalPlant:
                 laws.append(Law(name, constants, effect.torque, effect.friction, effect.inertia, effect.memory))
         if c.a_mech_plus != c.a_mech_minus:
             laws.append(_viscous_asymmetry(c))
-        if c.has_bristle and (c.c_2_plus != c.c_2_minus or np.isfinite(c.fade)):
-            laws.append(Law("a bristle's asymmetry or fading damping", np.zeros(0), None, lambda p, level, theta, w, j, direction: level))
+        if c.has_bristle and (c.c_2_plus != c.c_2_minus or np.isfinite(c.fade) or c.dahl != 1.0):
+            laws.append(Law("a bristle's asymmetry, fading damping or exponent", np.zeros(0), None, lambda p, level, theta, w, j, direction: level))
         return skeleton, tuple(laws)
 
     # -- running --

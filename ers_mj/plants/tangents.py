@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit, types
 
 from ers_mj.plants.compiled import compiled_cache, inlined
-from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, D_TWIST, FADE, K_TWIST, READ, READ_BOOL, ROWS, LAWS, TAU,
+from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, DAHL, D_TWIST, FADE, K_TWIST, READ, READ_BOOL, ROWS, LAWS, TAU,
                                   THETA_0, VECTOR, _derivative, _extra, _has_bristle, _level, _maps)
 from ers_mj.plants.laws import remember
 
@@ -189,6 +189,15 @@ def _fading(c, w):
 
 
 @inlined
+def _unbent(c, left, way):
+    """What is left of a bristle's share of its level to bend, which was ``left``, after a way counted in the displacement of its whole bend."""
+    if c[DAHL] == 1.0 or left <= 0.0:
+        return left * math.exp(-way)
+    power = 1.0 - c[DAHL]
+    return max(left**power - power * way, 0.0) ** (1.0 / power)
+
+
+@inlined
 def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
     """See ``_tangent``: of a rudder on a bristle, whose bend z along the path and its change bent are integrated here."""
     n, h = t.size, t[1] - t[0]
@@ -233,11 +242,15 @@ def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, 
         x = (0.5 * (theta + theta_1), 0.5 * (w + w_1), 0.5 * (j + j_1), 0.5 * (theta + theta_1), 0.0)
         level = _level(c, on, p, lawful, x, float(s))
         level_2 = _level(c_2, on_2, p_2, lawful_2, x, float(s))
-        z_1 = s * level / k + (z - s * level / k) * math.exp(-k * abs(way) / level)
+        unbent = _unbent(c, 1.0 - s * k * z / level, k * abs(way) / level)
+        z_1 = s * level / k * (1.0 - unbent)
         bends = (z_1 - z) / way if abs(way) > 0.0 else 1.0
         z_mean = 0.5 * (z + z_1)
-        lets_go = abs(way) / h * k / level
-        grows = abs(way) / h * z_mean * (k / level * (level_2 - level) * scale - dc[K_TWIST]) / level
+        left = 1.0 - s * k * z_mean / level
+        lets_go = abs(way) / h * k / level * (1.0 if c[DAHL] == 1.0 else c[DAHL] * abs(left) ** (c[DAHL] - 1.0))
+        grows = lets_go * z_mean * ((level_2 - level) * scale / level - dc[K_TWIST] / k)
+        if dc[DAHL] != 0.0 and left > 0.0:
+            grows += dc[DAHL] * way / h * left ** c[DAHL] * math.log(left)
         passed = 1.0
         if side_1 != side and theta_1 != theta:
             passed = min(max((c[THETA_0] - theta) / (theta_1 - theta), 0.0), 1.0)
