@@ -70,14 +70,16 @@ def test_both_plants_read_the_recordings_own_clock():
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - early.theta)
 
 
-@pytest.mark.parametrize("delta", [1.5, 2.0, 0.7])
-def test_a_bristle_of_another_exponent_agrees(delta):
-    """MuJoCo's bristle has the exponent 1; the level that it is given at every step makes it bend as Dahl's."""
+@pytest.mark.parametrize(("name", "p"), [("presliding", [0.005, 0.1, np.inf, 1.5]), ("presliding", [0.005, 0.1, np.inf, 2.0]), ("presliding", [0.02, 0.1, np.inf, 0.7]),
+                                         ("current_limit", [80.0, 0.3]), ("inductance", [0.008, 60.0])])
+def test_another_form_agrees(name, p):
+    """What the last number, absent in the plain form, makes of an effect, is in the twin as well: a bristle's exponent, what flows beyond a limit."""
     u = INPUTS["multisine"](T)
-    chosen = [("presliding", np.array([0.005, 0.1, np.inf, delta]))]
-    law, plain = ReducedModel(EQ_5, chosen).simulate(T, u), ReducedModel(EQ_5, [("presliding", np.array([0.005, 0.1, np.inf, np.inf]))]).simulate(T, u)
-    twin = MechanicalPlant(EQ_5, chosen, parameters=SHEET.parameters).simulate(T, u)
-    assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - plain.theta)
+    law, plain = (ReducedModel(EQ_5, [(name, np.array(some))]).simulate(T, u) for some in (p, [*p[:-1], np.inf]))
+    twin = MechanicalPlant(EQ_5, [(name, np.array(p))], parameters=SHEET.parameters).simulate(T, u)
+    size = rms_deg(law.theta - plain.theta)
+    assert size > VISIBLE
+    assert rms_deg(twin.theta - law.theta) < TOLERANCE * size
 
 
 def test_a_shaft_beside_a_play_softens_its_contact():
