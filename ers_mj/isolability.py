@@ -15,7 +15,7 @@ from ers_mj.traces import Trace
 
 RUN = 4  # neighbouring blocks that chance strikes together: 1 s, as the intervals take it
 PARAMETER_PRICE = 0.25  # of C for each further parameter, when explanations are compared
-WIDER_PRICE = 0.75  # and of one that is the other's limit: with the price of the parameter that opens it as much as Akaike asks
+WIDER_PRICE = 0.75  # of what has another as its limit and is not seen to be more (with the price of the parameter that opens it as much as Akaike asks), or else of that other
 DRAWS = 1000  # of weights, in which each run of blocks counts more or less
 
 
@@ -52,13 +52,14 @@ def isolability(leader: Fit, others: Sequence[Fit], traces: Sequence[Trace]) -> 
 def probabilities(fits: Mapping[str, Fit]) -> dict[str, float]:
     """How probable each of these explanations is, if one of them is true; they sum to one.
 
-    C is a logarithm of a likelihood, so exp(-C) weighs, less the price of the parameters; a play closes into a springy shaft, which is no worse unless
-    the play is seen. What one stick or one slip did may not happen
+    C is a logarithm of a likelihood, so exp(-C) weighs, less the price of the parameters; a play closes into a springy shaft, which is likelier unless
+    the play is seen, and less likely if it is: a spring that hardens does much of what a play does. What one stick or one slip did may not happen
     again: the weights are averaged over draws in which every run of RUN blocks counts by a random share of its own (Bayesian
     bootstrap; pseudo-BMA+ of Yao et al. 2018), so that an advantage won in one place does not exclude the rest.
     """
     runs = np.array([_runs(score(f.misfit, 1.0)) for f in fits.values()])
-    price = np.array([PARAMETER_PRICE * f.size + WIDER_PRICE * any(_is_limit(other, f) for other in fits.values()) for f in fits.values()])
+    price = np.array([PARAMETER_PRICE * f.size + WIDER_PRICE * any(_is_limit(other, f, False) or _is_limit(f, other, True) for other in fits.values())
+                      for f in fits.values()])
     shares = np.random.default_rng(0).dirichlet(np.ones(runs.shape[1]), DRAWS) * runs.shape[1]
     cost = shares @ runs.T + price
     weight = np.exp(-(cost - cost.min(axis=1, keepdims=True)))
@@ -66,10 +67,10 @@ def probabilities(fits: Mapping[str, Fit]) -> dict[str, float]:
     return dict(zip(fits, map(float, weight.mean(axis=0))))
 
 
-def _is_limit(narrow: Fit, wide: Fit) -> bool:
-    """Whether an effect of the wide model, which the narrow one lacks, has one of the narrow model's as its limit, and is not seen to be more."""
+def _is_limit(narrow: Fit, wide: Fit, seen: bool) -> bool:
+    """Whether an effect of the wide model, which the narrow one lacks, has one of the narrow model's as its limit, and is ``seen`` to be more, or is not."""
     return any(BY_NAME[name].grown(other, p, wide.model.scales) for name, at in wide.model.effects if name not in narrow.model.names
-               and not BY_NAME[name].seen(at, wide.model.values.get("c_2", 0.0)) for other, p in narrow.model.effects if other not in wide.model.names)
+               and seen == BY_NAME[name].seen(at, wide.model.values.get("c_2", 0.0)) for other, p in narrow.model.effects if other not in wide.model.names)
 
 
 def _runs(d: np.ndarray) -> np.ndarray:
