@@ -17,7 +17,7 @@ class CurrentLimit(Drive):
     mjcf = "the forcerange of the motor (the saturation of a dcmotor); beyond it, set step by step by the load actuator"
     parameters = (
         Parameter("tau_max", "torque", "largest motor torque n K_t i at the output", absent=np.inf),
-        Parameter("beyond", "ratio", "share of the excess that still flows (infinite: none)", upper=1.0, absent=np.inf),
+        Parameter("beyond", "ratio", "share of the excess that still flows (infinite: none)", lower=0.002, upper=0.9, absent=np.inf),
     )
     needs, follows_current = (("tau_max",),), True
 
