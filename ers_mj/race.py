@@ -39,7 +39,7 @@ NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) th
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 RIVAL = 0.3  # share of the leader's gain from which a candidate may take its place later
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
-ANEW = 8  # starts from which a wave that leaves the model bent is fitted again
+ANEW, ANEW_FROM = 8, 0.2  # starts from which a wave is fitted again that leaves so much C per block
 HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
 
 
@@ -213,12 +213,12 @@ def _attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
 
 
 def _anew(finished: Mapping[str, Fit], traces: Sequence[Trace], tau: float) -> list[tuple[str, Begin]]:
-    """More starts of the finished waves along the travel that leave the model bent, from where they have brought the baseline: which of many periods is
-    the true one shows badly beside parameters that stand for all of it.
+    """More starts of the finished waves along the travel that leave much, from where they have brought the baseline: which of many periods is the true one
+    shows badly beside parameters that stand for all of it.
     """
     out = []
     for name, found in finished.items():
-        if name in BY_NAME and BY_NAME[name].wave and not is_clocked(name) and found.cost > BENT * found.misfit.size:
+        if name in BY_NAME and BY_NAME[name].wave and not is_clocked(name) and found.cost > ANEW_FROM * found.misfit.size:
             others = [other for other in BY_NAME if other != name]
             places = screen([found.model.without_effect(name)], traces, tau, others, True, False, tries=ANEW).begins.get(name, [])
             out += [(name, begin) for begins in places for begin in begins]
