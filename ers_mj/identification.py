@@ -111,7 +111,8 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
 
     Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
     mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
-    more of a search that begins near the data: one bad block would send it back to the sum of squares.)
+    more of a search that begins near the data: one bad block would send it back to the sum of squares.) The cost is that at ``tau``,
+    wherever the search ends.
     """
     run = _begun(model, traces, rate)
     now, jacobian, blocks = math.inf, jacobian_of(run, traces, rate, known) if known is not None else None, Blocks.of(traces)
@@ -122,8 +123,10 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
         found, run, jacobian, renewals = _descend(run, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, jacobian, renewals, by_tangents)
-        if last or (ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size):
+        if last:
             return found
+        if ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size:
+            return replace(found, cost=float(score(found.misfit, tau).sum()))
 
 
 def _begun(model: Model, traces: Sequence[Trace], rate: float) -> Run:

@@ -10,7 +10,7 @@ from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.errors import InputError
-from ers_mj.identification import fit, residuals, tau_of
+from ers_mj.identification import fit, residuals, score, tau_of
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
@@ -40,6 +40,13 @@ def test_a_place_far_from_the_data_takes_no_candidate_from_one_near_it(pushed):
     alone, both = (screen(places, pushed.traces, 1.0, (), False, False) for places in ([near], [near, far]))
     assert "bias_torque" in alone.promising() and set(alone.promising()) <= set(both.promising())
     assert all(len(both.begins[name]) == 2 for name in both.promising() if not BY_NAME[name].dear)
+
+
+def test_a_search_that_is_given_up_still_tells_the_cost_that_was_asked_for(pushed):
+    far = replace(pushed.fit.model, values={**pushed.fit.model.values, "a_1": 2.5, "b": 7.0})
+    left = fit(far, pushed.traces, tau=1.0, steps=1, ceiling=pushed.fit.misfit)
+    assert float(np.exp(np.mean(np.log(left.misfit + 1.0)))) > 10.0  # it ended at a stage far above
+    assert left.cost == pytest.approx(float(score(left.misfit, 1.0).sum()))
 
 
 def test_a_promise_that_failed_is_no_measure_for_the_others():
