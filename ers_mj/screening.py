@@ -21,7 +21,7 @@ LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the sc
 HOTTEST, KNOCKS, NEARER = 3, (0.08, 0.25), 60  # blocks in which a knock is looked for, the lengths [s] from which its fit is begun, and simulations of it
 PEAK = 30.0  # factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
 USUAL = 0.95  # share of the blocks that are no worse than a bad one
-IDLE, HALVINGS = 1e-3, 6  # of C that a push which moves nothing changes; of the way from it to the next that throws the rudder
+IDLE, HALVINGS = 0.1, 6  # of C that a push which moves little changes; of the way from it to the next that throws the rudder
 
 
 @dataclass(frozen=True)
@@ -165,8 +165,8 @@ def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.nd
 
 
 def _between(gain: Callable[[np.ndarray], float], pushes: Sequence[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:
-    """Pushes alike but for their size, between the largest that moves nothing and the next, which throws the rudder too far: what a rudder at rest was
-    moved by is often within a few per cent of what moves it at all.
+    """Pushes alike but for their size, between the largest that moves little (a shaft twists under it) and the next, which throws the rudder too far: what a
+    rudder at rest was moved by is often within a few per cent of what moves it at all.
     """
     ordered = sorted(pushes, key=lambda push: abs(push[1][0]))
     k = next((k for k, (won, _) in enumerate(ordered) if abs(won) > IDLE), 0)
@@ -177,7 +177,7 @@ def _between(gain: Callable[[np.ndarray], float], pushes: Sequence[tuple[float, 
         middle = np.append(np.sign(idle[0]) * math.sqrt(idle[0] * thrown[0]), idle[1:])
         won = gain(middle)
         found.append((won, middle))
-        idle, thrown = (middle, thrown) if abs(won) <= IDLE else (idle, middle)
+        idle, thrown = (middle, thrown) if won > -IDLE else (idle, middle)
     return found
 
 
