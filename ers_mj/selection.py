@@ -25,6 +25,7 @@ LOST = 0.2  # share of the gain that the blocks which lose may lose, where it fa
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
+FORKED = 6.0  # of C that a fork of stick and slip leaves in one block (5.8 at most in 61 servos without missing physics)
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH) or is dear to simulate
 REVERSED, MOST_REVERSED = 0.1, 5  # share of the leader's gain from which a rival is begun with, the leader put in, and how many are
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
@@ -47,7 +48,7 @@ class Selection:
 def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str, float]] = (), exclude: Sequence[str] = (),
            jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless."""
-    current, rounds, mended, swept = base, [], 0, False
+    current, rounds, mended, swept, reviewed = base, [], 0, False, False
     tau = tau_of(base.misfit)
     while len(rounds) - len(current.model.states or {}) < _most_rounds(current):
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
@@ -68,7 +69,11 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME) and _asked_for(c, least, least_z, outstanding)]
         rounds.append(tuple(sorted(ranked, key=lambda c: c not in asked[:1])))
         if not asked:
-            break
+            other = None if reviewed or not _is_doubtful(current, tau) else _reviewed(current, rounds, traces, tau, exclude, jobs)
+            if other is None:
+                break
+            (current, rounds), reviewed = other, True
+            continue
         ranked = rounds[-1]
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         current, rounds = _reconsidered(current, rounds, traces, tau)
@@ -108,12 +113,17 @@ def _is_cheap_and_wrong(current: Fit, base: Fit, traces: Sequence[Trace]) -> boo
     return not current.model.plant().coupled and more_is_missing(left_by_sensor(current.model, traces), without)
 
 
+def _is_doubtful(current: Fit, tau: float) -> bool:
+    """Whether the effects of a model of one body leave more than a fork of stick and slip in one block does."""
+    return bool(current.model.names) and not current.model.plant().coupled and float(score(current.misfit, tau).sum()) > FORKED
+
+
 def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int,
            again: bool = False) -> list[Candidate]:
     """What a screening missed when it found nothing to add: where stick and slip fork, the secant of the very effect that acts may promise nothing.
 
     Every effect that is cheap to simulate and has few starts is refitted from these as they are, whatever they make worse on the way; those are returned that
-    gain more than the screening's refit of the same effect. One with several numbers at their bounds is none: a shaft of 1000 Hz without a resonance.
+    gain more than the screening's refit of the same effect. One whose several numbers end at their bounds is none: a shaft of 1000 Hz without a resonance.
     The second body, which takes most of the time, is tried once a case and not ``again``.
     """
     effects = [effect for effect in BY_NAME.values() if not effect.dear and not effect.once and effect.name not in exclude]
@@ -124,13 +134,33 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
     def refitted(item):
         return judged(item[0], fit(base.model.with_effect(*item), traces, tau=tau, steps=SWEEP), base, tau)
 
+    def carried_on(candidate):
+        return judged(candidate.name, fit(candidate.fit.model, traces, tau=tau, steps=20), base, tau)
+
     with ThreadPoolExecutor(jobs) as pool:
         best = {}
         for candidate in pool.map(refitted, starts):
             if candidate.gain > max(known.get(candidate.name, 0.0), best[candidate.name].gain if candidate.name in best else 0.0):
                 best[candidate.name] = candidate
-        ended = list(pool.map(lambda c: judged(c.name, fit(c.fit.model, traces, tau=tau, steps=20), base, tau), best.values()))
+        ended = list(pool.map(carried_on, best.values()))
+        ended = list(pool.map(lambda c: carried_on(c) if c.gain >= LEAST_GAIN else c, ended))
     return [c for c in ended if sum(c.fit.model.at_bound(f) for f in c.fit.model.layout() if f.owner == c.name) <= AT_BOUND]
+
+
+def _reviewed(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float, exclude: Sequence[str],
+              jobs: int) -> tuple[Fit, list[tuple[Candidate, ...]]] | None:
+    """The model with what a sweep finds in place of the effect found last, and the rounds up to there, if that is better than an effect beside which more than
+    noise is left and nothing is found: the first that a screening promises is not always the one that acts.
+    """
+    k = max((k for k, ranked in enumerate(rounds) if ranked[0].name in current.model.names), default=None)
+    if k is None:
+        return None
+    without = fit(current.model.without_effect(rounds[k][0].name), traces, tau=tau, steps=20)
+    found = _swept(without, (), traces, tau, (*exclude, *current.model.names), jobs, again=True)
+    best = min(found, key=lambda c: priced(c.fit), default=None)
+    if best is None or priced(best.fit) >= priced(current) - TIE:
+        return None
+    return best.fit, [*rounds[:k], (best, *(c for c in rounds[k] if c.name != best.name))]
 
 
 def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float,
