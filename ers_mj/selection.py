@@ -26,7 +26,7 @@ ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 FORKED = 6.0  # of C that a fork of stick and slip leaves in one block (5.8 at most in 61 servos without missing physics)
-MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH) or is dear to simulate
+MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
 REVERSED, MOST_REVERSED = 0.1, 5  # share of the leader's gain from which a rival is begun with, the leader put in, and how many are
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
@@ -184,8 +184,8 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
 
 
 def _most_rounds(current: Fit) -> int:
-    """How many rounds there are at most: fewer where the model itself stays wrong, or is dear."""
-    return MOST_ROUNDS if near_noise(current) and not is_dear(current) else FEWER_ROUNDS
+    """How many rounds there are at most: fewer where the model itself stays wrong."""
+    return MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS
 
 
 def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
