@@ -18,7 +18,7 @@ from ers_mj.effects import BY_NAME, EQUIVALENT
 from ers_mj.identification import Fit, converged, fit, near_noise, residuals_in, score
 from ers_mj.isolability import PARAMETER_PRICE, probabilities
 from ers_mj.model import OBSERVER_RATE, STATES, Model
-from ers_mj.screening import PEAK, Begin, screen
+from ers_mj.screening import PEAK, Begin, attainable, screen
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 3.0  # decrease of C that an effect must buy: one servo in forty without missing physics offers as much (evaluation.NULL_GAIN)
@@ -40,7 +40,6 @@ CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of
 RIVAL = 0.3  # share of the leader's gain from which a candidate may take its place later
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 ANEW, ANEW_FROM = 8, 0.2  # starts from which a wave is fitted again that leaves so much C per block
-HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that
     matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for.
     """
-    if _attainable(base.misfit, Blocks.of(traces).counts, tau) < LEAST_GAIN and score(base.misfit, tau).max() < math.log(PEAK):
+    if attainable(base.misfit, Blocks.of(traces).counts, tau) < LEAST_GAIN and score(base.misfit, tau).max() < math.log(PEAK):
         return []
     reference = float(score(base.misfit, tau).sum())
 
@@ -203,13 +202,6 @@ def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
 def priced(found: Fit) -> float:
     """The cost and the price of the parameters."""
     return found.cost + PARAMETER_PRICE * found.size
-
-
-def _attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
-    """What C would fall by, were no block (B,) worse than the noise, or than half of them where that is less; beyond what noise makes of ``counts`` samples."""
-    level = min(1.0, float(np.median(misfit)))
-    left = float(np.sum(np.maximum(score(misfit, tau) - score(level, tau), 0.0)))
-    return left - HALF_NORMAL * level / (tau + level) * float(np.sum(np.sqrt(2.0 / counts)))
 
 
 def _anew(finished: Mapping[str, Fit], traces: Sequence[Trace], tau: float) -> list[tuple[str, Begin]]:

@@ -19,8 +19,10 @@ PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from wh
 LEAST_PROMISE = 2.5  # of C that the secant of a candidate must promise where a model is quiet
 LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the screening may scale it
 HOTTEST, KNOCKS, NEARER = 3, (0.08, 0.25), 60  # blocks in which a knock is looked for, the lengths [s] from which its fit is begun, and simulations of it
+LEAST_KNOCK = 3.0  # of C that a recording must leave for a knock to be looked for: half of what one must buy (selection.ONCE)
 PEAK = 30.0  # factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
 USUAL = 0.95  # share of the blocks that are no worse than a bad one
+HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
 IDLE, HALVINGS = 0.1, 6  # of C that a push which moves little changes; of the way from it to the next that throws the rudder
 
 
@@ -99,6 +101,13 @@ def stands_out(misfit: np.ndarray, tau: float) -> bool:
     """Whether a block (B,) is PEAK times beyond what a model that is wrong leaves in many others."""
     scores = score(misfit, tau)
     return float(scores.max()) >= max(float(np.quantile(scores, USUAL)), 0.0) + math.log(PEAK)
+
+
+def attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
+    """What C would fall by, were no block (B,) worse than the noise, or than half of them where that is less; beyond what noise makes of ``counts`` samples."""
+    level = min(1.0, float(np.median(misfit)))
+    left = float(np.sum(np.maximum(score(misfit, tau) - score(level, tau), 0.0)))
+    return left - HALF_NORMAL * level / (tau + level) * float(np.sum(np.sqrt(2.0 / counts)))
 
 
 def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]:
@@ -267,10 +276,13 @@ def _ends(effect: Effect, traces: Sequence[Trace]) -> np.ndarray:
 
 
 def _hot(e: np.ndarray, traces: Sequence[Trace], tau: float) -> tuple[tuple[int, float, float], ...]:
-    """Spans (recording, begin [s], length [s]) around the blocks of largest misfit: where something may have knocked."""
+    """Spans (recording, begin [s], length [s]) around the blocks of largest misfit, where something may have knocked, in recordings that leave enough for it."""
     blocks = Blocks.of(traces)
     record = np.repeat(np.arange(len(traces)), [t.counts.size * (1 + len(t.channels)) for t in traces])
     within = np.concatenate([np.tile(np.arange(t.counts.size), 1 + len(t.channels)) for t in traces])
-    worst = np.argsort(-score(blocks.misfit(e), tau), kind="stable")[:HOTTEST]
+    misfit = blocks.misfit(e)
+    able = [k for k in range(len(traces)) if attainable(misfit[record == k], blocks.counts[record == k], tau) >= LEAST_KNOCK
+            or score(misfit[record == k], tau).max() >= math.log(PEAK)]
+    worst = [b for b in np.argsort(-score(misfit, tau), kind="stable")[:HOTTEST] if record[b] in able]
     return tuple((int(record[b]), float(traces[record[b]].t[0] + within[b] * BLOCK), length) for b in worst for length in KNOCKS)
 

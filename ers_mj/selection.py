@@ -27,7 +27,7 @@ SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of st
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 FORKED = 6.0  # of C that a fork of stick and slip leaves in one block (5.8 at most in 61 servos without missing physics)
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
-REVERSED, MOST_REVERSED = 0.1, 5  # share of the leader's gain from which a rival is begun with, the leader put in, and how many are
+REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (once if dear)
@@ -173,7 +173,7 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
         return list(ranked)
     p = dict(current.model.effects)[newest]
     rivals = [c for c in earlier[1:] if c.name in BY_NAME and c.name not in names and not BY_NAME[c.name].dear and not BY_NAME[c.name].once
-              and c.gain >= REVERSED * earlier[0].gain][:MOST_REVERSED]
+              and c.gain >= REVERSED * earlier[0].gain][:FEWER_REVERSED if is_dear(current) else MOST_REVERSED]
     with ThreadPoolExecutor(jobs) as pool:
         ends = list(pool.map(lambda c: judged(c.name, fit(c.fit.model.with_effect(newest, p), traces, tau=tau, steps=20), current, tau), rivals))
     best = {c.name: c for c in ranked}
