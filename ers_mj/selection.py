@@ -152,7 +152,7 @@ def _reviewed(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequenc
     """The model with what a sweep finds in place of the effect found last, and the rounds up to there, if that is better than an effect beside which more than
     noise is left and nothing is found: the first that a screening promises is not always the one that acts.
     """
-    k = max((k for k, ranked in enumerate(rounds) if ranked[0].name in current.model.names), default=None)
+    k = max((k for k, ranked in enumerate(rounds) if ranked and ranked[0].name in current.model.names), default=None)
     if k is None:
         return None
     without = fit(current.model.without_effect(rounds[k][0].name), traces, tau=tau, steps=20)

@@ -16,8 +16,8 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first
 from ers_mj.recording import from_arrays
-from ers_mj.screening import Begin, Screened, screen, stands_out
-from ers_mj.selection import _exchanged, _other_way_round, _reconsidered, _swept
+from ers_mj.screening import Begin, Screened, _between, _hot, screen, stands_out
+from ers_mj.selection import _exchanged, _other_way_round, _reconsidered, _reviewed, _swept
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -151,6 +151,24 @@ def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
     assert size == pytest.approx(-300.0, rel=0.3) and begin == pytest.approx(2.24, abs=0.02) and length == pytest.approx(0.08, rel=0.3) and record == 0
 
 
+def test_a_knock_is_sought_on_to_where_it_throws_the_rudder():
+    """A shaft twists under less, which gains a little; what moves the rudder lies in a window of a sixth above its friction."""
+    def gain(push):
+        return 0.05 if push[0] < 60.0 else 9.0 if push[0] < 70.0 else -14.0
+
+    pushes = [(gain([size]), np.array([size, 0.8, 0.1, 0.0])) for size in (3.0, 11.0, 33.0, 110.0)]
+    tried = _between(gain, pushes)
+    assert max(won for won, _ in tried) == 9.0 and all(33.0 < push[0] < 110.0 for _, push in tried)
+    assert not _between(gain, pushes[:3]) and not _between(gain, pushes[3:])
+
+
+def test_knocks_are_looked_for_where_a_recording_leaves_enough(pushed):
+    noise = 0.9 * np.random.default_rng(1).standard_normal(sum(t.rows for t in pushed.traces))
+    assert _hot(noise, pushed.traces, 1.0) == ()
+    noise[pushed.traces[0].rows + 1000:][:60] += 10.0
+    assert {(record, begin) for record, begin, _ in _hot(noise, pushed.traces, 1.0)} <= {(1, 0.75), (1, 1.0), *((1, 0.25 * k) for k in range(12))} != set()
+
+
 @pytest.mark.parametrize("newest, gain, kept", [("drive_dead_zone", 400.0, ("drive_dead_zone",)), ("drive_dead_zone", 50.0, ("load_disturbance", "drive_dead_zone")),
                                                 ("periodic_gust", 400.0, ("load_disturbance", "periodic_gust"))])
 def test_a_knock_that_a_later_law_outweighs_is_looked_for_again(pushed, newest, gain, kept):
@@ -186,6 +204,15 @@ def test_a_sweep_finds_what_secants_miss(pushed):
     (size,) = dict(best.fit.model.effects)["bias_torque"]
     assert best.name == "bias_torque" and size == pytest.approx(0.06, rel=0.3) and best.gain > 2.0
     assert not [c for c in _swept(pushed.fit, [best], pushed.traces, 1.0, others, 1) if c.name == "bias_torque" and c.gain > best.gain + 0.1]
+
+
+def test_an_effect_that_leaves_much_gives_way_to_what_a_sweep_finds(pushed):
+    others = [name for name in BY_NAME if name not in ("bias_torque", "quadratic_drag", "hinge_moment_cubic")]
+    model = pushed.fit.model.with_effect("quadratic_drag", BY_NAME["quadratic_drag"].starts(pushed.fit.model.scales)[0])
+    drag = judged("quadratic_drag", fit(model, pushed.traces, tau=1.0), pushed.fit, 1.0)
+    found, rounds = _reviewed(drag.fit, [(drag,), ()], pushed.traces, 1.0, others, 1)
+    assert found.model.names == ("bias_torque",) and [[c.name for c in ranked] for ranked in rounds] == [["bias_torque", "quadratic_drag"]]
+    assert _reviewed(found, rounds, pushed.traces, 1.0, others, 1) is None
 
 
 def test_a_second_sweep_leaves_two_bodies_out(pushed, monkeypatch):
