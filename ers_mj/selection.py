@@ -25,7 +25,7 @@ LOST = 0.2  # share of the gain that the blocks which lose may lose, where it fa
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
-FORKED = 6.0  # of C that a fork of stick and slip leaves in one block (5.8 at most in 61 servos without missing physics)
+FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
@@ -114,7 +114,7 @@ def _is_cheap_and_wrong(current: Fit, base: Fit, traces: Sequence[Trace]) -> boo
 
 
 def _is_doubtful(current: Fit, tau: float) -> bool:
-    """Whether the effects of a model of one body leave more than a fork of stick and slip in one block does."""
+    """Whether the effects of a model of one body leave more than forks of stick and slip in two blocks do."""
     return bool(current.model.names) and not current.model.plant().coupled and float(score(current.misfit, tau).sum()) > FORKED
 
 
