@@ -31,9 +31,11 @@ class Coefficients(NamedTuple):
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
     spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or, without
-    a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3). With rho = 0 it is the foot of a bristle
-    instead (effect ``presliding``), which carries the Coulomb friction; the drive acts on the rudder, and the bristle's
-    damping is d_twist exp(-(w / fade)^2); it gives way as in Dahl (1968): its bend moves with (1 - force over level)^``dahl`` of the rudder's speed.
+    a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3).
+
+    Where ``k_bristle`` [1/s^2] is not 0 (effect ``presliding``) a bristle carries the rudder's Coulomb friction; its damping is ``d_bristle`` [1/s] times
+    exp(-(w / fade)^2), and it gives way as in Dahl (1968): its bend moves with (1 - force over level)^``dahl`` of the rudder's speed. Of one body (rho = 0
+    beside two_body) the bristle's foot is the second one; beside a motor's side the rudder's bristle has the share 1 - phi of level, stiffness and damping.
 
     Where the inductance falls with the current tau_e is divided by 1 + (``fall`` j)^2, until LEAST_IRON of it is left.
     """
@@ -61,6 +63,8 @@ class Coefficients(NamedTuple):
     k_twist: float = 0.0
     d_twist: float = 0.0
     gap: float = 0.0
+    k_bristle: float = 0.0
+    d_bristle: float = 0.0
     fade: float = np.inf
     dahl: float = 1.0
     harden: float = 0.0
@@ -74,7 +78,7 @@ class Coefficients(NamedTuple):
     @property
     def has_bristle(self) -> bool:
         """Whether friction bends a bristle first."""
-        return self.two_body > 0 and self.rho <= 0
+        return self.k_bristle > 0
 
 
 @dataclass(frozen=True)
@@ -296,7 +300,6 @@ def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap:
 
     Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones named. Beside a
     slack nothing hardens.
-    A bristle gives way to them: friction is then rigid.
     """
     k, d = (2 * np.pi * f) ** 2, 4 * np.pi * zeta * f
     if c.has_motor_side and c.k_twist > 0:

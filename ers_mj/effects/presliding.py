@@ -18,7 +18,7 @@ class Presliding(Friction):
 
     k = F_c / x_s (LuGre's sigma_0), d = 2 zeta sqrt(k J) exp(-(w / w_d)^2): damping that fades with speed (Olsson, Astrom, Canudas de Wit, Gafvert
     and Lischinsky 1998), without which the bristle resists the slip it should let go of. Small zeta is Dahl's friction. The level F is what
-    the other laws make of F_c. Beside a play or a shaft, whose second body takes the bristle's place in the plant, the effect is not there.
+    the other laws make of F_c. Beside a play or a shaft it is the rudder's share of the friction that bends.
     """
 
     name = "presliding"
@@ -42,8 +42,8 @@ class Presliding(Friction):
 
     def coefficients(self, p, c):
         level = 0.5 * (c.c_2_plus + c.c_2_minus)
-        if c.two_body > 0 or p[0] <= 0 or level <= 0 or level > (2 * np.pi * RIGID_HZ) ** 2 * p[0]:
+        if p[0] <= 0 or level <= 0 or level > (2 * np.pi * RIGID_HZ) ** 2 * p[0]:
             return c
         k = level / p[0]
-        return c._replace(two_body=1.0, rho=0.0, beta=0.0, phi=1.0, k_twist=k, d_twist=2 * p[1] * math.sqrt(k), gap=0.0, fade=p[2],
-                          dahl=p[3] if np.isfinite(p[3]) else 1.0)
+        c = c._replace(k_bristle=k, d_bristle=2 * p[1] * math.sqrt(k), fade=p[2], dahl=p[3] if np.isfinite(p[3]) else 1.0)
+        return c if c.has_motor_side else c._replace(two_body=1.0, rho=0.0, beta=0.0, phi=1.0)

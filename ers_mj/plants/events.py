@@ -31,7 +31,7 @@ from ers_mj.plants.laws import friction_level, moved, remember, total_torque
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
- BETA, PHI, K_TWIST, D_TWIST, GAP, FADE, DAHL, HARDEN, FALL) = range(len(Coefficients._fields))
+ BETA, PHI, K_TWIST, D_TWIST, GAP, K_BRISTLE, D_BRISTLE, FADE, DAHL, HARDEN, FALL) = range(len(Coefficients._fields))
 RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
@@ -121,11 +121,11 @@ def _bristle(c, on, p, lawful, x, s_m):
     """(force of the bristle on the rudder, per total inertia; the speed of its foot)."""
     if s_m != 0:
         return -s_m * _level(c, on, p, lawful, x, float(s_m)), x[1]
-    pull, speed = c[K_TWIST] * (x[0] - x[3]), 0.0
+    pull, speed = c[K_BRISTLE] * (x[0] - x[3]), 0.0
     if x[1] != 0.0:
         way = 1.0 if x[1] > 0 else -1.0
         speed = x[1] * (1.0 - _bending(c, way * pull / _level(c, on, p, lawful, x, way)))
-    return -pull - c[D_TWIST] * math.exp(-(x[1] / c[FADE]) ** 2) * (x[1] - speed), speed
+    return -pull - c[D_BRISTLE] * math.exp(-(x[1] / c[FADE]) ** 2) * (x[1] - speed), speed
 
 
 @inlined
@@ -322,7 +322,7 @@ def _bristle_violation(e, c, on, p, lawful, x, m):
         return -1.0
     if e == 4:
         return -m[3] * x[1]
-    pull = c[K_TWIST] * (x[0] - x[3])
+    pull = c[K_BRISTLE] * (x[0] - x[3])
     if pull * x[1] <= 0.0 or (lawful and on[1, 0] > 0):
         return -1.0
     return abs(pull) - FULL * _level(c, on, p, lawful, x, 1.0 if x[1] > 0 else -1.0)
@@ -407,7 +407,7 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
             stop = 0
     elif (e == 4 or e == 6) and _has_bristle(c):
         if e == 4:
-            x = (theta, w, j, theta - s_m * _level(c, on, p, lawful, x, float(s_m)) / c[K_TWIST], w_m)
+            x = (theta, w, j, theta - s_m * _level(c, on, p, lawful, x, float(s_m)) / c[K_BRISTLE], w_m)
         s_m = 0 if e == 4 else (1 if w > 0 else -1)
     elif e == 4 or e == 6:
         x = (theta, w, j, theta_m, 0.0)
@@ -430,7 +430,7 @@ def _rate(c, m, x, tau, a_emf):
         rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
     if _has_bristle(c):
         if m[3] == 0:
-            rate += math.sqrt(c[K_TWIST]) + c[D_TWIST] + c[DAHL] * 2.0 ** c[DAHL] * c[K_TWIST] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS])
+            rate += math.sqrt(c[K_BRISTLE]) + c[D_BRISTLE] + c[DAHL] * 2.0 ** c[DAHL] * c[K_BRISTLE] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS])
     elif c[TWO] > 0:
         rate = rate / min(c[RHO], 1.0 - c[RHO])
         if m[4] != 0:
@@ -726,7 +726,7 @@ def _still(c, on, p, lawful, t, x, m, drive, tau, a_emf):
     if m[0] == 0:
         return x[1] == 0.0 and _violation(3, c, on, p, lawful, t, x, m) <= 0
     small = STILL * (c[C_PLUS] + c[C_MINUS])
-    return (abs(x[1]) * math.sqrt(c[K_TWIST]) < small
+    return (abs(x[1]) * math.sqrt(c[K_BRISTLE]) < small
             and abs(_derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1]) < small)
 
 
@@ -755,7 +755,7 @@ def _cuts(c, h0, tau, a_emf, lawful, refine):
     if c[FALL] > 0 and c[TAU] > 0:
         step = min(step, FALL_STEP * c[TAU])
     if c[TWO] > 0:
-        step = min(step, CONTACT_STEP / math.sqrt(c[K_TWIST] / (c[RHO] * (1.0 - c[RHO]) if c[RHO] > 0 else 1.0)))
+        step = min(step, CONTACT_STEP / math.sqrt(c[K_TWIST] / (c[RHO] * (1.0 - c[RHO])) if c[RHO] > 0 else c[K_BRISTLE]))
     step /= refine
     skip = int(c[DELAY] / h0 + 1e-9)
     late = c[DELAY] - skip * h0
@@ -842,8 +842,8 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
     extra = np.nan  # what the laws add where a segment ended that holds no event
     x = (x0[0], x0[1], x0[2], x0[0], x0[1] if two and not bristle else 0.0)
     if bristle:  # a spring stretched by as much as a motion of this speed would have left it
-        slip = 0.5 * (c[C_PLUS] + c[C_MINUS]) / c[K_TWIST]
-        x = (x[0], x[1], x[2], x[0] - min(max(x[1] / math.sqrt(c[K_TWIST]), -slip), slip), 0.0)
+        slip = 0.5 * (c[C_PLUS] + c[C_MINUS]) / c[K_BRISTLE]
+        x = (x[0], x[1], x[2], x[0] - min(max(x[1] / math.sqrt(c[K_BRISTLE]), -slip), slip), 0.0)
     m = _start_mode(c, on, p, lawful, t[0], x)
     for k in range(n):
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[1], x[2], x[0] if bristle else x[3]

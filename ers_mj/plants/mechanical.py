@@ -193,8 +193,8 @@ class MechanicalPlant:
         joints = {name: (q, dq * omega) for name, (q, dq) in self._skeleton.pose(theta).items()}
         joints["lever_up"] = (max(theta, c.theta_0), omega if theta > c.theta_0 else max(omega, 0.0) * (theta == c.theta_0))
         joints["lever_down"] = (min(theta, c.theta_0), omega if theta < c.theta_0 else min(omega, 0.0) * (theta == c.theta_0))
-        slip = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_twist if c.has_bristle else 0.0
-        bent = float(np.clip(omega / np.sqrt(c.k_twist), -slip, slip)) if c.has_bristle else 0.0
+        slip = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_bristle if c.has_bristle else 0.0
+        bent = float(np.clip(omega / np.sqrt(c.k_bristle), -slip, slip)) if c.has_bristle else 0.0
         return joints | {"drive": (drive, 0.0), "bristle": (bent, 0.0)}
 
     def _moved(self, theta: float, by: float) -> dict[str, float]:

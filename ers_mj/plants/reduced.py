@@ -9,7 +9,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients, Effect
-from ers_mj.plants.events import simulate_kernel
+from ers_mj.plants import events, fixed_steps
 from ers_mj.plants.laws import N_PARAMETERS, rows_of
 from ers_mj.plants.tangents import prepare_kernel, tangent_kernel
 
@@ -70,6 +70,12 @@ class ReducedModel:
         """Whether there is a second body."""
         return Coefficients(*self._lowered[0]).two_body > 0
 
+    @property
+    def bends_and_twists(self) -> bool:
+        """Whether there is a bristle beside the second body."""
+        c = Coefficients(*self._lowered[0])
+        return c.has_motor_side and c.has_bristle
+
     def fed(self, u: np.ndarray) -> np.ndarray:
         """What a drive makes of the command u (N,) whose supply varies as it was measured."""
         for name, values in self.effects if self.supply is not None else ():
@@ -90,7 +96,8 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        simulate_kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p.copy(), refine, x0, out)
+        kernel = (fixed_steps if self.bends_and_twists else events).simulate_kernel
+        kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p.copy(), refine, x0, out)
         return out
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:

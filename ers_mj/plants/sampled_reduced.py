@@ -8,8 +8,9 @@ import numpy as np
 from numba import njit, types
 
 from ers_mj.effects import BY_NAME
+from ers_mj.plants import fixed_steps
 from ers_mj.plants.compiled import compiled_cache
-from ers_mj.plants.events import (A_EMF, B, BRISTLE_CORNER, C_1, C_PLUS, CONTACT_STEP, CORNER, D_STOP, DELAY, K_STOP, K_TWIST, LOWER, RHO, TAU, TWO, UPPER,
+from ers_mj.plants.events import (A_EMF, B, BRISTLE_CORNER, C_1, C_PLUS, CONTACT_STEP, CORNER, D_STOP, DELAY, K_BRISTLE, K_STOP, LOWER, RHO, TAU, TWO, UPPER,
                                   _advance, _bounded, _cuts, _has_bristle, _last, _start_mode)
 from ers_mj.plants.laws import remember
 from ers_mj.plants.reduced import ReducedModel
@@ -20,8 +21,8 @@ def _begin(t, c, on, p, x, m):
     lawful, bristle = on[0, 0] + on[1, 0] > 0, _has_bristle(c)
     x[3], x[4] = x[0], 0.0
     if bristle:
-        slip = c[C_PLUS] / c[K_TWIST]
-        x[3] = x[0] - min(max(x[1] / math.sqrt(c[K_TWIST]), -slip), slip)
+        slip = c[C_PLUS] / c[K_BRISTLE]
+        x[3] = x[0] - min(max(x[1] / math.sqrt(c[K_BRISTLE]), -slip), slip)
     elif c[TWO] > 0:
         x[4] = x[1]
     mode = _start_mode(c, on, p, lawful, t, (x[0], x[1], x[2], x[3], x[4]))
@@ -83,10 +84,15 @@ class SampledReduced:
         self._c, self._p = c.copy(), p.copy()
         self._refine = 2 if any(BY_NAME[name].follows_current for name, _ in model.effects) else 1
         self._x, self._mode = np.array([*start, 0.0, 0.0, 0.0]), np.zeros(5, np.int64)
+        self._fixed = model.bends_and_twists
         self._skip = int(c[DELAY] * rate_hz + 1e-9)
         self._sent = [0.0] * (self._skip + 2)  # what the terminals saw last, oldest first
         self._samples = 0
-        begin_kernel(0.0, self._c, self._on, self._p, self._x, self._mode)
+        if self._fixed:
+            self._x = np.array([*start, 0.0, 0.0, 0.0, 0.0])
+            fixed_steps.begin_kernel(self._c, self._x)
+        else:
+            begin_kernel(0.0, self._c, self._on, self._p, self._x, self._mode)
 
     @property
     def theta(self) -> float:
@@ -108,5 +114,9 @@ class SampledReduced:
     def hold(self, v: float) -> None:
         """Hold v [V] at the terminals until the next sample."""
         self._sent = [*self._sent[1:], v]
-        sample_kernel(self._samples * self._h, self._h, self._sent[0], self._sent[1], self._c, self._on, self._p, self._refine, self._x, self._mode)
+        now = self._samples * self._h
+        if self._fixed:
+            fixed_steps.sample_kernel(now, self._h, self._sent[0], self._sent[1], self._c, self._on, self._p, self._refine, self._x)
+        else:
+            sample_kernel(now, self._h, self._sent[0], self._sent[1], self._c, self._on, self._p, self._refine, self._x, self._mode)
         self._samples += 1

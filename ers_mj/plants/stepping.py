@@ -192,14 +192,14 @@ class Stepper:
                 self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
                 force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
             else:
-                self.model.actuator_biasprm[self.bristle, 3:5] = self.inertia * self._yielding(up if w > 0 else down, w)
-                self.model.actuator_dynprm[self.bristle, LUGRE_DAMPING] = self.inertia * c.d_twist * math.exp(-(w / c.fade) ** 2)
+                self.model.actuator_biasprm[self.bristle, 3:5] = share * self.inertia * self._yielding(up if w > 0 else down, w)
+                self.model.actuator_dynprm[self.bristle, LUGRE_DAMPING] = share * self.inertia * c.d_bristle * math.exp(-(w / c.fade) ** 2)
         self.data.ctrl[self.load] = self.inertia * force
 
 
     def _yielding(self, level: float, w: float) -> float:
         """The level at which MuJoCo's bristle, of exponent 1, bends as fast as one of another exponent under this ``level`` (both per inertia)."""
-        share = math.copysign(1.0, w) * self.c.k_twist * self.data.act[self.model.actuator_actadr[self.bristle]] / level
+        share = math.copysign(1.0, w) * self.c.k_bristle * self.data.act[self.model.actuator_actadr[self.bristle]] / level
         if self.c.dahl == 1.0:
             return level
         if abs(share) < 1e-9:

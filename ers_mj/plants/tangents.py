@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit, types
 
 from ers_mj.plants.compiled import compiled_cache, inlined
-from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, DAHL, D_TWIST, FADE, K_TWIST, READ, READ_BOOL, ROWS, LAWS, TAU,
+from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, DAHL, D_BRISTLE, FADE, K_BRISTLE, READ, READ_BOOL, ROWS, LAWS, TAU,
                                   THETA_0, VECTOR, _derivative, _extra, _has_bristle, _level, _maps)
 from ers_mj.plants.laws import remember
 
@@ -185,7 +185,7 @@ def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p,
 @inlined
 def _fading(c, w):
     """The damping of a bristle at a speed, per total inertia."""
-    return c[D_TWIST] * math.exp(-((w / c[FADE]) ** 2))
+    return c[D_BRISTLE] * math.exp(-((w / c[FADE]) ** 2))
 
 
 @inlined
@@ -201,7 +201,7 @@ def _unbent(c, left, way):
 def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
     """See ``_tangent``: of a rudder on a bristle, whose bend z along the path and its change bent are integrated here."""
     n, h = t.size, t[1] - t[0]
-    lawful, k = on[0, 0] + on[1, 0] > 0, c[K_TWIST]
+    lawful, k = on[0, 0] + on[1, 0] > 0, c[K_BRISTLE]
     lawful_2 = on_2[0, 0] + on_2[1, 0] > 0
     low, high, fastest = path[0, 0], path[0, 0], 0.0
     for i in range(n):
@@ -248,7 +248,7 @@ def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, 
         z_mean = 0.5 * (z + z_1)
         left = 1.0 - s * k * z_mean / level
         lets_go = abs(way) / h * k / level * (1.0 if c[DAHL] == 1.0 else c[DAHL] * abs(left) ** (c[DAHL] - 1.0))
-        grows = lets_go * z_mean * ((level_2 - level) * scale / level - dc[K_TWIST] / k)
+        grows = lets_go * z_mean * ((level_2 - level) * scale / level - dc[K_BRISTLE] / k)
         if dc[DAHL] != 0.0 and left > 0.0:
             grows += dc[DAHL] * way / h * left ** c[DAHL] * math.log(left)
         passed = 1.0
@@ -257,7 +257,7 @@ def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, 
         viscous, more = (c[A_PLUS], dc[A_PLUS]) if s > 0 else (c[A_MINUS], dc[A_MINUS])
         damping = _fading(c, x[1])
         force = (dc[BIAS] + dc[A_1] * (c[THETA_0] - x[0]) + c[A_1] * dc[THETA_0] - dc[C_1] * (side * passed + side_1 * (1.0 - passed)) - more * x[1]
-                 - dc[K_TWIST] * z_mean - (_fading(c_2, x[1]) - damping) * scale * (z_1 - z) / h)
+                 - dc[K_BRISTLE] * z_mean - (_fading(c_2, x[1]) - damping) * scale * (z_1 - z) / h)
         if lawful or lawful_2:
             force += (_extra(c_2, on_2, p_2, load[i], t[i] + 0.5 * h, x, s) - _extra(c, on, p, load[i], t[i] + 0.5 * h, x, s)) * scale
         bent_0, per_speed = (bent + part * grows) / (1.0 + part * lets_go), part * bends / (1.0 + part * lets_go)

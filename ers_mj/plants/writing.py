@@ -90,20 +90,20 @@ def _write_friction(skeleton: Skeleton, c: Coefficients) -> None:
     damping, level = 0.5 * J * (c.a_mech_plus + c.a_mech_minus), 0.5 * J * (c.c_2_plus + c.c_2_minus)
     tendon.damping, rocker.damping = [(1 - beta) * damping, 0.0, 0.0], [beta * damping, 0.0, 0.0]
     push = J * (c.bias - 0.5 * (1 - phi) * (c.c_2_plus - c.c_2_minus))
-    if c.has_bristle:
-        _write_bristle(skeleton, c, level)
-        level, push = 0.0, J * c.bias
     tendon.frictionloss, rocker.frictionloss = (1 - phi) * level, phi * level
+    if c.has_bristle:
+        _write_bristle(skeleton, c, 1 - phi, level)
+        tendon.frictionloss, push = 0.0, J * c.bias
     if push:
         skeleton.spec.add_actuator(name="bias", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle", gainprm=np.zeros(10),
                                    biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[push, *[0.0] * 9])
 
 
-def _write_bristle(skeleton: Skeleton, c: Coefficients, level: float) -> None:
+def _write_bristle(skeleton: Skeleton, c: Coefficients, share: float, level: float) -> None:
     """LuGre friction, which MuJoCo has as a part of a motor: one without torque, its activation the bristle's deflection."""
     bristle = skeleton.spec.add_actuator(name="bristle", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle")
     bristle.set_to_dcmotor(motorconst=[NO_TORQUE, NO_TORQUE], resistance=1.0,
-                           lugre=[skeleton.inertia * c.k_twist, skeleton.inertia * c.d_twist, level, level, 1.0])
+                           lugre=[share * skeleton.inertia * c.k_bristle, share * skeleton.inertia * c.d_bristle, share * level, share * level, 1.0])
 
 
 def _write_spring(skeleton: Skeleton, c: Coefficients) -> None:
