@@ -1,6 +1,6 @@
 """A play or a shaft beside a bristle: six states by fixed steps, every force taken in the middle of the step.
 
-State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit]. What gives like a spring needs no event; what is left of
+State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead. What gives like a spring needs no event; what is left of
 set-valued terms, the motor side's dry friction and the preload's corner, is solved for with the speeds at the end of the step, as in Moreau's time
 stepping: a body that its friction holds stays, one that would pass the corner's reach within the step ends in it. So a motion moves smoothly with the
 plant's numbers. Positions lead the speeds by half a step (leapfrog), which is of second order where nothing switches; dampers are implicit.
@@ -19,8 +19,10 @@ from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BETA, BIAS, C_
                                   UPPER, VECTOR, _faster)
 from ers_mj.plants.laws import friction_level, remember, total_torque
 
-LONGEST = 5e-5  # [s] of a step
-SPRING_STEP = 0.2  # frequency [rad/s] of the stiffest spring times the step
+LONGEST = 1e-4  # [s] of a step
+SPRING_STEP = 0.35  # frequency [rad/s] of the stiffest spring times the step
+FINER = 8  # steps for one where the rudder may reach the preload's corner: one that comes slower than step times c_1 stays there
+RESTING = 1e-9  # [output unit, and that per second] from the corner, and of speed, within which a rudder rests there
 SWEEPS = 3  # over the two set-valued forces, which only the contact's damper couples
 
 
@@ -142,7 +144,6 @@ def _step(c, on, p, lawful, t, x, drive, closed, load, h):
     theta, theta_m = theta + half * w, theta_m + half * w_m
     j = _charged(c, j, drive, w_m, half) if closed else 0.0
     level = _full_level(c, on, p, lawful, theta, w, j)
-    z = _bent(c, z, w, level, half)
     left = 1.0 - math.copysign(1.0, w) * c[K_BRISTLE] * z / level
     gives = left if c[DAHL] == 1.0 else math.copysign(abs(left) ** c[DAHL], left)
     force = c[BIAS] + load + c[A_1] * (c[THETA_0] - theta) - share * c[K_BRISTLE] * z
@@ -167,17 +168,27 @@ def _step(c, on, p, lawful, t, x, drive, closed, load, h):
             twist = d = 0.0
         if sucks:
             wall = d_wall = 0.0
-    z = _bent(c, z, w_1, level, half)
+    z = _bent(c, z, w_1, level, h)
     j = _charged(c, j, drive, w_m1, half) if closed else 0.0
     return theta + half * w_1, w_1, j, theta_m + half * w_m1, w_m1, z
+
+
+@inlined
+def _is_near_corner(c, x, h):
+    """Whether a rudder that does not rest there may reach the preload's corner within h."""
+    away, reach = abs(x[0] - c[THETA_0]), h * (abs(x[1]) + h * c[C_1] / (1.0 - c[RHO]))
+    return c[C_1] > 0.0 and away <= 2.0 * reach and (away > RESTING or abs(x[1]) > RESTING)
 
 
 @part
 def _through(c, on, p, lawful, t, x, drive, closed, load, span, longest):
     """The state ``span`` later under a constant drive."""
     steps = int(math.ceil(span / longest - 1e-9))
+    h = span / steps
     for k in range(steps):
-        x = _step(c, on, p, lawful, t + k * span / steps, x, drive, closed, load, span / steps)
+        parts = FINER if _is_near_corner(c, x, h) else 1
+        for i in range(parts):
+            x = _step(c, on, p, lawful, t + k * h + i * h / parts, x, drive, closed, load, h / parts)
     return x
 
 
