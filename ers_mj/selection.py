@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, fit, hopped, near_noise, score, tau_of
 from ers_mj.model import Model
+from ers_mj.plants.reduced import ReducedModel
 from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, candidates, is_clocked, is_dear, is_quiet, judged, likeliest, likeliest_first,
                          priced, really)
 from ers_mj.remainder import left_by_sensor, more_is_missing
@@ -62,8 +63,10 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         least_z = LATER_Z if current.model.names else LEAST_Z
         outstanding = stands_out(current.misfit, tau)
         if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and _is_cheap_and_wrong(current, base, traces):
-            found, swept = _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, again=swept), True
-            ranked = likeliest_first(sorted([*ranked, *found], key=lambda c: -c.worth))
+            kinds = _of_one_body if swept else _any  # the second body, which takes most of the time, once a case
+            ranked, swept = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, kinds)), True
+        elif ranked and _may_twist(current):
+            ranked = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, _of_two_bodies))
         if rounds and ranked and not is_quiet(current, tau):
             ranked = _other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
         asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME) and _asked_for(c, least, least_z, outstanding)]
@@ -118,17 +121,45 @@ def _is_doubtful(current: Fit, tau: float) -> bool:
     return bool(current.model.names) and not current.model.plant().coupled and float(score(current.misfit, tau).sum()) > FORKED
 
 
+def _joined(ranked: Sequence[Candidate], others: Sequence[Candidate]) -> list[Candidate]:
+    """The better one of each name, the likeliest first."""
+    best = {c.name: c for c in ranked}
+    for c in others:
+        if c.name not in best or c.worth > best[c.name].worth:
+            best[c.name] = c
+    return likeliest_first(sorted(best.values(), key=lambda c: -c.worth))
+
+
+def _any(plant: ReducedModel) -> bool:
+    return True
+
+
+def _of_one_body(plant: ReducedModel) -> bool:
+    """Whether a plant is simulated fast."""
+    return not plant.coupled
+
+
+def _of_two_bodies(plant: ReducedModel) -> bool:
+    return plant.has_motor_side
+
+
+def _may_twist(current: Fit) -> bool:
+    """Whether a rudder whose friction bends a bristle is explained so badly that a play or a shaft may be there, which beside it no secant shows."""
+    plant = current.model.plant()
+    return plant.bends and not plant.has_motor_side and not near_noise(current)
+
+
 def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int,
-           again: bool = False) -> list[Candidate]:
+           kinds: Callable[[ReducedModel], bool] = _any) -> list[Candidate]:
     """What a screening missed when it found nothing to add: where stick and slip fork, the secant of the very effect that acts may promise nothing.
 
-    Every effect that is cheap to simulate and has few starts is refitted from these as they are, whatever they make worse on the way; those are returned that
-    gain more than the screening's refit of the same effect. One whose several numbers end at their bounds is none: a shaft of 1000 Hz without a resonance.
-    The second body, which takes most of the time, is tried once a case and not ``again``.
+    Every effect that makes a plant of these ``kinds``, is not dear and has few starts is refitted from these as they are, whatever they make worse on the way;
+    those are returned that gain more than the screening's refit of the same effect. One whose several numbers end at their bounds is none: a shaft of 1000 Hz
+    without a resonance.
     """
     effects = [effect for effect in BY_NAME.values() if not effect.dear and not effect.once and effect.name not in exclude]
     starts = [(effect.name, start) for effect in effects if len(few := effect.starts(base.model.scales)) < BY_SCREEN for start in few]
-    starts = [start for start in starts if not (again and base.model.with_effect(*start).plant().coupled)]
+    starts = [start for start in starts if kinds(base.model.with_effect(*start).plant())]
     known = {c.name: c.gain for c in ranked}
 
     def refitted(item):
@@ -156,7 +187,7 @@ def _reviewed(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequenc
     if k is None:
         return None
     without = fit(current.model.without_effect(rounds[k][0].name), traces, tau=tau, steps=20)
-    found = _swept(without, (), traces, tau, (*exclude, *current.model.names), jobs, again=True)
+    found = _swept(without, (), traces, tau, (*exclude, *current.model.names), jobs, _of_one_body)
     best = min(found, key=lambda c: priced(c.fit), default=None)
     if best is None or priced(best.fit) >= priced(current) - TIE:
         return None
@@ -176,11 +207,7 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
               and c.gain >= REVERSED * earlier[0].gain][:FEWER_REVERSED if is_dear(current) else MOST_REVERSED]
     with ThreadPoolExecutor(jobs) as pool:
         ends = list(pool.map(lambda c: judged(c.name, fit(c.fit.model.with_effect(newest, p), traces, tau=tau, steps=20), current, tau), rivals))
-    best = {c.name: c for c in ranked}
-    for c in ends:
-        if c.name not in best or c.worth > best[c.name].worth:
-            best[c.name] = c
-    return likeliest_first(sorted(best.values(), key=lambda c: -c.worth))
+    return _joined(ranked, ends)
 
 
 def _most_rounds(current: Fit) -> int:

@@ -17,7 +17,7 @@ from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, _between, _hot, screen, stands_out
-from ers_mj.selection import _exchanged, _other_way_round, _reconsidered, _reviewed, _swept
+from ers_mj.selection import _exchanged, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -219,9 +219,9 @@ def test_a_second_sweep_leaves_two_bodies_out(pushed, monkeypatch):
     tried = []
     monkeypatch.setattr(selection, "fit", lambda model, *_, **__: tried.append(model.names) or pushed.fit)
     others = [name for name in BY_NAME if name not in ("bias_torque", "backlash", "shaft_compliance")]
-    for again, names in ((False, {("bias_torque",), ("backlash",), ("shaft_compliance",)}), (True, {("bias_torque",)})):
+    for kinds, names in (((), {("bias_torque",), ("backlash",), ("shaft_compliance",)}), ((_of_one_body,), {("bias_torque",)})):
         tried.clear()
-        _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, again=again)
+        _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, *kinds)
         assert set(tried) == names
 
 

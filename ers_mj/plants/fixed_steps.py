@@ -1,9 +1,10 @@
-"""A play or a shaft beside a bristle: six states by fixed steps, every force taken in the middle of the step.
+"""A play or a shaft beside a bristle: two bodies by fixed steps, every force taken in the middle of the step.
 
-State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead. What gives like a spring needs no event; what is left of
+State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead. Its friction is k z + d exp(-(w / w_d)^2) z',
+its bend goes the way of Dahl's exactly under a speed that is constant over the step. What gives like a spring needs no event; what is left of
 set-valued terms, the motor side's dry friction and the preload's corner, is solved for with the speeds at the end of the step, as in Moreau's time
-stepping: a body that its friction holds stays, one that would pass the corner's reach within the step ends in it. So a motion moves smoothly with the
-plant's numbers. Positions lead the speeds by half a step (leapfrog), which is of second order where nothing switches; dampers are implicit.
+stepping: a body that its friction holds stays, a rudder that would not leave the corner's reach within the step ends in it. So a motion moves smoothly with
+the plant's numbers. Positions lead the speeds by half a step (leapfrog), which is of second order where nothing switches; dampers are implicit.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ SWEEPS = 3  # over the two set-valued forces, which only the contact's damper co
 def _step_length(c, refine):
     """[s] of a step at most."""
     rest = 1.0 - c[RHO]
-    fastest = math.sqrt(max(c[K_TWIST] / (c[RHO] * rest), c[K_BRISTLE] * (1.0 - c[PHI]) / rest, c[K_STOP] / rest))
-    return min(LONGEST, SPRING_STEP / fastest) / refine if fastest > 0.0 else LONGEST / refine
+    stiffest = max(c[K_TWIST] / c[RHO], c[K_BRISTLE] * (1.0 - c[PHI]), c[K_STOP]) / rest
+    return (min(LONGEST, SPRING_STEP / math.sqrt(stiffest)) if stiffest > 0.0 else LONGEST) / refine
 
 
 @inlined
@@ -93,23 +94,30 @@ def _stop(c, theta):
 
 
 @inlined
+def _past_corner(a, push, ahead, corner):
+    """(w, mean side of the corner over the step's way, 0 in it) of a w = push - corner sgn(ahead + w), sgn set-valued at 0."""
+    reach = push + a * ahead
+    if abs(reach) <= corner:
+        return -ahead, 0.0
+    way = math.copysign(1.0, reach)
+    if way * ahead >= 0.0:
+        return (push - corner * way) / a, way
+    rest = way * push - corner
+    w = way * (rest + math.sqrt(rest * rest + 8.0 * a * corner * abs(ahead))) / (2.0 * a)
+    return w, way * (1.0 - 2.0 * abs(ahead / w))
+
+
+@inlined
 def _speeds(a, e, d, push, push_m, ahead, corner, holds):
     """(w, w_m) at the end of a step: a w - d w_m = push - corner sgn(ahead + w), e w_m - d w = push_m - holds sgn(w_m), sgn set-valued at 0.
 
-    A rudder that passes the corner feels the mean of both sides over the step's way. Sweeps find which of the two hold, the rest is linear.
+    Sweeps find which of the two hold, the rest is linear.
     """
     way = way_m = 0.0
     w, w_m = push / a, push_m / e
     for _ in range(SWEEPS):
         if corner > 0.0:
-            reach = push + d * w_m + a * ahead
-            way = math.copysign(1.0, reach) if abs(reach) > corner else 0.0
-            if way * ahead < 0.0:
-                rest = way * (push + d * w_m) - corner
-                w = way * (rest + math.sqrt(rest * rest + 8.0 * a * corner * abs(ahead))) / (2.0 * a)
-                way *= 1.0 - 2.0 * abs(ahead / w)
-            else:
-                w = (push + d * w_m - corner * way) / a if way != 0.0 else -ahead
+            w, way = _past_corner(a, push + d * w_m, ahead, corner)
         if holds > 0.0:
             reach = push_m + d * w
             way_m = math.copysign(1.0, reach) if abs(reach) > holds else 0.0
@@ -136,6 +144,15 @@ def _charged(c, j, drive, w_m, h):
     return end + (j - end) * math.exp(-rate * h)
 
 
+@inlined
+def _bristle_damping(c, w, z, level):
+    """Damping of a bristle that a motion bends on at the speed w."""
+    if c[D_BRISTLE] <= 0.0:
+        return 0.0
+    left = max(1.0 - math.copysign(1.0, w) * c[K_BRISTLE] * z / level, 0.0)
+    return c[D_BRISTLE] * (left if c[DAHL] == 1.0 else left ** c[DAHL]) * math.exp(-((w / c[FADE]) ** 2))
+
+
 @part
 def _step(c, on, p, lawful, t, x, drive, closed, load, h):
     """The state h later under a constant drive, or in an open circuit."""
@@ -144,14 +161,12 @@ def _step(c, on, p, lawful, t, x, drive, closed, load, h):
     theta, theta_m = theta + half * w, theta_m + half * w_m
     j = _charged(c, j, drive, w_m, half) if closed else 0.0
     level = _full_level(c, on, p, lawful, theta, w, j)
-    left = 1.0 - math.copysign(1.0, w) * c[K_BRISTLE] * z / level
-    gives = left if c[DAHL] == 1.0 else math.copysign(abs(left) ** c[DAHL], left)
     force = c[BIAS] + load + c[A_1] * (c[THETA_0] - theta) - share * c[K_BRISTLE] * z
     if lawful:
         force += total_torque(on, p, theta, w, j, t + half)
     wall, d_wall = _stop(c, theta)
     twist, d = _contact(c, theta_m - theta)
-    own = share * c[D_BRISTLE] * max(gives, 0.0) * math.exp(-((w / c[FADE]) ** 2)) + (1.0 - c[BETA]) * _damping(c, w)
+    own = share * _bristle_damping(c, w, z, level) + (1.0 - c[BETA]) * _damping(c, w)
     own_m = c[BETA] * _damping(c, w_m)
     if closed and c[TAU] <= 0.0:  # the back-EMF damps at once
         own_m, j = own_m + c[A_EMF], drive

@@ -67,14 +67,18 @@ class ReducedModel:
 
     @property
     def coupled(self) -> bool:
-        """Whether there is a second body."""
+        """Whether there is a second body, be it the foot of a bristle."""
         return Coefficients(*self._lowered[0]).two_body > 0
 
     @property
-    def bends_and_twists(self) -> bool:
-        """Whether there is a bristle beside the second body."""
-        c = Coefficients(*self._lowered[0])
-        return c.has_motor_side and c.has_bristle
+    def bends(self) -> bool:
+        """Whether friction bends a bristle first."""
+        return Coefficients(*self._lowered[0]).has_bristle
+
+    @property
+    def has_motor_side(self) -> bool:
+        """Whether a play or a shaft parts motor and rudder."""
+        return Coefficients(*self._lowered[0]).has_motor_side
 
     def fed(self, u: np.ndarray) -> np.ndarray:
         """What a drive makes of the command u (N,) whose supply varies as it was measured."""
@@ -96,7 +100,7 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        kernel = (fixed_steps if self.bends_and_twists else events).simulate_kernel
+        kernel = (fixed_steps if self.bends and self.has_motor_side else events).simulate_kernel
         kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p.copy(), refine, x0, out)
         return out
 

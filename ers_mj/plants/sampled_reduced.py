@@ -84,7 +84,7 @@ class SampledReduced:
         self._c, self._p = c.copy(), p.copy()
         self._refine = 2 if any(BY_NAME[name].follows_current for name, _ in model.effects) else 1
         self._x, self._mode = np.array([*start, 0.0, 0.0, 0.0]), np.zeros(5, np.int64)
-        self._fixed = model.bends_and_twists
+        self._fixed = model.bends and model.has_motor_side
         self._skip = int(c[DELAY] * rate_hz + 1e-9)
         self._sent = [0.0] * (self._skip + 2)  # what the terminals saw last, oldest first
         self._samples = 0
