@@ -20,9 +20,9 @@ from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BETA, BIAS, C_
                                   UPPER, VECTOR, _faster)
 from ers_mj.plants.laws import friction_level, remember, total_torque
 
-LONGEST = 1e-4  # [s] of a step
+LONGEST = 2e-4  # [s] of a step
 SPRING_STEP = 0.35  # frequency [rad/s] of the stiffest spring times the step
-FINER = 8  # steps for one where the rudder may reach the preload's corner: one that comes slower than step times c_1 stays there
+FINER = 16  # steps for one where the rudder may reach the preload's corner: one that comes slower than step times c_1 stays there
 RESTING = 1e-9  # [output unit, and that per second] from the corner, and of speed, within which a rudder rests there
 SWEEPS = 3  # over the two set-valued forces, which only the contact's damper couples
 
