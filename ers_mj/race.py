@@ -176,7 +176,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         finished = dict(pool.map(finish, rough[:close]))
-        for name, found in pool.map(finish, _anew(finished, traces, tau)):
+        for name, found in pool.map(finish, [] if bends_and_twists(base) else _anew(finished, traces, tau)):
             finished[name] = min(finished[name], found, key=total)
         others = _other_forms(finished, {name: begins for (name, place), begins in starts.items() if place == 0})
         for name, found in pool.map(finish, [*others, *_wider(finished, exclude)]):
@@ -289,6 +289,12 @@ def is_clocked(name: str) -> bool:
 def is_dear(current: Fit) -> bool:
     """Whether the model takes many times as long to simulate as others."""
     return any(BY_NAME[name].dear for name in current.model.names)
+
+
+def bends_and_twists(current: Fit) -> bool:
+    """Whether the model has a play or a shaft beside a bristle, whose refits take longest of all."""
+    plant = current.model.plant()
+    return plant.bends and plant.has_motor_side
 
 
 def is_quiet(current: Fit, tau: float) -> bool:

@@ -11,7 +11,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, fit, hopped, near_noise, score, tau_of
 from ers_mj.model import Model
 from ers_mj.plants.reduced import ReducedModel
-from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, candidates, is_clocked, is_dear, is_quiet, judged, likeliest, likeliest_first,
+from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, is_quiet, judged, likeliest, likeliest_first,
                          priced, really)
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, stands_out
@@ -31,7 +31,7 @@ MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself 
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
-MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (once if dear)
+MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (see _most_mended)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
-        if ranked and least <= ranked[0].gain <= MODEST and mended < (1 if is_dear(current) else MOST_MENDED):
+        if ranked and least <= ranked[0].gain <= MODEST and mended < _most_mended(current):
             again = _less(ranked[0], traces, tau)
             if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT:
                 base, current, mended = base if current.model.names else again, again, mended + 1
@@ -65,7 +65,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and _is_cheap_and_wrong(current, base, traces):
             kinds = _of_one_body if swept else _any  # the second body, which takes most of the time, once a case
             ranked, swept = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, kinds)), True
-        elif ranked and _may_twist(current):
+        elif ranked and _may_twist(current) and not ranked[0].fit.model.plant().has_motor_side:
             ranked = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, _of_two_bodies))
         if rounds and ranked and not is_quiet(current, tau):
             ranked = _other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
@@ -215,6 +215,11 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
 def _most_rounds(current: Fit) -> int:
     """How many rounds there are at most: fewer where the model itself stays wrong."""
     return MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS
+
+
+def _most_mended(current: Fit) -> int:
+    """How often the model itself may win on its way back from a candidate."""
+    return 0 if bends_and_twists(current) else 1 if is_dear(current) else MOST_MENDED
 
 
 def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
