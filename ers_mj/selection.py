@@ -11,8 +11,8 @@ from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, fit, hopped, near_noise, score, tau_of
 from ers_mj.model import Model
 from ers_mj.plants.reduced import ReducedModel
-from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, is_quiet, judged, likeliest, likeliest_first,
-                         priced, really)
+from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, is_quiet, judged,
+                         likeliest, likeliest_first, priced, really)
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, stands_out
 from ers_mj.starts import with_starts
@@ -145,8 +145,7 @@ def _of_two_bodies(plant: ReducedModel) -> bool:
 
 def _may_twist(current: Fit) -> bool:
     """Whether a rudder whose friction bends a bristle is explained so badly that a play or a shaft may be there, which beside it no secant shows."""
-    plant = current.model.plant()
-    return plant.bends and not plant.has_motor_side and not near_noise(current)
+    return current.model.plant().bends and not bends_and_twists(current) and not near_noise(current)
 
 
 def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int,

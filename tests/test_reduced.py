@@ -53,6 +53,22 @@ def test_presliding_equals_an_independent_lugre(name, x_s_deg, w_d):
     assert np.degrees(np.max(np.abs(ours - truth))) < 3e-3
 
 
+@pytest.mark.parametrize("x_s_deg, delta", [(1.0, 1.5), (0.1, 1.0)])
+@pytest.mark.parametrize("name", ["multisine", "steps"])
+def test_a_shaft_beside_a_bristle_equals_an_independent_scheme(name, x_s_deg, delta):
+    """At a far smaller step, of other numbers: there the rudder's bristle is as stiff as if it bore the motor's friction as well."""
+    J, rho, phi, k, zeta = TABLE_1.parameters["J"], 0.6, 0.3, 30.0, 0.1
+    dahl = {"label": "presliding", "strength": x_s_deg, "shape": {"form": "Dahl", "bristle_damping_ratio": 0.0, "delta": delta}}
+    shaft = {"label": "shaft_compliance", "strength": np.degrees(1.0 / k), "shape": {"zeta": zeta, "motor_friction_share": phi}}
+    u, shares = INPUTS[name](T), {"motor_inertia_share": rho, "motor_damping_share": rho}
+    truth = quick.simulate(dict(TABLE_1.parameters) | shares, [shaft, dahl], T, u, step=5e-6, stand=0.0).true
+    effects = [("shaft_compliance", np.array([np.sqrt(k / J) / (2.0 * np.pi), zeta * np.sqrt(rho * (1.0 - rho)), rho, phi, np.inf])),
+               ("presliding", np.array([(1.0 - phi) * np.radians(x_s_deg), 0.0, np.inf, delta]))]
+    ours = ReducedModel(table_1().coefficients, effects).simulate(T, u).theta
+    rigid = ReducedModel(table_1().coefficients, effects[:1]).simulate(T, u).theta
+    assert np.sqrt(np.mean((ours - truth) ** 2)) < 0.05 * np.sqrt(np.mean((rigid - truth) ** 2))
+
+
 @pytest.mark.parametrize("name", ["multisine", "chirp", "ramp", "steps"])
 def test_eq_5_is_the_limit_of_vanishing_inductance(name):
     u = INPUTS[name](T)

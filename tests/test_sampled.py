@@ -35,6 +35,13 @@ def test_the_reduced_model_moves_as_in_one_go(effect, options, within):
     assert np.abs(theta - whole.theta).max() < within
 
 
+def test_two_bodies_beside_a_bristle_move_as_in_one_go():
+    plant = build_plant(SHEET, effects=[parse_effect("shaft_compliance:f_shaft=30"), parse_effect("presliding:x_s=0.002,zeta=0.5"),
+                                        parse_effect("input_delay:T_d=0.0023")])
+    u = INPUTS["steps"](T)
+    assert np.abs(stepped(plant, u)[0] - plant.simulate(T, u).theta).max() < 1e-11
+
+
 @pytest.mark.parametrize(("effect", "options"), [
     (None, {}), (None, {"inductance": True}), (None, {"gap": 0.009}), (None, {"linkage": "rod"}), ("input_delay:T_d=0.00232", {}),
     ("stribeck:dF_s=0.1,v_s=0.2", {})])

@@ -93,6 +93,19 @@ def test_a_shaft_beside_a_play_softens_its_contact():
     assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(T, u).theta - law.theta) < 1e-9
 
 
+@pytest.mark.parametrize("second", [("shaft_compliance", [25.0, 0.1, 0.6, 0.2, 0.02]), ("backlash", [0.012, 0.6, 0.2, 120.0, 0.2])])
+@pytest.mark.parametrize("bristle", [[0.005, 0.3, np.inf, np.inf], [0.01, 0.3, 1.0, 1.5]])
+def test_two_bodies_beside_a_bristle_agree(second, bristle):
+    """What the bristle changes beside a play or a shaft is the same in either plant, whichever is named first."""
+    both = [(second[0], np.array(second[1])), ("presliding", np.array(bristle))]
+    u = INPUTS["multisine"](T)
+    law, rigid = ReducedModel(EQ_5, both).simulate(T, u), ReducedModel(EQ_5, both[:1]).simulate(T, u)
+    twin = MechanicalPlant(EQ_5, both, parameters=SHEET.parameters).simulate(T, u)
+    assert rms_deg(law.theta - rigid.theta) > VISIBLE
+    assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - rigid.theta)
+    assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(T, u).theta - law.theta) < 1e-9
+
+
 def test_a_shaft_beside_a_play_does_not_harden():
     shaft, play = (lambda c: BY_NAME["shaft_compliance"].coefficients(np.array([20.0, 0.2, 0.6, 0.2, 0.01]), c),
                    lambda c: BY_NAME["backlash"].coefficients(np.array([0.012, 0.6, 0.2, 120.0, 0.2]), c))
