@@ -65,7 +65,7 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth LEAST_PROMISE. (How far C
     lies above zero is no such sign: it hangs on the noise, which is an estimate.)
 
-    What is dear to simulate is refitted from its most promising place only, and each effect from as many starts as it declares, or ``tries`` if more.
+    A knock is looked for from the first place only, what is dear to simulate is refitted from its most promising one, and each effect from as many starts as it declares, or ``tries`` if more.
     """
     names, floor, most = [name for name in BY_NAME if name not in exclude], 0.0, LATER if places[0].names else MOST_BENT if bent else MOST_SENT
     promises, begins = {}, {}
@@ -77,6 +77,8 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
         for effect in (BY_NAME[name] for name in names):
             if effect.once:
+                if place is not places[0]:
+                    continue
                 found = _knocks(place, effect, effect.starts(scales), e, targets[0][2], traces, tau)
             else:
                 starts = _hopeful(run, effect, effect.starts(scales), targets, traces, max(effect.tries, tries))
@@ -221,19 +223,24 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
 
 def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
     """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local."""
-    amplitudes, phase = effect.wave
-    secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
-    if not np.all(np.isfinite(secants)):
-        return None
-    (share,), (mixture,) = max((_shares(np.array(secants), 2, _ends(effect, traces), target, True) for target in targets), key=lambda found: found[0][0])
-    sizes, turns = np.hypot(*mixture.T), np.arctan2(mixture[:, 1], mixture[:, 0])
-    found = start.copy()
-    found[list(amplitudes)] *= min(max(math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
-    found[phase] += turns[0]
-    model = place.with_effect(effect.name, found)
-    if effect.local:
-        model.local[effect.name][:, effect.local_columns.index(phase)] = start[phase] + turns
-    return float(share), model
+    amplitudes, phase = list(effect.wave[0]), effect.wave[1]
+    best, ends, whole, size = None, _ends(effect, traces), start, 1.0
+    for _ in range(2):
+        secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
+        if not np.all(np.isfinite(secants)):
+            break
+        (share,), (mixture,) = max((_shares(np.array(secants), 2, ends, target, True) for target in targets), key=lambda found: found[0][0])
+        sizes, turns = np.hypot(*mixture.T), np.arctan2(mixture[:, 1], mixture[:, 0])
+        size = min(max(size * math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
+        found, start = start.copy(), whole.copy()
+        found[amplitudes] = start[amplitudes] = size * whole[amplitudes]
+        found[phase] += turns[0]
+        if best is None or share > best[0]:
+            model = place.with_effect(effect.name, found)
+            if effect.local:
+                model.local[effect.name][:, effect.local_columns.index(phase)] = whole[phase] + turns
+            best = float(share), model
+    return best
 
 
 def _shares(changes: np.ndarray, waves: int, ends: np.ndarray, target: tuple[np.ndarray, np.ndarray, np.ndarray],

@@ -22,7 +22,7 @@ LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the o
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LATER_Z = 2.0  # and beside an effect
 MISSED = 100.0  # of C by which a model is worse without an effect that nothing else will stand for
-LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
+LOST = 0.33  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
@@ -158,13 +158,13 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
     """
     effects = [effect for effect in BY_NAME.values() if not effect.dear and not effect.once and effect.name not in exclude]
     starts = [(effect.name, start) for effect in effects if len(few := effect.starts(base.model.scales)) < BY_SCREEN for start in few]
-    starts = [start for start in starts if kinds(base.model.with_effect(*start).plant())]
+    starts = [(name, model) for name, start in starts if kinds((model := base.model.with_effect(name, start)).plant())]
     if base.model.plant().bends:
         starts = starts[1::2]
     known = {c.name: c.gain for c in ranked}
 
     def refitted(item):
-        return judged(item[0], fit(base.model.with_effect(*item), traces, tau=tau, steps=SWEEP), base, tau)
+        return judged(item[0], fit(item[1], traces, tau=tau, steps=SWEEP), base, tau)
 
     def carried_on(candidate):
         return judged(candidate.name, fit(candidate.fit.model, traces, tau=tau, steps=20), base, tau)
@@ -247,11 +247,11 @@ def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequen
     """With earlier effects exchanged for rivals of their round that are likelier beside what came later, and the newest where one was; they lead their rounds
     then."""
     def instead(candidate):
-        name = candidate.name
-        model = without.with_effect(name, dict(candidate.fit.model.effects)[name])
-        if BY_NAME[name].local:
-            model = replace(model, local={**model.local, name: candidate.fit.model.local[name]})
-        return fit(model, traces, tau=tau, steps=12)
+        model = without.with_effect(candidate.name, dict(candidate.fit.model.effects)[candidate.name])
+        return replace(model, local={**model.local, candidate.name: candidate.fit.model.local[candidate.name]}) if BY_NAME[candidate.name].local else model
+
+    def refitted(item):
+        return item[0], fit(item[1], traces, tau=tau, steps=12)
 
     before = current
     for k, ranked in enumerate(rounds):
@@ -263,13 +263,25 @@ def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequen
         rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names and really(c.name, c.fit) != leader
                   and c.gain >= RIVAL * ranked[0].gain][:MOST_RIVALS]
         without = current.model.without_effect(leader)
+        begun = [(c.name, instead(c)) for c in rivals]
+        begun += [(name, model) for name in (leader, *(c.name for c in rivals)) for model in _begun_anew(name, without)]
+        fits = {leader: current}
         with ThreadPoolExecutor(jobs) as pool:
-            fits = {leader: current} | dict(zip((c.name for c in rivals), pool.map(instead, rivals)))
+            for name, found in pool.map(refitted, begun):
+                fits[name] = min(fits.get(name, found), found, key=priced)
         least = min(map(priced, fits.values())) + TIE
-        if (name := likeliest({n: found for n, found in fits.items() if priced(found) < least})) != leader:
-            current = fits[name]
+        name = likeliest({n: found for n, found in fits.items() if priced(found) < least})
+        current = fits[name]
+        if name != leader:
             rounds[k] = tuple(sorted(ranked, key=lambda c: c.name != name))
     return current
+
+
+def _begun_anew(name: str, without: Model) -> list[Model]:
+    """A play or a shaft from its own starts beside all that has been found since: the numbers that it took alone may lie in a dent of C, from which the
+    descent does not lead out."""
+    begun = [without.with_effect(name, start) for start in BY_NAME[name].starts(without.scales)]
+    return [model for model in begun if _of_two_bodies(plant := model.plant()) and not plant.bends] if not without.plant().has_motor_side else []
 
 
 def _pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> Fit:

@@ -196,6 +196,14 @@ def test_another_proof_in_the_folder_is_refused_and_forced(tmp_path, asked):
     assert not (tmp_path / "p" / "case-003").exists()
 
 
+def test_a_folder_in_which_another_run_is_at_work_is_refused(tmp_path, asked):
+    with sealing.held(tmp_path / "p"):
+        with pytest.raises(InputError, match="another `ers prove` is at work"):
+            conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
+    assert not any((tmp_path / "p").iterdir())
+    conduct.conduct(tmp_path / "p", TASKS, SETTINGS)  # let go of, it is free again
+
+
 def test_a_stopped_proof_keeps_its_answers(tmp_path, monkeypatch):
     calls = []
 

@@ -16,8 +16,8 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first
 from ers_mj.recording import from_arrays
-from ers_mj.screening import Begin, Screened, _between, _hot, screen, stands_out
-from ers_mj.selection import _exchanged, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
+from ers_mj.screening import Begin, Screened, _between, _hot, _promise, _targets, screen, stands_out
+from ers_mj.selection import _begun_anew, _exchanged, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -47,6 +47,29 @@ def test_a_search_that_is_given_up_still_tells_the_cost_that_was_asked_for(pushe
     left = fit(far, pushed.traces, tau=1.0, steps=1, ceiling=pushed.fit.misfit)
     assert float(np.exp(np.mean(np.log(left.misfit + 1.0)))) > 10.0  # it ended at a stage far above
     assert left.cost == pytest.approx(float(score(left.misfit, 1.0).sum()))
+
+
+def test_a_small_wave_is_promised_by_a_large_start():
+    """Cogging of 1 % of the friction: a start that is 30 times as large throws the rudder elsewhere, and tells only how small to try again."""
+    cog, traces = np.array([1.0, 2 * np.pi / 267, 1.3, np.inf, np.inf]), []
+    for k, name in enumerate(("multisine", "ramp")):
+        y = ReducedModel(lumped(TRUTH), [("cogging", cog)]).simulate(T, INPUTS[name](T)).measured
+        traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+    start = baseline(traces, Datasheet(lumped=TRUTH), True, 1)
+    place, traces = start.fit.model, start.traces
+    e = residuals(place, traces, 5.0)
+    share, model = _promise(place, BY_NAME["cogging"], np.array([30.0, cog[1], 0.0, np.inf, np.inf]), e, _targets(place, e, traces, 1.0)[1], traces)
+    A, _, phase = dict(model.effects)["cogging"][:3]
+    assert share > 0.3 and abs(A * np.exp(1j * phase) - np.exp(1.3j)) < 0.3
+
+
+def test_a_play_begins_anew_beside_what_was_found_since(pushed):
+    model = pushed.fit.model
+    anew = _begun_anew("backlash", model.with_effect("quadratic_drag", np.array([0.5])))
+    assert [m.names for m in anew] == [("quadratic_drag", "backlash")] * len(BY_NAME["backlash"].starts(model.scales))
+    assert not _begun_anew("quadratic_drag", model)
+    assert not _begun_anew("backlash", model.with_effect("shaft_compliance", np.array([80.0, 0.2, 0.6, 0.2, np.inf])))
+    assert not _begun_anew("backlash", model.with_effect("presliding", np.array([1e-3, 0.5, np.inf, np.inf])))
 
 
 def test_a_promise_that_failed_is_no_measure_for_the_others():

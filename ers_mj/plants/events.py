@@ -822,7 +822,7 @@ def _last(ends):
     return ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
 
 
-@inlined
+@part
 def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out):
     """See ``_simulate``: through the samples, by maps over segments (late, early, the first of a sample) or, if it ``leaps``, over a whole sample."""
     n = t.size

@@ -9,7 +9,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients, Effect
-from ers_mj.plants import events, fixed_steps
+from ers_mj.plants.events import simulate_kernel
 from ers_mj.plants.laws import N_PARAMETERS, rows_of
 from ers_mj.plants.tangents import prepare_kernel, tangent_kernel
 
@@ -100,7 +100,9 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        kernel = (fixed_steps if self.bends and self.has_motor_side else events).simulate_kernel
+        kernel = simulate_kernel
+        if self.bends and self.has_motor_side:
+            from ers_mj.plants.fixed_steps import simulate_kernel as kernel  # here alone: it takes seconds to compile and is seldom needed
         kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p.copy(), refine, x0, out)
         return out
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ers_mj.proving.asking import LIMIT, Asker
-from ers_mj.proving.sealing import answer_of, begin, has_case, hash_of_diagnosis, hash_of_maker, keep_answer, keep_case, opened, seal
+from ers_mj.proving.sealing import answer_of, begin, has_case, hash_of_diagnosis, hash_of_maker, held, keep_answer, keep_case, opened, seal
 
 Progress = Callable[[str, float], None]
 MAKING = 0.4  # share of the bar
@@ -45,19 +45,20 @@ def conduct(folder: Path, tasks: Sequence[Task], settings: dict, *, force: bool 
         tell: called with lines for a person as they come, the hash before the first question among them.
 
     Raises:
-        InputError: the folder holds something else, or the sealed truth was touched.
+        InputError: the folder holds something else, another run is at work in it, or the sealed truth was touched.
         KeyboardInterrupt: stopped; what was made and answered is kept.
     """
     settings = {**settings, "limit_s": limit, "made_by": hash_of_maker()}
-    if begin(folder, settings, force):
-        tell(f"{folder}: goes on where it was left")
-    names = [task.name for task in tasks]
-    _make(folder, [task for task in tasks if not has_case(folder, task.name)], jobs, progress)
-    digest = seal(folder, names)
-    tell(f"the truth of {len(names)} cases is sealed, sha256 {digest}")
-    code = hash_of_diagnosis()
-    _ask(folder, [name for name in names if answer_of(folder, name, code) is None], Asker(code, limit), jobs, progress)
-    return Proof(opened(folder, digest), {name: answer_of(folder, name, code) or {} for name in names}, digest)
+    with held(folder):
+        if begin(folder, settings, force):
+            tell(f"{folder}: goes on where it was left")
+        names = [task.name for task in tasks]
+        _make(folder, [task for task in tasks if not has_case(folder, task.name)], jobs, progress)
+        digest = seal(folder, names)
+        tell(f"the truth of {len(names)} cases is sealed, sha256 {digest}")
+        code = hash_of_diagnosis()
+        _ask(folder, [name for name in names if answer_of(folder, name, code) is None], Asker(code, limit), jobs, progress)
+        return Proof(opened(folder, digest), {name: answer_of(folder, name, code) or {} for name in names}, digest)
 
 
 def _make(folder: Path, tasks: Sequence[Task], jobs: int, progress: Progress) -> None:
