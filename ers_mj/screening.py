@@ -65,7 +65,8 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth LEAST_PROMISE. (How far C
     lies above zero is no such sign: it hangs on the noise, which is an estimate.)
 
-    A knock is looked for from the first place only, what is dear to simulate is refitted from its most promising one, and each effect from as many starts as it declares, or ``tries`` if more.
+    A knock is looked for from the first place only, what is dear to simulate is refitted from its most promising one, and each effect from as many
+    starts as it declares, or ``tries`` if more.
     """
     names, floor, most = [name for name in BY_NAME if name not in exclude], 0.0, LATER if places[0].names else MOST_BENT if bent else MOST_SENT
     promises, begins = {}, {}
@@ -222,7 +223,10 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
 
 
 def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
-    """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local."""
+    """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local.
+
+    Of a wave that is 20 times too large, as a small cog's start may be, the rudder sticks and slips elsewhere, and its secants tell no more than the size to try.
+    """
     amplitudes, phase = list(effect.wave[0]), effect.wave[1]
     best, ends, whole, size = None, _ends(effect, traces), start, 1.0
     for _ in range(2):
