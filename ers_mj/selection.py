@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, fit, hopped, near_noise, score, tau_of
 from ers_mj.model import Model
-from ers_mj.plants.reduced import ReducedModel
+from ers_mj.plants.reduced import EFFORT, ReducedModel
 from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, is_quiet, judged,
                          likeliest, likeliest_first, priced, really)
 from ers_mj.remainder import left_by_sensor, more_is_missing
@@ -27,7 +27,9 @@ ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
-MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see ROUGH)
+MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH)
+MOST_EFFORT = 120_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing more is looked for that does not show by itself
+GOOD_PART = 0.35  # share of C that a round must take away for a third where the model stays wrong
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
@@ -48,10 +50,14 @@ class Selection:
 
 def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str, float]] = (), exclude: Sequence[str] = (),
            jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
-    """Grow the model while the data asks for it, dropping what later additions make needless."""
-    current, rounds, mended, swept, reviewed = base, [], 0, False, False
+    """Grow the model while the data asks for it, dropping what later additions make needless.
+
+    What takes longest, the sweeps and what is begun once more the other way round, is left out after MOST_EFFORT.
+    """
+    end = EFFORT.spent + MOST_EFFORT
+    current, rounds, mended, swept, reviewed, took = base, [], 0, False, False, 0.0
     tau = tau_of(base.misfit)
-    while len(rounds) - len(current.model.states or {}) < _most_rounds(current):
+    while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took):
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
@@ -62,22 +68,23 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
                 continue
         least_z = LATER_Z if current.model.names else LEAST_Z
         outstanding = stands_out(current.misfit, tau)
-        if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and _is_cheap_and_wrong(current, base, traces):
+        if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and EFFORT.spent < end and _is_cheap_and_wrong(current, base, traces):
             kinds = _of_one_body if swept else _any  # the second body, which takes most of the time, once a case
-            ranked, swept = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, kinds)), True
-        elif ranked and _may_twist(current) and not ranked[0].fit.model.plant().has_motor_side:
-            ranked = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, _of_two_bodies))
-        if rounds and ranked and not is_quiet(current, tau):
+            ranked, swept = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, kinds)), True
+        elif ranked and EFFORT.spent < end and _may_twist(current) and not ranked[0].fit.model.plant().has_motor_side:
+            ranked = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, _of_two_bodies))
+        if rounds and ranked and EFFORT.spent < end and not is_quiet(current, tau):
             ranked = _other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
         asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME) and _asked_for(c, least, least_z, outstanding)]
         rounds.append(tuple(sorted(ranked, key=lambda c: c not in asked[:1])))
         if not asked:
-            other = None if reviewed or not _is_doubtful(current, tau) else _reviewed(current, rounds, traces, tau, exclude, jobs)
+            other = None if reviewed or EFFORT.spent >= end or not _is_doubtful(current, tau) else _reviewed(current, rounds, traces, tau, exclude, jobs, end)
             if other is None:
                 break
             (current, rounds), reviewed = other, True
             continue
         ranked = rounds[-1]
+        took = ranked[0].gain / max(ranked[0].gain, float(score(current.misfit, tau).sum()))
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         current, rounds = _reconsidered(current, rounds, traces, tau)
         tau = tau_of(current.misfit)
@@ -148,39 +155,45 @@ def _may_twist(current: Fit) -> bool:
     return current.model.plant().bends and not bends_and_twists(current) and not near_noise(current)
 
 
-def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int,
+def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int, end: float = math.inf,
            kinds: Callable[[ReducedModel], bool] = _any) -> list[Candidate]:
     """What a screening missed when it found nothing to add: where stick and slip fork, the secant of the very effect that acts may promise nothing.
 
-    Every effect that makes a plant of these ``kinds``, is not dear and has few starts is refitted from these as they are, whatever they make worse on the way;
-    those are returned that gain more than the screening's refit of the same effect. One whose several numbers end at their bounds is none: a shaft of 1000 Hz
-    without a resonance. Beside a bristle, where a refit takes long, every other start will do.
+    Every effect that makes a plant of these ``kinds``, is not dear and has few starts is refitted from these as they are, whatever they make worse on the way,
+    those of one body first, until the EFFORT reaches ``end``; those are returned that gain more than the screening's refit of the same effect. One whose
+    several numbers end at their bounds is none: a shaft of 1000 Hz without a resonance. Beside a bristle, where a refit takes long, every other start will do.
     """
     effects = [effect for effect in BY_NAME.values() if not effect.dear and not effect.once and effect.name not in exclude]
-    starts = [(effect.name, start) for effect in effects if len(few := effect.starts(base.model.scales)) < BY_SCREEN for start in few]
-    starts = [(name, model) for name, start in starts if kinds((model := base.model.with_effect(name, start)).plant())]
+    starts = [(effect.name, base.model.with_effect(effect.name, start)) for effect in effects
+              if len(few := effect.starts(base.model.scales)) < BY_SCREEN for start in few]
+    starts = [(name, model) for name, model in starts if kinds(model.plant())]
     if base.model.plant().bends:
         starts = starts[1::2]
-    known = {c.name: c.gain for c in ranked}
+    begun: dict[str, list[Model]] = {}
+    for name, model in sorted(starts, key=lambda start: _of_two_bodies(start[1].plant())):
+        begun.setdefault(name, []).append(model)
 
-    def refitted(item):
-        return judged(item[0], fit(item[1], traces, tau=tau, steps=SWEEP), base, tau)
+    def refitted(model):
+        return fit(model, traces, tau=tau, steps=SWEEP)
 
     def carried_on(candidate):
         return judged(candidate.name, fit(candidate.fit.model, traces, tau=tau, steps=20), base, tau)
 
+    known, best = {c.name: c.gain for c in ranked}, []
     with ThreadPoolExecutor(jobs) as pool:
-        best = {}
-        for candidate in pool.map(refitted, starts):
-            if candidate.gain > max(known.get(candidate.name, 0.0), best[candidate.name].gain if candidate.name in best else 0.0):
-                best[candidate.name] = candidate
-        ended = list(pool.map(carried_on, best.values()))
+        for name, models in begun.items():
+            if EFFORT.spent >= end:
+                break
+            found = max((judged(name, found, base, tau) for found in pool.map(refitted, models)), key=lambda c: c.gain)
+            if found.gain > max(known.get(name, 0.0), 0.0):
+                best.append(found)
+        ended = list(pool.map(carried_on, best))
         ended = list(pool.map(lambda c: carried_on(c) if c.gain >= LEAST_GAIN else c, ended))
     return [c for c in ended if sum(c.fit.model.at_bound(f) for f in c.fit.model.layout() if f.owner == c.name) <= AT_BOUND]
 
 
 def _reviewed(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float, exclude: Sequence[str],
-              jobs: int) -> tuple[Fit, list[tuple[Candidate, ...]]] | None:
+              jobs: int, end: float = math.inf) -> tuple[Fit, list[tuple[Candidate, ...]]] | None:
     """The model with what a sweep finds in place of the effect found last, and the rounds up to there, if that is better than an effect beside which more than
     noise is left and nothing is found: the first that a screening promises is not always the one that acts.
     """
@@ -188,7 +201,7 @@ def _reviewed(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequenc
     if k is None:
         return None
     without = fit(current.model.without_effect(rounds[k][0].name), traces, tau=tau, steps=20)
-    found = _swept(without, (), traces, tau, (*exclude, *current.model.names), jobs, _of_one_body)
+    found = _swept(without, (), traces, tau, (*exclude, *current.model.names), jobs, end, _of_one_body)
     best = min(found, key=lambda c: priced(c.fit), default=None)
     if best is None or priced(best.fit) >= priced(current) - TIE:
         return None
@@ -211,9 +224,9 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
     return _joined(ranked, ends)
 
 
-def _most_rounds(current: Fit) -> int:
-    """How many rounds there are at most: fewer where the model itself stays wrong."""
-    return MOST_ROUNDS if near_noise(current) else FEWER_ROUNDS
+def _most_rounds(current: Fit, took: float) -> int:
+    """How many rounds there are at most: fewer where the model itself stays wrong, and the last one took away no good part of that."""
+    return MOST_ROUNDS if near_noise(current) or took >= GOOD_PART else FEWER_ROUNDS
 
 
 def _most_mended(current: Fit) -> int:

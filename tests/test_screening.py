@@ -13,7 +13,7 @@ from ers_mj.errors import InputError
 from ers_mj.identification import fit, residuals, score, tau_of
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, _between, _hot, _promise, _targets, screen, stands_out
@@ -238,13 +238,20 @@ def test_an_effect_that_leaves_much_gives_way_to_what_a_sweep_finds(pushed):
     assert _reviewed(found, rounds, pushed.traces, 1.0, others, 1) is None
 
 
+def test_a_sweep_ends_when_enough_has_been_simulated(pushed):
+    others = [name for name in BY_NAME if name not in ("bias_torque", "backlash")]
+    before = EFFORT.spent
+    assert not _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, before) and EFFORT.spent == before
+    assert [c.name for c in _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, before + 1)] == ["bias_torque"]  # one body first
+
+
 def test_a_second_sweep_leaves_two_bodies_out(pushed, monkeypatch):
     tried = []
     monkeypatch.setattr(selection, "fit", lambda model, *_, **__: tried.append(model.names) or pushed.fit)
     others = [name for name in BY_NAME if name not in ("bias_torque", "backlash", "shaft_compliance")]
-    for kinds, names in (((), {("bias_torque",), ("backlash",), ("shaft_compliance",)}), ((_of_one_body,), {("bias_torque",)})):
+    for kinds, names in (({}, {("bias_torque",), ("backlash",), ("shaft_compliance",)}), ({"kinds": _of_one_body}, {("bias_torque",)})):
         tried.clear()
-        _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, *kinds)
+        _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, **kinds)
         assert set(tried) == names
 
 
