@@ -128,7 +128,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         laws = [effect for effect in BY_NAME.values() if not (is_clocked(effect.name) or effect.dear or effect.name in exclude)
                 and (effect.name not in best or reference - total(best[effect.name]) < CLOCKED * (reference - total(best[leader])))]
         own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)] for effect in laws if not effect.sized}
-        return [(name, begin) for name in (effect.name for effect in laws) for begin in starts.get((name, 0), own.get(name, []))]
+        twists = base.model.plant().has_motor_side  # a play or a shaft, which takes longest, is no knock
+        return [(name, begin) for name in (effect.name for effect in laws) for begin in starts.get((name, 0), own.get(name, []))
+                if begin.model.plant().has_motor_side == twists]
 
     states = [((s, 0), [Begin(base.model.with_state(s, len(traces)), {})]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]

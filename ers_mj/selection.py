@@ -22,13 +22,14 @@ LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the o
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LATER_Z = 2.0  # and beside an effect
 MISSED = 100.0  # of C by which a model is worse without an effect that nothing else will stand for
-LOST = 0.33  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
+LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH)
-MOST_EFFORT = 120_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing more is looked for that does not show by itself
+MOST_EFFORT, LAST_BEGUN = 60_000_000, 100_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked for that does not show by itself,
+# and no round is begun
 GOOD_PART = 0.35  # share of C that a round must take away for a third where the model stays wrong
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
@@ -54,10 +55,11 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
 
     What takes longest, the sweeps and what is begun once more the other way round, is left out after MOST_EFFORT.
     """
-    end = EFFORT.spent + MOST_EFFORT
+    begun = EFFORT.spent
+    end = begun + MOST_EFFORT
     current, rounds, mended, swept, reviewed, took = base, [], 0, False, False, 0.0
     tau = tau_of(base.misfit)
-    while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took):
+    while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took) and EFFORT.spent < begun + LAST_BEGUN:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
