@@ -189,7 +189,13 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         if rivals > 1:
             lead, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau), base, tau), ranked[:rivals])
-    return likeliest_first(sorted((c for c in ranked if not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
+    return likeliest_first(sorted((c for c in ranked if shows(c) and not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
+
+
+def shows(candidate: Candidate) -> bool:
+    """Whether the recordings can show what it adds at all (see Effect.shows)."""
+    model = candidate.fit.model
+    return candidate.name not in BY_NAME or BY_NAME[candidate.name].shows(dict(model.effects)[candidate.name], model.scales)
 
 
 def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:

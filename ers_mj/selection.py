@@ -12,7 +12,7 @@ from ers_mj.identification import Fit, fit, hopped, near_noise, score, tau_of
 from ers_mj.model import Model
 from ers_mj.plants.reduced import EFFORT, ReducedModel
 from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, is_quiet, judged,
-                         likeliest, likeliest_first, priced, really)
+                         likeliest, likeliest_first, priced, really, shows)
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, stands_out
 from ers_mj.starts import with_starts
@@ -191,7 +191,7 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
                 best.append(found)
         ended = list(pool.map(carried_on, best))
         ended = list(pool.map(lambda c: carried_on(c) if c.gain >= LEAST_GAIN else c, ended))
-    return [c for c in ended if sum(c.fit.model.at_bound(f) for f in c.fit.model.layout() if f.owner == c.name) <= AT_BOUND]
+    return [c for c in ended if shows(c) and sum(c.fit.model.at_bound(f) for f in c.fit.model.layout() if f.owner == c.name) <= AT_BOUND]
 
 
 def _reviewed(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float, exclude: Sequence[str],

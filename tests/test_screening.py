@@ -72,6 +72,13 @@ def test_a_play_begins_anew_beside_what_was_found_since(pushed):
     assert not _begun_anew("backlash", model.with_effect("presliding", np.array([1e-3, 0.5, np.inf, np.inf])))
 
 
+def test_a_shaft_that_twists_by_less_than_the_noise_is_none(pushed):
+    """At 756 Hz 115 rad/s^2 of friction twist it by 5 urad, where the noise is 150."""
+    stiff, soft = (replace(pushed.fit, model=pushed.fit.model.with_effect("shaft_compliance", np.array([f, 0.4, 0.3, 0.6, np.inf]))) for f in (756.0, 90.0))
+    assert not race.shows(judged("shaft_compliance", stiff, pushed.fit, 1.0)) and race.shows(judged("shaft_compliance", soft, pushed.fit, 1.0))
+    assert race.shows(judged("friction_level", pushed.fit, pushed.fit, 1.0))
+
+
 def test_a_promise_that_failed_is_no_measure_for_the_others():
     found = Screened({"load_disturbance": 3.0, "load_dependent_friction": 0.97, "cogging": 0.4, "input_delay": 0.18, "gravity": 0.02}, {}, 0.0, 4)
     assert found.promising() == ["load_disturbance", "load_dependent_friction", "cogging"]

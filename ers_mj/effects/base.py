@@ -220,6 +220,10 @@ class Effect:
         """Whether these numbers, beside a Coulomb friction c_2, are clearly not those of an effect that is a limit of this one (see grown)."""
         return False
 
+    def shows(self, p: np.ndarray, scales: Scales) -> bool:
+        """Whether recordings of these scales can show the effect at these numbers at all."""
+        return True
+
     def really(self, p: np.ndarray, friction: float) -> str:
         """Name of the effect of which these numbers, beside a Coulomb friction c_2, are a form: its own but where it is hardly there."""
         return self.name
