@@ -29,7 +29,8 @@ AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH)
 MOST_EFFORT, LAST_BEGUN = 60_000_000, 100_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked for that does not show by itself,
-# and no round is begun
+# and no round is begun; more by as much as the recordings last longer than a MINUTE together
+MINUTE = 60.0  # [s]
 GOOD_PART = 0.35  # share of C that a round must take away for a third where the model stays wrong
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
@@ -53,13 +54,13 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
            jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
-    What takes longest, the sweeps and what is begun once more the other way round, is left out after MOST_EFFORT.
+    What takes longest, the sweeps and what is begun once more the other way round, is left out after MOST_EFFORT, and no round begins after LAST_BEGUN.
     """
-    begun = EFFORT.spent
-    end = begun + MOST_EFFORT
+    longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
+    end, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_BEGUN))
     current, rounds, mended, swept, reviewed, took = base, [], 0, False, False, 0.0
     tau = tau_of(base.misfit)
-    while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took) and EFFORT.spent < begun + LAST_BEGUN:
+    while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took) and EFFORT.spent < last:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
