@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -203,12 +204,19 @@ class Model:
 
     def plant(self, record: int = 0, supply: np.ndarray | None = None) -> ReducedModel:
         """The reduced model of one recording (its record state applied), with the supply (N,) that was measured there."""
+        if supply is None and not self.states and not self.local:
+            return self._anywhere
         c = lumped(self.values)
         if self.states:
             gain = self.states["gain"][record] if "gain" in self.states else 1.0
             level = self.states["friction_level"][record] if "friction_level" in self.states else 1.0
             c = c._replace(b=c.b * gain, c_2_plus=c.c_2_plus * level, c_2_minus=c.c_2_minus * level)
         return ReducedModel(c, self.effects_of(record), supply)
+
+    @cached_property
+    def _anywhere(self) -> ReducedModel:
+        """The plant without what differs between recordings; made once, since a fit asks for it in each of them."""
+        return ReducedModel(lumped(self.values), self.effects)
 
     def effects_of(self, record: int | None = None) -> tuple[tuple[str, np.ndarray], ...]:
         """The effects that act in one recording (None: in any), with their values there (in the first where they act)."""
@@ -254,7 +262,7 @@ class Model:
     @property
     def has_tangents(self) -> bool:
         """Whether ``changes`` can tell the first-order changes of this model's outputs."""
-        return ReducedModel(lumped(self.values), self.effects).has_tangents
+        return self._anywhere.has_tangents
 
     def changes(self, traces: Sequence[Trace], rate: float, others: Sequence[Model], scale: float, motions: Sequence[np.ndarray]) -> np.ndarray:
         """First-order changes (rows of all traces, others) of the predicted outputs, in sigmas, 0 where a sample is missing.

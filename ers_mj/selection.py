@@ -66,9 +66,12 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
         if ranked and least <= ranked[0].gain <= MODEST and mended < _most_mended(current):
             again = _less(ranked[0], traces, tau)
-            if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT:
+            won = float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum())
+            if won > DENT:
                 base, current, mended = base if current.model.names else again, again, mended + 1
-                continue
+                if ranked[0].gain - won < least or any(c.worth >= ranked[0].worth - won for c in ranked[1:]):
+                    continue
+                ranked = [judged(c.name, c.fit, current, tau) for c in ranked]
         least_z = LATER_Z if current.model.names else LEAST_Z
         outstanding = stands_out(current.misfit, tau)
         if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and EFFORT.spent < end and _is_cheap_and_wrong(current, base, traces):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numba import njit
 
@@ -131,8 +133,9 @@ def remember(on, p, theta, w, j, h):
         p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, h)
 
 
+@lru_cache
 def rows_of(names):
-    """Effects as the laws are called: (4, 1 + effects) their number and rows, of torques, of frictions, of inertias and of memories."""
+    """A tuple of effects as the laws are called: (4, 1 + effects) their number and rows, of torques, of frictions, of inertias and of memories."""
     on = np.zeros((4, 1 + len(EFFECTS)), np.int64)
     for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS], [e.inertia for e in EFFECTS],
                                  [e.memory for e in EFFECTS])):
