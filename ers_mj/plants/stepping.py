@@ -16,6 +16,7 @@ from ers_mj.plants.mjcf import unlogged
 
 MOTOR_GROUP = 1  # actuator group that an open circuit disables
 TIME_CONSTANT = 0  # where MuJoCo keeps a motor's electrical time constant in its actuator's dynprm
+LAW_STEPS = 4  # steps over which a law keeps its value; one beside a bristle, whose level is stiff, and where the inductance falls
 LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dynprm
 
 
@@ -148,9 +149,11 @@ class Stepper:
         data = self.data
         data.ctrl[self.motor], data.ctrl[self.load] = v, self.inertia * load
         if self.laws or self.falls:
-            for _ in range(steps):
-                self._apply_laws(v, load)
-                mujoco.mj_step(self.model, data)
+            most = LAW_STEPS if self.bristle is None and not self.falls else 1
+            for done in range(0, steps, most):
+                count = min(most, steps - done)
+                self._apply_laws(v, load, count * self.model.opt.timestep)
+                mujoco.mj_step(self.model, data, count)
         else:
             mujoco.mj_step(self.model, data, steps)
         self.drive = self._drive(v)
@@ -170,14 +173,14 @@ class Stepper:
             return theta + q[self.gap], omega + v[self.gap], theta, v[self.rotor] / self.ratio, self.drive
         return theta, omega, theta, v[self.rotor] / self.ratio, self.drive
 
-    def _apply_laws(self, v: float, load: float) -> None:
-        """Set load torque, frictionloss, armature and inductance from the laws at the present state, per step."""
+    def _apply_laws(self, v: float, load: float, h: float) -> None:
+        """Set load torque, frictionloss, armature and inductance from the laws at the present state, for the next h [s]."""
         theta, w, _, _, _ = self._observe()
         j, t, c = self._drive(v), self.data.time, self.c
         if self.falls:
             self.model.actuator_dynprm[self.motor, TIME_CONSTANT] = c.tau_e * max(1.0 / (1.0 + (c.fall * j) ** 2), LEAST_IRON)
         for memory, p in self.memories:
-            p[-1] = memory(p, theta, w, j, self.model.opt.timestep)
+            p[-1] = memory(p, theta, w, j, h)
         force = load + sum(torque(p, theta, w, j, t) for torque, p in self.torques)
         for inertia, p in self.inertias:
             relative, half_slope = inertia(p, theta)
