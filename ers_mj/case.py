@@ -69,6 +69,11 @@ class Case:
         """What the answer leaves beyond the noise, by sensor."""
         return left_by_sensor(self.model, self.start.traces)
 
+    @cached_property
+    def left_before(self) -> dict[str, float]:
+        """What the refitted baseline leaves beyond the noise, by sensor."""
+        return left_by_sensor(self.start.fit.model, self.start.traces)
+
     @property
     def inertia(self) -> float | None:
         return self.datasheet.parameters.get("J") if self.datasheet is not None else None
@@ -115,9 +120,13 @@ class Case:
 
         One whose free run is lost with and without them tells nothing, as long as there are others: by ASTRAY, or, where the effects leave nothing beyond the
         noise (see remainder.py), by LOST, since stick and slip must have forked then. Where there are no others the observer's held-out error tells their share.
+        Where no error is above the noise, of which the estimate may be too large, and memory tells of a mismatch, memory tells the share.
         """
         forked = not more_is_missing(self.left, None)
         above = [(b, a, noise) for b, a, noise in self.confirmed.shown if b.sure > VISIBLE * noise]
+        if not above and more_is_missing(self.left_before, None):
+            kind = max(self.left_before, key=self.left_before.get)
+            return _share(*(math.expm1(left[kind]) for left in (self.left_before, self.left)), 0.0)
         told = [ends for ends in above if min(ends[0].sure, ends[1].sure) < (LOST if forked else ASTRAY) * ends[2]]
         if told or not forked:
             shares = [_share(b.sure**2, a.sure**2, noise**2) for b, a, noise in told or above]
@@ -130,7 +139,7 @@ class Case:
         """Whether the model leaves more than noise (see remainder.py): of the output nothing where free runs leave none, whatever forks in the observer."""
         free = self.fits["train_rmse_after_rad"] < FREE * self.noise and self.fits["heldout_rmse_after_rad"] < FREE_HELD * self.noise
         left = {**self.left, "output": 0.0} if free else self.left
-        return more_is_missing(left, left_by_sensor(self.start.fit.model, self.start.traces) if self.model.names else None)
+        return more_is_missing(left, self.left_before if self.model.names else None)
 
     @property
     def told_effects(self) -> tuple[str, ...]:

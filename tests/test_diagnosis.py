@@ -183,6 +183,14 @@ def test_where_all_free_runs_fork_the_observer_tells_what_is_explained():
     assert Case._explained_each(case) == pytest.approx(0.875)
 
 
+@pytest.mark.parametrize("before, explained", [(0.2, 0.75), (0.05, 0.0)])
+def test_where_no_error_is_above_the_noise_memory_tells_what_is_explained(before, explained):
+    errors = [(SimpleNamespace(sure=0.99), SimpleNamespace(sure=0.9), 1.0)]
+    left, left_before = ({"output": float(np.log1p(power)), "current": 0.0} for power in (before / 4, before))
+    case = SimpleNamespace(confirmed=SimpleNamespace(shown=errors), left=left, left_before=left_before)
+    assert Case._explained_each(case) == pytest.approx(explained)
+
+
 @pytest.mark.parametrize("explained, left, after, part", [(0.95, 0.2, 3.0, True), (0.99, 0.2, 3.0, False), (0.95, 0.05, 3.0, False), (0.95, 0.2, 9.0, False)])
 def test_what_memory_and_held_out_error_both_miss_is_left(explained, left, after, part):
     case = SimpleNamespace(told_effects=("supply_sag",), explained=explained, left={"output": left}, fits={"heldout_rmse_after_rad": after}, noise=1.0)
