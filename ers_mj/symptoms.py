@@ -1,5 +1,7 @@
 """What a signal shows of the instrument that took it: held spans, noise, and the step of its converter."""
 
+import math
+
 import numpy as np
 from scipy.ndimage import median_filter
 
@@ -13,6 +15,8 @@ ON_LATTICE = 0.18  # of a step by which a gap may miss a multiple of it: a coars
 ONE_STEP = 0.3  # of a step by which gaps of one step, seen through a finer converter, may differ
 LEAP = 3.5, 6.0, 1.5  # grid steps, noise levels and usual changes that the catching up after a held span must exceed at least
 LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
+DITHER, COLOURED = 0.35, 3.0  # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may let it stay
+FEWEST_TURNS = 5  # of the reading within NEIGHBOURS, as noise makes them and motion does not
 RARER = 0.1  # share of the gaps of one step that either kind has at least, where a converter behind makes two kinds of them
 FLOAT32 = float(np.finfo(np.float32).eps)
 WITHIN = 1.75  # times the smallest gap between rounded levels up to which a gap is one step of the converter ahead
@@ -31,6 +35,24 @@ def frozen_spans(y: np.ndarray, grid: float) -> list[slice]:
     repeats = np.clip(np.mean(np.diff(y) == 0), by_chance, 0.9)
     shortest = max(SHORTEST_HELD, int(np.ceil(2 * np.log(len(y)) / -np.log(repeats))))
     return [s for s in held_spans(y, shortest) if _dithered(y, s)]
+
+
+def unmoved_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
+    """Repeats of y (N,) longer than noise of DITHER steps and more, ``sigma`` with the converter's own, leaves a reading alone, if it is less than a step,
+    and just before or after which the reading goes to and fro: a rudder at rest may be quieter than a moving one.
+    """
+    noise = math.sqrt(max(sigma**2 - grid**2 / 12.0, 0.0))
+    if not DITHER * grid < noise < grid:
+        return []
+    repeats = math.erf(grid / (math.sqrt(8.0) * noise))  # in the middle of a step
+    shortest = math.ceil(COLOURED * 2.0 * math.log(len(y)) / -math.log(repeats))
+    return [s for s in held_spans(y, shortest) if max(map(_turns, _around(y, s))) >= FEWEST_TURNS]
+
+
+def _turns(changes: np.ndarray) -> int:
+    """How often changes from sample to sample turn their sign, those of zero left out."""
+    signs = np.sign(changes[changes != 0])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))
 
 
 def leapt_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ers_mj.converter import COARSE, Converter
 from ers_mj.recording import Recording
-from ers_mj.symptoms import at_extreme, converter_step, frozen_spans, leapt_spans, spikes
+from ers_mj.symptoms import at_extreme, converter_step, frozen_spans, leapt_spans, spikes, unmoved_spans
 
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
@@ -128,12 +128,18 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     """
     load = -recording.load / inertia if recording.load is not None and inertia else None
     y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
-    stuck = [s for s in frozen_spans(y, recording.quantum) if not at_extreme(y, s)]
-    stuck += [s for s in leapt_spans(y, recording.quantum, sigma) if not any(s.start < other.stop and other.start < s.stop for other in stuck)]
+    stuck: list[slice] = []
+    for found in (frozen_spans(y, recording.quantum), unmoved_spans(y, recording.quantum, sigma)):
+        stuck += [s for s in found if not at_extreme(y, s) and not _meets(s, stuck)]
+    stuck += [s for s in leapt_spans(y, recording.quantum, sigma) if not _meets(s, stuck)]
     lost = (*spikes(np.where(recording.valid, y, np.nan), sigma), *stuck)
     trace = make_trace(recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum)
     trace = trace.without(lost)
     return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid), supply=_supply(recording))
+
+
+def _meets(span: slice, others: Sequence[slice]) -> bool:
+    return any(span.start < other.stop and other.start < span.stop for other in others)
 
 
 def counted(traces: Sequence[Trace], travel: float) -> list[Trace]:

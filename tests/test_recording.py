@@ -11,7 +11,7 @@ import pytest
 
 from ers_mj.errors import InputError
 from ers_mj.recording import converter_step, from_arrays, read_recording, write_recording
-from ers_mj.symptoms import leapt_spans, step_behind
+from ers_mj.symptoms import leapt_spans, step_behind, unmoved_spans
 from ers_mj.traces import start_seen
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -455,6 +455,18 @@ def test_a_rudder_that_breaks_loose_is_no_hold():
     t = np.arange(600) * 5e-3
     y = np.where(t < 1.5, 0.3 - 0.02 * np.exp(-8 * t), 0.3 + 40.0 * np.maximum(t - 1.5, 0.0) ** 2)
     assert leapt_spans(np.round(y / 2.5e-4) * 2.5e-4, 2.5e-4, 8e-5) == []
+
+
+@pytest.mark.parametrize("resting_noise, found", [(2.5e-4, [(2000, 2600)]), (0.0, [])])
+def test_a_sensor_that_hangs_at_rest_is_told_by_the_noise_that_no_longer_moves_it(resting_noise, found):
+    """Noise of half a converter's step moves a reading every few samples; a rudder that comes to rest without noise is no hang."""
+    rng, grid, n = np.random.default_rng(5), 5e-4, 8000
+    swing = 0.1 * np.sin(2 * np.pi * np.arange(2000) / 1000)
+    noise = np.where(np.abs(np.arange(n) - n / 2) < 2000, resting_noise, 2.5e-4) * rng.standard_normal(n)
+    y = np.round((np.concatenate([swing, np.full(n - 4000, swing[0]), swing]) + noise) / grid) * grid
+    if resting_noise:
+        y[2000:2600] = y[2000]
+    assert [(s.start, round(s.stop, -1)) for s in unmoved_spans(y, grid, 2.9e-4)] == found
 
 
 def test_a_leap_of_three_counts_is_chance():
