@@ -37,6 +37,7 @@ NEAR_LEAST = 0.5  # share of the gain that matters below which the best first re
 TIE, NEAR_TIE = 1.0, 0.02  # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
 NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) that this other must win itself to be told in its place
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
+HALF_STEP = 0.5  # of a coarse converter's, by which an effect moves the reading at least
 RIVAL = 0.3  # share of the leader's gain from which a candidate may take its place later
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 ANEW, ANEW_FROM = 8, 0.2  # starts from which a wave is fitted again that leaves so much C per block
@@ -199,12 +200,18 @@ def shows(candidate: Candidate) -> bool:
 
 
 def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
-    """Whether a knock moves the reading by less than a coarse converter's step: it stands for where the rudder began within one."""
-    if candidate.name not in BY_NAME or not BY_NAME[candidate.name].once or all(trace.converter is None for trace in traces):
+    """Whether a candidate moves the reading by less than a coarse converter's step, if it acts once, or by less than half a step: what is so small is
+    no more than what a model's own error makes of the moments at which thresholds are passed, or of where within a step the rudder began.
+
+    Of effects of the sensor itself confirmation judges (confirmation.py).
+    """
+    if candidate.name not in BY_NAME or BY_NAME[candidate.name].subsystem == "sensor" or all(trace.converter is None for trace in traces):
         return False
+    share = 1.0 if BY_NAME[candidate.name].once else HALF_STEP
     models = candidate.fit.model, candidate.fit.model.without_effect(candidate.name)
     moved = [(np.subtract(*(trace.plain(residuals_in(m, trace, k, OBSERVER_RATE)) for m in models)), trace) for k, trace in enumerate(traces)]
-    return all(trace.converter is not None and float(np.max(np.abs(d[:trace.t.size]))) * trace.sigma < trace.converter.step for d, trace in moved if np.any(d))
+    return all(trace.converter is not None and float(np.max(np.abs(d[:trace.t.size]))) * trace.sigma < share * trace.converter.step
+               for d, trace in moved if np.any(d))
 
 
 def priced(found: Fit) -> float:
