@@ -11,6 +11,7 @@ from ers_mj.identification import fit, residuals, run_of, step_of
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.race import Candidate, _is_within_a_step
 from ers_mj.recording import from_arrays
 from ers_mj.starts import with_starts
 from ers_mj.traces import counted, trace_of
@@ -121,3 +122,13 @@ def test_a_baseline_that_is_far_is_not_led_astray():
 
 def model(values):
     return Model(values, FREE, scales=replace(SCALES, recordings=1))
+
+
+@pytest.mark.parametrize("torque, within", [(0.02, True), (20.0, False)])
+def test_what_moves_the_reading_by_less_than_half_a_coarse_step_is_nothing_to_name(torque, within):
+    """Of a finer converter, which is not counted, the smallest torque stays a candidate."""
+    fine, truth = recorded()
+    coarse = counted([fine], float(np.ptp(fine.y)))
+    model = Model({**truth, "tau_e": 0.0, "emf_share": 0.0, "ampere": 1.0}, FREE, scales=SCALES).with_effect("bias_torque", np.array([torque]))
+    candidate = Candidate("bias_torque", replace(fit(model, coarse, steps=1), model=model), 10.0, 3.0, 0.0, 1.0)
+    assert _is_within_a_step(candidate, coarse) is within and not _is_within_a_step(candidate, [fine])
