@@ -93,8 +93,14 @@ class Case:
                 "recalibrated_rmse_before_rad": self._again[0].rmse, "recalibrated_rmse_after_rad": self._again[1].rmse,
                 "mujoco_heldout_rmse_before_rad": self.multibody[0], "mujoco_heldout_rmse_after_rad": self.multibody[1],
                 "noise_floor_rad": self.noise, "heldout_from": c.sentence,
-                "mujoco_heldout_from": f"the MuJoCo plant ran {', '.join(fold.held_out.name for fold in run_in_mujoco(c.parts))} of what was held out",
+                "mujoco_heldout_from": f"the MuJoCo plant ran {self._run_in_mujoco} of what was held out",
                 "selection_cost_before": self.start.fit.cost, "selection_cost_after": self.selection.chosen.cost}
+
+    @property
+    def _run_in_mujoco(self) -> str:
+        ran = run_in_mujoco(self.confirmed.parts)
+        cut = ran[0].t.size < self.confirmed.parts[0].held_out.t.size
+        return f"the first {ran[0].t[-1] - ran[0].t[0]:.0f} s of {ran[0].name}" if cut else ", ".join(trace.name for trace in ran)
 
     @cached_property
     def _again(self) -> tuple[Score, Score]:

@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg.blas import dger
 
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.model import OBSERVER_RATE, Columns, Model
@@ -29,6 +30,7 @@ FAR_HOP = 0.3  # length of the longest hop, in the transformed parameters
 SOFT = 3  # directions along which a fit hops, of least curvature
 HOP_GAIN = 0.3  # of C that a hop must win to be followed by further ones
 ROUGH, QUIET = 3.0, 0.02  # median misfit up to which, and C per block from which, a fit hops
+DENSE = 3e-3  # [s] between the samples that tell a fit's curvature: its slope is told by all of them
 HOPELESS = 0.02  # excess of C per block over a nested model at which a search is given up
 
 
@@ -208,6 +210,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
     Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised; ``jacobian`` is changed by it.
     """
     layout, blocks = run.model.layout(), Blocks.of(traces)
+    stride = max(1, round(DENSE / max(trace.sample_time for trace in traces)))
     z, damping, fresh = run.model.vector(layout), 1e-3, False
     final = not by_tangents or math.isfinite(renewals) or not _has_tangents(run.model, traces) or any(BY_NAME[name].dear for name in run.model.names)
 
@@ -229,8 +232,8 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
             jacobian, fresh = jacobian_of(run, traces, rate, by_tangents=by_tangents), True
             renewals -= 1
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
-        weighted = jacobian * weight[:, None]
-        hessian, slope = weighted.T @ jacobian, weighted.T @ run.left
+        some = jacobian.T[:, ::stride] * np.sqrt(weight[::stride])
+        hessian, slope = stride * (some @ some.T), jacobian.T @ (weight * run.left)
         _add_prior(layout, z, hessian, slope)
         step = None
         for _ in range(6 if fresh else 2):
@@ -253,7 +256,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
         moved, gain, was_fresh = goal - z, cost - trial[2], fresh
         promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
         if gain > 0.3 * promised and moved @ moved > 0:
-            jacobian.T[...] += np.outer(moved / (moved @ moved), trial[0].left - run.left - jacobian @ moved)
+            dger(1.0 / float(moved @ moved), trial[0].left - run.left - jacobian @ moved, moved, a=jacobian, overwrite_a=1)  # in place
             fresh = False
         else:
             jacobian = None
@@ -294,7 +297,8 @@ def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns |
     tangible = by_tangents and _has_tangents(model, traces)
     along = [k for k in wanted if tangible and (layout[k].owner not in BY_NAME or BY_NAME[layout[k].owner].tangible)]
     if along:
-        jacobian[:, along] = -model.changes(traces, rate, [others[k] for k in along], 1.0 / step, run.motions)
+        for k, column in zip(along, model.changes(traces, rate, [others[k] for k in along], 1.0 / step, run.motions).T):
+            np.negative(column, out=jacobian[:, k])
     for k in (k for k in wanted if k not in along):
         jacobian[:, k] = (residuals(others[k], traces, rate) - run.left) / step
     jacobian[~np.isfinite(jacobian)] = 0.0

@@ -284,7 +284,11 @@ class Model:
                     row[:trace.t.size] *= slope
                 row[unseen] = 0.0
                 if trace.channels:
-                    there = other.shown(trace, its, path + np.column_stack([move, move[:, 0]]) / scale)
+                    beside = np.empty_like(path)
+                    beside[:, :3], beside[:, 3] = move, move[:, 0]
+                    beside /= scale
+                    beside += path
+                    there = other.shown(trace, its, beside)
                     row[trace.t.size:] = np.concatenate([np.where(np.isfinite(c.values), (b - a) * scale, 0.0) / c.sigma
                                                          for c, a, b in zip(trace.channels, here, there)])
         return changes.T

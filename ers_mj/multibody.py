@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,13 +17,16 @@ from ers_mj.plants.reduced import lumped
 from ers_mj.plants.skeletons import bodily
 from ers_mj.traces import Trace
 
-MOST_SECONDS = 10.0  # [s] of held-out recordings that are run in MuJoCo, which takes a thousand times as long as the reduced model
+MOST_SECONDS = 5.0  # [s] of held-out recordings that are run in MuJoCo, which takes a thousand times as long as the reduced model
 
 
-def run_in_mujoco(parts: Sequence[Fold]) -> list[Fold]:
-    """The first of the held-out recordings: as many as last MOST_SECONDS together, one at least."""
-    ends = np.cumsum([fold.held_out.t[-1] - fold.held_out.t[0] for fold in parts])
-    return list(parts[:max(1, int(np.searchsorted(ends, MOST_SECONDS, side="right")))])
+def run_in_mujoco(parts: Sequence[Fold]) -> list[Trace]:
+    """The first of the held-out recordings: as many as last MOST_SECONDS together, or the first one's beginning."""
+    traces = [fold.held_out for fold in parts]
+    ends = np.cumsum([trace.t[-1] - trace.t[0] for trace in traces])
+    whole = int(np.searchsorted(ends, MOST_SECONDS, side="right"))
+    first = traces[0]
+    return traces[:whole] or [replace(first.part(0, int(np.searchsorted(first.t, first.t[0] + MOST_SECONDS))), start=first.start)]
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,8 @@ class Rig:
 
     def rmse(self, models: Sequence[Model], parts: Sequence[Fold], jobs: int) -> float | None:
         """Pooled free-run error [output unit] of the MuJoCo plants on what each model has not seen (see run_in_mujoco); None where one runs away."""
-        parts = run_in_mujoco(parts)
+        traces = run_in_mujoco(parts)
         with ThreadPoolExecutor(jobs) as pool:
-            outputs = list(pool.map(self.free_run, models, [fold.held_out for fold in parts]))
-        errors = np.concatenate([(fold.held_out.y - y)[fold.held_out.valid] for y, fold in zip(outputs, parts)])
+            outputs = list(pool.map(self.free_run, models, traces))
+        errors = np.concatenate([(trace.y - y)[trace.valid] for y, trace in zip(outputs, traces)])
         return math.sqrt(float(np.mean(errors**2))) if np.all(np.isfinite(errors)) else None

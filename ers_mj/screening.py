@@ -23,6 +23,7 @@ LEAST_KNOCK = 3.0  # of C that a recording must leave for a knock to be looked f
 PEAK = 30.0  # factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
 USUAL = 0.95  # share of the blocks that are no worse than a bad one
 HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
+LEAD, TAIL = 0.1, 2.0  # [s] before a knock begins and after, in which it is tried
 IDLE, HALVINGS = 0.1, 6  # of C that a push which moves little changes; of the way from it to the next that throws the rudder
 
 
@@ -80,7 +81,7 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
             if effect.once:
                 if place is not places[0]:
                     continue
-                found = _knocks(place, effect, effect.starts(scales), e, targets[0][2], traces, tau)
+                found = _knocks(run, effect, effect.starts(scales), targets[0][2], traces, tau)
             else:
                 starts = _hopeful(run, effect, effect.starts(scales), targets, traces, max(effect.tries, tries))
                 found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
@@ -120,9 +121,12 @@ def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]
 
 
 def _hopeful(run: Run, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace], tries: int) -> list[np.ndarray]:
-    """Of many starts of a law, those that promise most to first order along a place's own motion."""
+    """Of many starts of a law, those that promise most to first order along a place's own motion.
+
+    To choose among them the tangents of one body are near enough, whatever stops, delays and sensors make of them.
+    """
     place = run.model
-    if len(starts) <= tries + 1 or not (effect.torque or effect.friction) or not place.has_tangents:
+    if len(starts) <= tries + 1 or not (effect.torque or effect.friction) or place.plant().has_motor_side:
         return starts
     waves = 2 if effect.wave else 1
     every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
@@ -150,20 +154,21 @@ def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
     return {f.key: column for f, column in zip(layout, jacobian.T)}, out
 
 
-def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.ndarray, target: np.ndarray, traces: Sequence[Trace],
-            tau: float) -> list[tuple[float, Model]]:
+def _knocks(run: Run, effect: Effect, starts: Sequence[np.ndarray], target: np.ndarray, traces: Sequence[Trace], tau: float) -> list[tuple[float, Model]]:
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all for a small one, so that no secant
     may be scaled. The best starts of different side, length or recording, brought nearer, with what they gain in C as a share of the residual. What a coarse
     converter's thresholds tell counts as rounding here: a knock bends to when one of them was passed.
     """
-    ends, best = np.cumsum([0, *(trace.rows for trace in traces)]), {}
+    place, best = run.model, {}
     column = [p.name for p in effect.parameters].index("record")
+    near = _Surroundings(run, traces, tau)
 
     def gain(start):
         k = int(start[column])
-        left = e[ends[k]:ends[k + 1]], residuals_in(place.with_effect(effect.name, start), traces[k], k, OBSERVER_RATE)
-        without, beside = (float(np.sum(score(Blocks.of([traces[k]]).misfit(traces[k].plain(some)), tau))) for some in left)
-        return without - beside if np.isfinite(beside) else -math.inf
+        trace, without = near.of(k, start[1])
+        beside = residuals_in(place.with_effect(effect.name, start), trace, k, OBSERVER_RATE)
+        gained = without - near.cost(trace, beside)
+        return gained if np.isfinite(gained) else -math.inf
 
     tried: dict[tuple, list[tuple[float, np.ndarray]]] = {}
     for start in starts:
@@ -174,6 +179,35 @@ def _knocks(place: Model, effect: Effect, starts: Sequence[np.ndarray], e: np.nd
             best[kind] = max(best.get(kind, (0.0, start)), (won, start), key=lambda found: found[0])
     nearer = [_nearer(gain, start) for won, start in sorted(best.values(), key=lambda found: -found[0])[:effect.tries] if won > 0]
     return [(2.0 * won / float(target @ target), place.with_effect(effect.name, start)) for won, start in nearer]
+
+
+class _Surroundings:
+    """The part of a recording around a moment, from LEAD before it to TAIL after, begun in the state that a run had there: what a knock changes is in
+    it, and simulated in a fraction of the time. All of the recording where that state is more than position, speed and current.
+    """
+
+    def __init__(self, run: Run, traces: Sequence[Trace], tau: float):
+        self.run, self.traces, self.tau, self.known = run, traces, tau, {}
+        place = run.model
+        self.whole = not place.has_tangents or place.plant().bends or any(BY_NAME[name].memory for name in place.names)
+
+    def cost(self, trace: Trace, e: np.ndarray) -> float:
+        """C of the residuals (rows,) of a trace, its converter's thresholds aside."""
+        return float(np.sum(score(Blocks.of([trace]).misfit(trace.plain(e)), self.tau)))
+
+    def of(self, record: int, moment: float) -> tuple[Trace, float]:
+        """The part around a moment [s], and C of the run there."""
+        trace = self.traces[record]
+        begin, end = 0, trace.t.size
+        if not self.whole and trace.converter is None:
+            blocks = math.floor((moment - LEAD - trace.t[0]) / BLOCK), math.ceil((moment + TAIL - trace.t[0]) / BLOCK)
+            begin, end = (int(np.searchsorted(trace.block, min(block, trace.block[-1] + after))) for after, block in enumerate(blocks))
+        if (record, begin, end) not in self.known:
+            theta, omega = self.run.motions[record][begin, :2]
+            start = (theta + self.run.model.offset(record), omega) if begin else trace.start
+            part = trace if (begin, end) == (0, trace.t.size) else replace(trace.part(begin, end), start=start)
+            self.known[record, begin, end] = part, self.cost(part, residuals_in(self.run.model, part, record, OBSERVER_RATE))
+        return self.known[record, begin, end]
 
 
 def _between(gain: Callable[[np.ndarray], float], pushes: Sequence[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:

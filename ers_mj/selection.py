@@ -54,7 +54,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
            jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
-    What takes longest, the sweeps and what is begun once more the other way round, is left out after MOST_EFFORT, and no round begins after LAST_BEGUN.
+    What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle, is left out after MOST_EFFORT, and no round
+    begins after LAST_BEGUN.
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
     end, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_BEGUN))
@@ -63,7 +64,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took) and EFFORT.spent < last:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
-        ranked = candidates(current, traces, tau, jobs, (*exclude, *current.model.names), anchors if not rounds else (), least)
+        unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
+        ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), least)
         if ranked and least <= ranked[0].gain <= MODEST and mended < _most_mended(current):
             again = _less(ranked[0], traces, tau)
             won = float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum())
@@ -91,11 +93,15 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             continue
         ranked = rounds[-1]
         took = ranked[0].gain / max(ranked[0].gain, float(score(current.misfit, tau).sum()))
+        before, judged_at = current, tau
         current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
         current, rounds = _reconsidered(current, rounds, traces, tau)
         tau = tau_of(current.misfit)
         traces = _restarted(current.model, traces)
         current = fit(current.model, traces, tau=tau, steps=20)
+        if (other := _in_its_place(current, before, rounds[-1], judged_at)) is not None:
+            rounds[-1] = other
+            current = fit(other[0].fit.model, traces, tau=tau, steps=20)
         if not is_dear(current):
             current, _ = hopped(current, traces, tau, jobs)
         if near_noise(current):
@@ -121,6 +127,17 @@ def _reconsidered(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Seq
     for name in early:
         model = model.without_effect(name)
     return fit(model, traces, tau=tau, steps=20), [ranked for ranked in rounds if ranked[0].name not in early]
+
+
+def _in_its_place(current: Fit, before: Fit, ranked: tuple[Candidate, ...], tau: float) -> tuple[Candidate, ...] | None:
+    """The candidates of a round that added its leader to the model ``before``, with a rival first where the refit has made of the leader a form of another
+    effect (see Effect.really); None where it is still itself, or still the likeliest.
+    """
+    name = ranked[0].name
+    if name not in current.model.names or really(name, current) == name:
+        return None
+    others = likeliest_first(sorted((judged(name, current, before, tau), *ranked[1:]), key=lambda c: -c.worth))
+    return None if others[0].name == name else tuple(others)
 
 
 def _is_cheap_and_wrong(current: Fit, base: Fit, traces: Sequence[Trace]) -> bool:
@@ -154,6 +171,13 @@ def _of_one_body(plant: ReducedModel) -> bool:
 
 def _of_two_bodies(plant: ReducedModel) -> bool:
     return plant.has_motor_side
+
+
+def _bending_and_twisting(model: Model) -> list[str]:
+    """The effects that make a plant whose friction bends a bristle and whose shaft twists, which the model's has only one of."""
+    starts = ((name, effect.starts(model.scales)[:1]) for name, effect in BY_NAME.items() if effect.subsystem == "transmission" or effect.dear)
+    plants = ((name, model.with_effect(name, start).plant()) for name, some in starts if name not in model.names for start in some)
+    return [name for name, plant in plants if plant.bends and plant.has_motor_side]
 
 
 def _may_twist(current: Fit) -> bool:

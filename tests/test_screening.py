@@ -10,14 +10,14 @@ from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.errors import InputError
-from ers_mj.identification import fit, residuals, score, tau_of
+from ers_mj.identification import fit, residuals, residuals_in, run_of, score, tau_of
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first
 from ers_mj.recording import from_arrays
-from ers_mj.screening import Begin, Screened, _between, _hot, _promise, _targets, screen, stands_out
-from ers_mj.selection import _begun_anew, _exchanged, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
+from ers_mj.screening import Begin, Screened, _between, _Surroundings, _hot, _promise, _targets, screen, stands_out
+from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -181,6 +181,21 @@ def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
     assert size == pytest.approx(-300.0, rel=0.3) and begin == pytest.approx(2.24, abs=0.02) and length == pytest.approx(0.08, rel=0.3) and record == 0
 
 
+def test_a_knock_is_tried_in_its_surroundings(pushed):
+    """What begins in the run's own state gains there what it gains in all of the recording; beside a memory all of it is simulated."""
+    run, trace = run_of(pushed.fit.model, pushed.traces, 5.0), pushed.traces[1]
+    near = _Surroundings(run, pushed.traces, 1.0)
+    for moment in (0.02, 1.4, 2.95):
+        gains = []
+        for part, without in (near.of(1, moment), (trace, near.cost(trace, residuals_in(run.model, trace, 1, 5.0)))):
+            knocked = run.model.with_effect("load_disturbance", np.array([300.0, moment, 0.08, 1.0]))
+            gains.append(without - near.cost(part, residuals_in(knocked, part, 1, 5.0)))
+        assert gains[0] == pytest.approx(gains[1], rel=0.02, abs=0.02) and abs(gains[0]) > 0.5
+    assert near.of(1, 2.95)[0].t.size < 0.25 * trace.t.size and near.of(1, 0.02)[0].t.size < trace.t.size
+    warm = run.model.with_effect("thermal_drift", BY_NAME["thermal_drift"].starts(run.model.scales)[0])
+    assert _Surroundings(run_of(warm, pushed.traces, 5.0), pushed.traces, 1.0).of(1, 1.4)[0] is trace
+
+
 def test_a_knock_is_sought_on_to_where_it_throws_the_rudder():
     """A shaft twists under less, which gains a little; what moves the rudder lies in a window of a sixth above its friction."""
     def gain(push):
@@ -252,6 +267,12 @@ def test_a_sweep_ends_when_enough_has_been_simulated(pushed):
     assert [c.name for c in _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, before + 1)] == ["bias_torque"]  # one body first
 
 
+def test_what_bends_and_twists_takes_longest(pushed):
+    model = pushed.fit.model
+    beside = {name: _bending_and_twisting(model.with_effect(name, BY_NAME[name].starts(model.scales)[0])) for name in ("presliding", "backlash", "stribeck")}
+    assert beside == {"presliding": ["backlash", "shaft_compliance"], "backlash": ["presliding"], "stribeck": []}
+
+
 def test_a_second_sweep_leaves_two_bodies_out(pushed, monkeypatch):
     tried = []
     monkeypatch.setattr(selection, "fit", lambda model, *_, **__: tried.append(model.names) or pushed.fit)
@@ -290,6 +311,17 @@ def test_a_shaft_whose_motor_bears_nothing_is_a_filter_in_the_drive(pushed):
     for rho, first in ((0.2, "inductance"), (0.4, "shaft_compliance")):
         assert likeliest_first([found("shaft_compliance", [50.0, 0.7, rho, 0.0, np.inf], 21.0), winding])[0].name == first
     assert not BY_NAME["shaft_compliance"].grown("shaft_compliance", np.array([50.0, 0.7, 0.2, 0.0, np.inf]), pushed.fit.model.scales)
+
+
+def test_what_a_refit_turns_into_another_effect_gives_way_to_it(pushed):
+    def found(name, p, gain):
+        return replace(judged(name, replace(pushed.fit, model=pushed.fit.model.with_effect(name, np.array(p))), pushed.fit, 1.0), gain=gain)
+
+    shaft, winding = found("shaft_compliance", [50.0, 0.7, 0.4, 0.0, np.inf], 21.0), found("inductance", [2e-3, np.inf], 0.0)
+    for rho, first in ((0.2, "inductance"), (0.4, None)):
+        now = pushed.fit.model.with_effect("shaft_compliance", np.array([50.0, 0.7, rho, 0.0, np.inf]))
+        other = _in_its_place(replace(pushed.fit, model=now), pushed.fit, (shaft, winding), 1.0)
+        assert other is None if first is None else other[0].name == first and len(other) == 2
 
 
 def test_a_stop_that_is_touched_once_is_no_knock(monkeypatch):

@@ -4,7 +4,8 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Sensor
 
-NEWTON, FLATTEST = 6, 0.2  # steps that take a sensor's error off a reading, and the least slope of a reading
+NEWTON, FLATTEST = 6, 0.2  # steps that take a sensor's error off a reading at most, and the least slope of a reading
+SETTLED = 1e-12  # [output unit] of a step after which no other follows
 ORDERS = (0.5, 1, 2, 3, 4, 6, 8)  # periods within the travel from which a fit is begun
 
 
@@ -43,7 +44,10 @@ class SensorNonlinearity(Sensor):
     def behind(self, p, y):
         theta = y
         for _ in range(NEWTON):
-            theta = theta + (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), FLATTEST)
+            step = (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), FLATTEST)
+            theta = theta + step
+            if np.nanmax(np.abs(step), initial=0.0) < SETTLED:
+                break
         return theta
 
     def _slope(self, p, theta):

@@ -15,12 +15,13 @@ from ers_mj.plants.laws import N_PARAMETERS, rows_of
 from ers_mj.plants.tangents import prepare_kernel, tangent_kernel
 
 ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
-PLAIN, LAW, TWO_BODIES, TANGENT = 150, 400, 800, 60  # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on a bristle; of a tangent
+PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = 150, 400, 800, 2000, 60  # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on
+# a bristle, of both; of a tangent
 OVERHEAD = 20  # samples whose handling takes another microsecond
 
 
 class Effort:
-    """What has been simulated so far by this process, in the microseconds that it takes a core of 3 GHz, about: a clock that goes alike on every machine,
+    """What has been simulated so far by this process, in the microseconds that it takes a slow core, about: a clock that goes alike on every machine,
     whatever runs beside."""
 
     def __init__(self):
@@ -123,10 +124,11 @@ class ReducedModel:
         enable = np.ones(t.size, np.bool_) if enable is None else enable
         load = np.zeros(t.size) if load is None else load
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
-        EFFORT.add(t, TWO_BODIES if self.coupled else LAW if on[:2, 0].any() else PLAIN)
+        both = self.bends and self.has_motor_side
+        EFFORT.add(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on[:2, 0].any() else PLAIN)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
         kernel = simulate_kernel
-        if self.bends and self.has_motor_side:
+        if both:
             from ers_mj.plants.fixed_steps import simulate_kernel as kernel  # here alone: it takes seconds to compile and is seldom needed
         kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p.copy(), refine, x0, out)
         return out
