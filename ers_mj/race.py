@@ -167,7 +167,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             pace = max(PACE * least, PACE_SHARE * leading)
             ends = dict(pool.map(onward, ((label, best[label]) for label in running)))
             running = [label for label in running if total(best[label]) - total(ends[label]) > pace
-                       and not (label[0] in BY_NAME and BY_NAME[label[0]].dear)]
+                       and not (label[0] in BY_NAME and BY_NAME[label[0]].dear or bends_and_twists(ends[label]))]
             best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
             running = contending(running, best)
         best = leaders(best)
