@@ -9,9 +9,10 @@ import pytest
 from ers_mj.baseline import baseline
 from ers_mj.confirmation import _halved, _is_a_converters, _may_be_none, _no_closer, _p_of, _scores
 from ers_mj.datasheet import Datasheet
-from ers_mj.evaluation import Score, folds, halves, refits
+from ers_mj.evaluation import Fold, Score, folds, halves, refits
 from ers_mj.identification import fit
 from ers_mj.intervals import half_widths, unseen_widths
+from ers_mj.multibody import MOST_SECONDS, run_in_mujoco
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
@@ -130,3 +131,13 @@ def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks():
     assert _no_closer(score(1.4), score(1.0), 1e-6) and not _no_closer(score(0.9), score(1.0), 0.04)
     assert not _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 1e-6) and _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 0.04)
     assert _no_closer(score(0.9, 0.9, 9.0), score(1.0, 1.0, 5.0), 1e-6)
+
+
+def test_mujoco_runs_a_few_seconds_of_what_was_held_out():
+    def held(seconds):
+        t = np.arange(0.0, seconds, 1e-2)
+        return Fold(trace_of(from_arrays(t, np.sin(t), np.sin(t), name=f"{seconds} s"), None), None)
+
+    (long,) = run_in_mujoco([held(9.0), held(2.0)])
+    assert long.name == "9.0 s" and long.t[-1] == pytest.approx(MOST_SECONDS, abs=0.011)
+    assert [trace.name for trace in run_in_mujoco([held(2.0), held(2.5), held(2.0)])] == ["2.0 s", "2.5 s"]

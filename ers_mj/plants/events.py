@@ -41,6 +41,7 @@ EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is gi
 BRISTLE_CORNER = 0.03  # the same for a rudder that no friction slows: share of c_1 h below which it bounces out of sight
 STILL = 5e-5  # share of a bristle's friction within which its rudder rests
 LEAST_LEVEL = 0.2  # of the mean friction, which laws cannot lower a bristle's beyond
+LEAST_LEFT = 0.2  # of its level that a bristle is taken to have left to bend beyond what it has, where that sets a step
 FULL = 1.0 - 1e-4  # share of its friction's level at which a bristle counts as bent to the full
 CALM = 0.2  # share of a speed, or of a twist's distance to the ends of the play, that a leap over a whole sample must leave
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
@@ -430,7 +431,11 @@ def _rate(c, m, x, tau, a_emf):
         rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
     if _has_bristle(c):
         if m[3] == 0:
-            rate += math.sqrt(c[K_BRISTLE]) + c[D_BRISTLE] + c[DAHL] * 2.0 ** c[DAHL] * c[K_BRISTLE] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS])
+            most = 2.0  # what is left to bend, over the level, which for exponents above 1 slows the bending as it gets less
+            if c[DAHL] > 1.0:
+                most = min(abs(1.0 - math.copysign(2.0, x[1]) * c[K_BRISTLE] * (x[0] - x[3]) / (c[C_PLUS] + c[C_MINUS])) + LEAST_LEFT, 2.0)
+            rate += (math.sqrt(c[K_BRISTLE]) + c[D_BRISTLE]
+                     + 2.0 * c[DAHL] * most ** (c[DAHL] - 1.0) * c[K_BRISTLE] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS]))
     elif c[TWO] > 0:
         rate = rate / min(c[RHO], 1.0 - c[RHO])
         if m[4] != 0:
