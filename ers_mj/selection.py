@@ -28,7 +28,7 @@ SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of st
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH)
-MOST_EFFORT, LAST_BEGUN = 60_000_000, 100_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked for that does not show by itself,
+MOST_EFFORT, LAST_BEGUN = 60_000_000, 160_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked for that does not show by itself,
 # and no round is begun; more by as much as the recordings last longer than a MINUTE together
 MINUTE = 60.0  # [s]
 GOOD_PART = 0.35  # share of C that a round must take away for a third where the model stays wrong
