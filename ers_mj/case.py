@@ -34,6 +34,7 @@ ASTRAY = 30.0  # times the noise by which the free run of every held-out recordi
 HALF = 0.5  # share of the squared held-out error that the named effects must explain
 NEARLY_ALL = 0.98  # that another form of the right law explains
 LEFT = 0.115  # of what is left in the output (see remainder.py), 0.35 noise levels, from which it counts beside that share
+FAINT = 0.065  # of the same, from which a model without effects is told to miss something (remainder.SIGNIFICANT would have it looked for at length)
 LOST = 6.0  # noise levels of free-run error after, from which stick and slip that fork are what a free run misses
 
 
@@ -145,7 +146,7 @@ class Case:
         """Whether the model leaves more than noise (see remainder.py): of the output nothing where free runs leave none, whatever forks in the observer."""
         free = self.fits["train_rmse_after_rad"] < FREE * self.noise and self.fits["heldout_rmse_after_rad"] < FREE_HELD * self.noise
         left = {**self.left, "output": 0.0} if free else self.left
-        return more_is_missing(left, self.left_before if self.model.names else None)
+        return more_is_missing(left, self.left_before if self.model.names else None) or not self.model.names and left["output"] > FAINT
 
     @property
     def told_effects(self) -> tuple[str, ...]:
