@@ -34,7 +34,7 @@ ASTRAY = 30.0  # times the noise by which the free run of every held-out recordi
 HALF = 0.5  # share of the squared held-out error that the named effects must explain
 NEARLY_ALL = 0.98  # that another form of the right law explains
 LEFT = 0.115  # of what is left in the output (see remainder.py), 0.35 noise levels, from which it counts beside that share
-FAINT = 0.065  # of the same, from which a model without effects is told to miss something (remainder.SIGNIFICANT would have it looked for at length)
+FAINT = 0.065  # of the same, 0.26 noise levels, from which a model without effects misses something; sought at length is what leaves remainder.SIGNIFICANT
 LOST = 6.0  # noise levels of free-run error after, from which stick and slip that fork are what a free run misses
 
 
@@ -94,7 +94,7 @@ class Case:
                 "recalibrated_rmse_before_rad": self._again[0].rmse, "recalibrated_rmse_after_rad": self._again[1].rmse,
                 "mujoco_heldout_rmse_before_rad": self.multibody[0], "mujoco_heldout_rmse_after_rad": self.multibody[1],
                 "noise_floor_rad": self.noise, "heldout_from": c.sentence,
-                "mujoco_heldout_from": f"the MuJoCo plant ran {self._run_in_mujoco} of what was held out",
+                "mujoco_heldout_from": f"of what was held out the MuJoCo plant ran {self._run_in_mujoco}",
                 "selection_cost_before": self.start.fit.cost, "selection_cost_after": self.selection.chosen.cost}
 
     @property
