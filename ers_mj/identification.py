@@ -147,19 +147,20 @@ def converged(found: Fit, rival: Fit, traces: Sequence[Trace], tau: float) -> Fi
     return min(ends, key=lambda f: f.cost)
 
 
-def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restart: bool = False) -> tuple[Fit, Sequence[Trace]]:
+def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restart: bool = False,
+           quiet: float = QUIET) -> tuple[Fit, Sequence[Trace]]:
     """The fit after hops along its softest directions, as long as they pay, and the traces it belongs to.
 
     One start leads into one dent of many (see ``converged``). A hop goes as far as the fit's own curvature prices at HOP, and
     descends from there; ``restart`` fits the initial states again, which a wrong model has bent. Only near the noise are dents what
-    keeps a fit from its floor: beyond ROUGH the model itself is wrong, below QUIET nothing is left to win.
+    keeps a fit from its floor: beyond ROUGH the model itself is wrong, below ``quiet`` nothing is left to win.
     """
     def land(start):
         begun = with_starts(start, traces) if restart else traces
         return descend(start, begun, OBSERVER_RATE, tau, 12, 0.03), begun
 
     for _ in range(MOST_HOPS):
-        if not near_noise(found) or float(np.mean(score(found.misfit, tau))) < QUIET:
+        if not near_noise(found) or float(np.mean(score(found.misfit, tau))) < quiet:
             break
         layout = found.model.layout()
         z, (curvature, directions) = found.model.vector(layout), np.linalg.eigh(found.hessian)
@@ -171,6 +172,11 @@ def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restar
             break
         found, traces = best, begun
     return found, traces
+
+
+def is_rough(traces: Sequence[Trace]) -> bool:
+    """Whether a converter is so coarse that C has dents wherever a threshold is passed a sample sooner or later."""
+    return any(trace.converter is not None for trace in traces)
 
 
 def near_noise(found: Fit) -> bool:

@@ -7,9 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import Fit, fit, hopped, near_noise, score, tau_of
-from ers_mj.model import Model
+from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residuals_in, score, tau_of
+from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.reduced import EFFORT, ReducedModel
 from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, is_quiet, judged,
                          likeliest, likeliest_first, priced, really, shows)
@@ -21,6 +23,7 @@ from ers_mj.traces import Trace
 LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the one that acts
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LATER_Z = 2.0  # and beside an effect
+PLAIN = 1.3  # noise levels of what a model leaves of a coarse converter's readings, rounding being noise, from which it is wrong
 MISSED = 100.0  # of C by which a model is worse without an effect that nothing else will stand for
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
@@ -76,9 +79,10 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
                 ranked = [judged(c.name, c.fit, current, tau) for c in ranked]
         least_z = LATER_Z if current.model.names else LEAST_Z
         outstanding = stands_out(current.misfit, tau)
-        if not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and EFFORT.spent < end and _is_cheap_and_wrong(current, base, traces):
+        rough = not swept and EFFORT.spent < end and _is_rough_and_wrong(current, traces)
+        if rough or not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and EFFORT.spent < end and _is_cheap_and_wrong(current, base, traces):
             kinds = _of_one_body if swept else _any  # the second body, which takes most of the time, once a case
-            ranked, swept = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, kinds)), True
+            ranked, swept = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, kinds, rough)), True
         elif ranked and EFFORT.spent < end and _may_twist(current) and not ranked[0].fit.model.plant().has_motor_side:
             ranked = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, _of_two_bodies))
         if rounds and ranked and EFFORT.spent < end and not is_quiet(current, tau):
@@ -111,7 +115,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
 
 def _restarted(model: Model, traces: Sequence[Trace]) -> Sequence[Trace]:
     """The traces with new starts where converters are coarse: within a step a model tells where the rudder began, and a wrong one tells it wrongly."""
-    return with_starts(model, traces) if any(trace.converter is not None for trace in traces) else traces
+    return with_starts(model, traces) if is_rough(traces) else traces
 
 
 def _reconsidered(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float) -> tuple[Fit, list[tuple[Candidate, ...]]]:
@@ -144,6 +148,16 @@ def _is_cheap_and_wrong(current: Fit, base: Fit, traces: Sequence[Trace]) -> boo
     """Whether a model of one body, which is simulated fast, leaves more than noise (see remainder.py)."""
     without = left_by_sensor(base.model, traces) if current.model.names else None
     return not current.model.plant().coupled and more_is_missing(left_by_sensor(current.model, traces), without)
+
+
+def _is_rough_and_wrong(current: Fit, traces: Sequence[Trace]) -> bool:
+    """Whether a model of one body is further from the readings of a coarse converter than their noise is (PLAIN): behind one, C is so rough that a screening
+    promises nothing of what acts, and what is left has lost its memory (see remainder.py).
+    """
+    if current.model.plant().coupled or not is_rough(traces):
+        return False
+    parts = [trace.plain(residuals_in(current.model, trace, k, OBSERVER_RATE)[:trace.t.size])[trace.valid] for k, trace in enumerate(traces)]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) > PLAIN
 
 
 def _is_doubtful(current: Fit, tau: float) -> bool:
@@ -186,12 +200,13 @@ def _may_twist(current: Fit) -> bool:
 
 
 def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float, exclude: Sequence[str], jobs: int, end: float = math.inf,
-           kinds: Callable[[ReducedModel], bool] = _any) -> list[Candidate]:
+           kinds: Callable[[ReducedModel], bool] = _any, hops: bool = False) -> list[Candidate]:
     """What a screening missed when it found nothing to add: where stick and slip fork, the secant of the very effect that acts may promise nothing.
 
     Every effect that makes a plant of these ``kinds``, is not dear and has few starts is refitted from these as they are, whatever they make worse on the way,
     those of one body first, until the EFFORT reaches ``end``; those are returned that gain more than the screening's refit of the same effect. One whose
-    several numbers end at their bounds is none: a shaft of 1000 Hz without a resonance. Beside a bristle, where a refit takes long, every other start will do.
+    several numbers end at their bounds is none: a shaft of 1000 Hz without a resonance. With ``hops``
+    a refit does not rest in the first dent of C. Beside a bristle, where a refit takes long, every other start will do.
     """
     effects = [effect for effect in BY_NAME.values() if not effect.dear and not effect.once and effect.name not in exclude]
     starts = [(effect.name, base.model.with_effect(effect.name, start)) for effect in effects
@@ -207,7 +222,8 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
         return fit(model, traces, tau=tau, steps=SWEEP)
 
     def carried_on(candidate):
-        return judged(candidate.name, fit(candidate.fit.model, traces, tau=tau, steps=20), base, tau)
+        found = fit(candidate.fit.model, traces, tau=tau, steps=20)
+        return judged(candidate.name, hopped(found, traces, tau, 1, quiet=-math.inf)[0] if hops else found, base, tau)
 
     known, best = {c.name: c.gain for c in ranked}, []
     with ThreadPoolExecutor(jobs) as pool:
