@@ -153,7 +153,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         foremost = [name for name in screened.promising(failed) if name not in failed][:FOREMOST]
         own = {*foremost, *(name for name in screened.promising() if base.model.names and not is_dear(base) and not BY_NAME[name].dear)}  # where bent
         best, ahead = dict(first), [label for label in starts if label[1] == 0 and label[0] in own] if bent else []
-        for label, found in pool.map(finish, [(label, begin) for label in ahead for begin in starts[label]]):
+        early = [(label, begin) for label in ahead for begin in starts[label]]
+        ended = list(pool.map(finish, early))
+        for label, found in ended:
             best[label] = min(best[label], found, key=total)
         worth = {name for name, found in leaders(best).items() if bent or reference - total(found) >= AGAIN * most}
         worth = {*contending(worth, leaders(best)), *foremost, *(name for name in screened.promising(failed) if not BY_NAME[name].sized)}
@@ -171,7 +173,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
             running = contending(running, best)
         best = leaders(best)
-        for name, found in pool.map(finish, overlooked(best)):
+        late = list(pool.map(onward, overlooked(best)))
+        leading = reference - min(map(total, best.values()), default=reference)
+        for name, found in pool.map(finish, [(name, found) for name, found in late if reference - total(found) >= AGAIN * leading]):
             best[name] = min(best.get(name, found), found, key=total)
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
@@ -179,10 +183,13 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         finished = dict(pool.map(finish, rough[:close]))
-        for name, found in pool.map(finish, [] if bends_and_twists(base) else _anew(finished, traces, tau)):
+        explained = min(map(total, finished.values())) <= QUIET * base.misfit.size
+        for name, found in pool.map(finish, [] if explained or bends_and_twists(base) else _anew(finished, traces, tau)):
             finished[name] = min(finished[name], found, key=total)
         others = _other_forms(finished, {name: begins for (name, place), begins in starts.items() if place == 0})
-        for name, found in pool.map(finish, [*others, *_wider(finished, exclude)]):
+        others = [(name, begin) for name, begin in others if not any(begin is known for _, known in early)]
+        known = [(label[0], found) for label, found in ended if label[0] in finished]
+        for name, found in (*known, *pool.map(finish, [*others, *_wider(finished, exclude)])):
             if name not in best or priced(found) < priced(finished.get(name, best[name])):
                 finished[name] = found
         ranked = sorted((judged(*item, base, tau) for item in {**dict(rough), **finished}.items()), key=lambda c: -c.worth)

@@ -24,6 +24,7 @@ PEAK = 30.0  # factor by which a block's tau + misfit must fall, more than a for
 USUAL = 0.95  # share of the blocks that are no worse than a bad one
 HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
 LEAD, TAIL = 0.1, 2.0  # [s] before a knock begins and after, in which it is tried
+RUNAWAY = 1e12  # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
 IDLE, HALVINGS = 0.1, 6  # of C that a push which moves little changes; of the way from it to the next that throws the rudder
 
 
@@ -131,6 +132,7 @@ def _hopeful(run: Run, effect: Effect, starts: list[np.ndarray], targets, traces
     waves = 2 if effect.wave else 1
     every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
     changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, run.motions).T
+    changes[~(np.max(np.abs(changes), axis=1) < RUNAWAY)] = 0.0
     ends = _ends(effect, traces)
     shares = np.max([_shares(changes, waves, ends, target, effect.signed)[0] for target in targets], axis=0)
     best = sorted(np.argsort(shares)[::-1][:tries])
