@@ -188,9 +188,13 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             finished[name] = min(finished[name], found, key=total)
         others = _other_forms(finished, {name: begins for (name, place), begins in starts.items() if place == 0})
         others = [(name, begin) for name, begin in others if not any(begin is known for _, known in early)]
-        known = [(label[0], found) for label, found in ended if label[0] in finished]
-        for name, found in (*known, *pool.map(finish, [*others, *_wider(finished, exclude)])):
-            if name not in best or priced(found) < priced(finished.get(name, best[name])):
+        known, wider = [(label[0], found) for label, found in ended if label[0] in finished], _wider(finished, exclude)
+        for name, found in (*known, *pool.map(finish, others)):
+            if priced(found) < priced(finished[name]):
+                finished[name] = found
+        for name, found in pool.map(finish, wider):
+            kept = finished.get(name, best.get(name))
+            if kept is None or priced(found) < priced(kept) - (max(TIE, NEAR_TIE * (reference - total(kept))) if BY_NAME[name].dear else 0.0):
                 finished[name] = found
         ranked = sorted((judged(*item, base, tau) for item in {**dict(rough), **finished}.items()), key=lambda c: -c.worth)
         rivals = len(_rivals(ranked))
@@ -256,7 +260,10 @@ def _form(model: Model, name: str) -> tuple[bool, ...]:
 
 
 def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:
-    """Effects that have a finished one as their limit, with the models that begin there: what is wider is no worse, if its fit finds it."""
+    """Effects that have a finished one as their limit, with the models that begin there: what is wider is no worse, if its fit finds it.
+
+    What is dear gives way to its own wider form only beyond a tie: that takes several times as long to simulate, and one dent may decide.
+    """
     out = []
     for name, found in finished.items():
         if name in BY_NAME:

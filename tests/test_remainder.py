@@ -8,7 +8,7 @@ from test_confirmation import NOISE, TRUTH, started, trace
 
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
-from ers_mj.remainder import left_by_sensor, remembered
+from ers_mj.remainder import left_by_sensor, left_elsewhere, remembered
 from ers_mj.symptoms import converter_step
 from ers_mj.traces import trace_of
 
@@ -44,6 +44,20 @@ def test_a_mismatch_below_the_noise_is_seen():
               for k, name in enumerate(("multisine", "steps", "chirp"))]
     start = started(traces)
     assert left_by_sensor(start.fit.model, start.traces)["output"] > 0.1
+
+
+def test_what_one_recording_alone_shows_is_not_left_elsewhere():
+    """A wave in one of three recordings is seen by the mean over all, and not by that over the others; a wave in each is seen by both."""
+    def left(bent):
+        traces = [trace(name, sensor=lambda y, size=2.0 * (name in bent): y + size * NOISE * np.sin(600.0 * y), seed=k)
+                  for k, name in enumerate(("multisine", "steps", "chirp"))]
+        model = started([trace("multisine")]).fit.model
+        return left_by_sensor(model, traces)["output"], left_elsewhere(model, traces)
+
+    one, every = left(("multisine",)), left(("multisine", "steps", "chirp"))
+    assert one[0] > 0.1 and one[1] < 0.03
+    assert every[0] > 0.3 and every[1] > 0.2
+    assert left_elsewhere(started([trace("multisine")]).fit.model, [trace("multisine", sensor=lambda y: y + 9.0 * NOISE * np.sin(600.0 * y))]) == 0.0
 
 
 @pytest.mark.parametrize("rate", [1000, 50, 10])

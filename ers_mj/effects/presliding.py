@@ -8,7 +8,8 @@ from ers_mj.effects.base import Friction, Parameter
 
 RIGID_HZ = 2000.0  # natural frequency of the bristle (against J) above which friction is rigid: 4e-5 deg of displacement in Table 1
 GROWN = 1.4  # exponent at which the search for another than 1 begins
-FADING = 0.1  # share of the recordings' speed at which the search begins
+DAMPED, FADING = 0.5, 0.1  # damping ratio, and the share of the recordings' speed at which it fades, with which the search begins
+LASTING = 10.0  # times that speed from which damping does not fade in these recordings
 
 
 class Presliding(Friction):
@@ -34,11 +35,15 @@ class Presliding(Friction):
 
     def starts(self, scales):
         least, most = 2 * scales.noise, 0.05 * scales.position
-        return [np.array([x_s, 0.5, w_d, math.inf]) for x_s in np.geomspace(most, least, 4) for w_d in (FADING * scales.speed, math.inf)]
+        return [np.array([x_s, DAMPED, w_d, math.inf]) for x_s in np.geomspace(most, least, 4) for w_d in (FADING * scales.speed, math.inf)]
 
     def grown(self, name, p, scales):
-        """One of another exponent, without damping or with it, from one of exponent 1."""
-        return [np.array([p[0], zeta, math.inf, GROWN]) for zeta in (0.02, p[1])] if name == self.name and not np.isfinite(p[3]) else []
+        """One of another exponent, without damping or with it, from one of exponent 1; and one whose damping fades, where that of p does not: begun
+        with a bristle much too stiff, as which it shows first, it may have lost its damping on the way."""
+        if name != self.name or np.isfinite(p[3]):
+            return []
+        fading = [np.array([p[0], DAMPED, FADING * scales.speed, math.inf])] if p[2] > LASTING * FADING * scales.speed else []
+        return fading + [np.array([p[0], zeta, math.inf, GROWN]) for zeta in (0.02, p[1])]
 
     def coefficients(self, p, c):
         level = 0.5 * (c.c_2_plus + c.c_2_minus)
