@@ -13,6 +13,7 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.race import Candidate, _is_within_a_step
 from ers_mj.recording import from_arrays
+from ers_mj.selection import _is_rough_and_wrong
 from ers_mj.starts import with_starts
 from ers_mj.traces import counted, trace_of
 from test_observer import TRUTH
@@ -107,6 +108,17 @@ def test_what_is_smaller_than_a_step_shows():
         without = fit(model(truth), traces)
         gains.append(without.cost - fit(without.model.with_effect(*gust[0]), traces).cost)
     assert gains[0] > 6.0 and gains[0] > 4.0 * gains[1] and gains[2] < 1.0, gains
+
+
+@pytest.mark.parametrize("torque, wrong", [(0.0, False), (8.0, True)])
+def test_a_model_further_from_the_readings_than_their_rounding_is_wrong(torque, wrong):
+    """Where no screening would tell, the sweep begins: not of a finer converter, nor beside what is simulated slowly."""
+    trace, truth = recorded([("bias_torque", np.array([torque]))] if torque else ())
+    coarse = counted([trace], float(np.ptp(trace.y)))
+    found = fit(model(truth), with_starts(model(truth), coarse))
+    assert _is_rough_and_wrong(found, coarse) is wrong and not _is_rough_and_wrong(found, [trace])
+    bristle = replace(found, model=found.model.with_effect("presliding", np.array([1e-3, 0.2, np.inf, np.inf])))
+    assert not _is_rough_and_wrong(bristle, coarse)
 
 
 def test_a_baseline_that_is_far_is_not_led_astray():

@@ -16,7 +16,7 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first
 from ers_mj.recording import from_arrays
-from ers_mj.screening import Begin, Screened, _between, _Surroundings, _hot, _promise, _targets, screen, stands_out
+from ers_mj.screening import Begin, Screened, _between, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
 from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
 from ers_mj.traces import trace_of
 
@@ -77,6 +77,26 @@ def test_a_shaft_that_twists_by_less_than_the_noise_is_none(pushed):
     stiff, soft = (replace(pushed.fit, model=pushed.fit.model.with_effect("shaft_compliance", np.array([f, 0.4, 0.3, 0.6, np.inf]))) for f in (756.0, 90.0))
     assert not race.shows(judged("shaft_compliance", stiff, pushed.fit, 1.0)) and race.shows(judged("shaft_compliance", soft, pushed.fit, 1.0))
     assert race.shows(judged("friction_level", pushed.fit, pushed.fit, 1.0))
+
+
+def test_a_tangent_that_runs_away_promises_nothing(pushed, monkeypatch):
+    """Beside a stiff bristle a law's tangent may leave all bounds: the start is passed over, and the other ones are compared as before."""
+    model, effect = pushed.fit.model, BY_NAME["load_dependent_friction"]
+    run = run_of(model, pushed.traces, 5.0)
+    starts = [size * effect.starts(model.scales)[0] for size in (1.0, 1.1, 1.2, 1.3, 1.4)]
+    targets, changes = _targets(model, run.left, pushed.traces, 1.0)[1], type(model).changes
+    whole = _hopeful(run, effect, starts, targets, pushed.traces, 3)
+    monkeypatch.setattr(type(model), "changes", lambda *a: changes(*a) + np.where(np.arange(len(starts)) == lost, size, 0.0))
+    for lost, size in ((0, np.inf), (0, np.nan), (2, 1e200)):
+        assert len(whole) == len(some := _hopeful(run, effect, starts, targets, pushed.traces, 3)) == 3
+        assert all(start is not starts[lost] for start in some)
+
+
+def test_a_bristle_is_begun_with_damping_that_fades_where_it_was_lost(pushed):
+    scales, effect = pushed.fit.model.scales, BY_NAME["presliding"]
+    lasting, fading = (np.array([1e-3, 0.1, w_d, np.inf]) for w_d in (10.0 * scales.speed, 0.1 * scales.speed))
+    assert [p[0] == 1e-3 and p[2] < scales.speed for p in effect.grown("presliding", lasting, scales)] == [True, False, False]
+    assert not any(p[2] < np.inf for p in effect.grown("presliding", fading, scales))
 
 
 def test_a_promise_that_failed_is_no_measure_for_the_others():
