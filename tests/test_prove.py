@@ -3,12 +3,14 @@
 import ast
 import json
 import signal
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ers_mj.cli import main
+from ers_mj.commands.output import plain
 from ers_mj.datasheet import read_datasheet
 from ers_mj.effects import EFFECTS
 from ers_mj.errors import InputError
@@ -268,6 +270,27 @@ def test_shares_are_those_of_the_contract():
     assert results["of"]["pair_recall_visible"] == [1, 1]
     assert results["confusion"]["backlash"] == {"unexplained": 1} and results["confusion"]["nothing"] == {"nothing": 1, "stribeck": 1}
     assert sum(b["of"] for b in results["reliability"]) == 6 and results["error_over_floor"]["median"] == 2.0
+
+
+def test_proofs_of_several_seeds_are_pooled(tmp_path, capsys):
+    """The pooled shares are those of all cases together; a proof given twice, or none, is one sentence."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
+    pooling = pytest.importorskip("pool_proofs", reason="analysis/ is not beside the tests")
+    told = {41: [truth_and_answer("null", [], []), truth_and_answer("several", ["cogging", "stribeck"], ["cogging"], each={"cogging": 8.0, "stribeck": 0.6})],
+            42: [truth_and_answer("single", ["cogging"], ["cogging"]), truth_and_answer("single", ["cogging"], ["stribeck"])]}
+    for seed, pairs in told.items():
+        (tmp_path / str(seed)).mkdir()
+        (tmp_path / str(seed) / "results.json").write_text(json.dumps(plain({"seed": seed, "rows": [scoring.row_of(*pair) for pair in pairs]})))
+    folders = [str(tmp_path / str(seed)) for seed in told]
+    assert pooling.main(folders) == 0
+    lines = {line[:58].strip(): line[58:].split() for line in capsys.readouterr().out.splitlines()}
+    assert lines["single effects named right, by class"][:3] == ["1", "of", "2"]
+    assert lines["effects found, of several at once"][:3] == ["1", "of", "2"]
+    assert lines["null cases with a named effect"][:3] == ["0", "of", "1"]
+    assert "4 cases of seeds 41 (2 cases), 42 (2 cases)" in lines and "0 to 1                0 of 1" in lines
+    for bad, word in (([folders[0]] * 2, "twice"), ([str(tmp_path)], "results.json")):
+        assert pooling.main(bad) == 2
+        assert word in capsys.readouterr().err
 
 
 def test_a_failed_case_is_wrong_and_counted():
