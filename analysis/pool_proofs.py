@@ -59,7 +59,7 @@ def _read(folders: Sequence[Path]) -> list[dict]:
             proof = json.loads((folder / "results.json").read_text())
         except (OSError, ValueError):
             raise InputError(f"{folder}: a finished proof with a results.json was expected, `ers prove --out {folder}` makes one") from None
-        if not isinstance(proof, dict) or "rows" not in proof or "concealed_in_real" in proof:
+        if not isinstance(proof, dict) or not {"rows", "seed"} <= proof.keys() or "concealed_in_real" in proof:
             raise InputError(f"{folder}: its results.json is not that of a proof on simulated servos")
         if proof["seed"] in (other["seed"] for other in proofs):
             raise InputError(f"{folder}: seed {proof['seed']} is given twice, proofs of different seeds were expected")

@@ -34,7 +34,7 @@ ASTRAY = 30.0  # times the noise by which the free run of every held-out recordi
 HALF = 0.5  # share of the squared held-out error that the named effects must explain
 NEARLY_ALL = 0.98  # that another form of the right law explains
 LEFT = 0.115  # of what is left in the output (see remainder.py), 0.35 noise levels, from which it counts beside that share
-FAINT = 0.05  # of the same in the recordings but the worst, 0.23 noise levels, from which a model without effects misses something: of 65 that miss nothing none leaves it
+FAINT = 0.05  # of the same in the recordings but the worst, 0.23 noise levels, from which a model without effects misses something: none of 65 nulls (4133 to 4135) leaves it
 LOST = 6.0  # noise levels of free-run error after, from which stick and slip that fork are what a free run misses
 
 
