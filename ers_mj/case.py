@@ -40,7 +40,8 @@ LOST = 6.0  # noise levels of free-run error after, from which stick and slip th
 
 @dataclass(frozen=True)
 class Case:
-    """Everything that is known when the work is done, and what follows from it."""
+    """Everything that is known when the work is done, and what follows from it; ``suspects`` are the laws without a name that act
+    here (see mimics.py)."""
 
     recordings: Sequence[Recording]
     holdout: list[Recording]
@@ -49,6 +50,7 @@ class Case:
     selection: Selection
     confirmed: Confirmed
     sensors: Mapping[str, np.ndarray]
+    suspects: tuple[Candidate, ...]
     seed: int
     rig: Rig
     multibody: tuple[float | None, float | None]
@@ -160,14 +162,14 @@ class Case:
         """One of diagnosis.json's verdicts."""
         if self.told_effects or self.sensors:
             return "missing_physics"
-        if self.model.names or self.more_is_missing or self._astray():
+        if self.model.names or self.suspects or self.more_is_missing or self._astray():
             return "unexplained"
         return "consistent" if self._datasheet_explains() else "parameters_only"
 
     @property
     def more_is_left(self) -> bool:
         """Whether a mismatch stays that nothing named accounts for."""
-        return self.verdict == "unexplained" or self.told_effects != self.model.names or self.more_is_missing or self._is_a_part()
+        return self.verdict == "unexplained" or bool(self.suspects) or self.told_effects != self.model.names or self.more_is_missing or self._is_a_part()
 
     def _is_a_part(self) -> bool:
         """Whether memory and held-out error agree that the named effects are a part only, as the mimic of an unknown effect is."""

@@ -16,7 +16,9 @@ from ers_mj.confirmation import confirmed
 from ers_mj.converter import COARSE
 from ers_mj.datasheet import Datasheet
 from ers_mj.document import Diagnosis, told
+from ers_mj.effects import SUSPECTS
 from ers_mj.identification import polished
+from ers_mj.mimics import unmasked
 from ers_mj.model import MOST_TAU, Model
 from ers_mj.starts import without_spikes
 from ers_mj.multibody import Rig
@@ -53,18 +55,21 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
     sensors = _symptoms(recordings, start.traces, travel)
-    chosen = select(start.fit, start.traces, anchors=start.anchors, exclude=_ordinary(start.fit.model), jobs=jobs, progress=progress)
+    chosen = select(start.fit, start.traces, anchors=start.anchors, exclude=(*_ordinary(start.fit.model), *SUSPECTS), jobs=jobs, progress=progress)
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
     chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs)
+    named, suspects = unmasked(selection, start.traces, jobs)
+    if named is not selection:
+        selection, judged = confirmed(start, named, held, jobs)
     progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
     before = rig.rmse(judged.base_models, judged.parts, jobs)
     multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
     progress("locating", 0.92)
-    case = Case(recordings, list(holdout), datasheet, start, selection, judged, sensors, seed, rig, multibody)
+    case = Case(recordings, list(holdout), datasheet, start, selection, judged, sensors, suspects, seed, rig, multibody)
     return told(case, held)
 
 

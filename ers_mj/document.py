@@ -54,9 +54,8 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "parameters": _parameters(case), "next_recording": next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit),
         "data": _data(case), "seed": case.seed, "versions": _versions(),
     }
-    if verdict == "unexplained":
-        document["suspects"] = [{"effect": c.name, "sentence": f"buys {c.gain:.1f} of {case.start.fit.cost:.1f} of the misfit"}
-                                for c in (case.selection.rounds[0] if case.selection.rounds else ())[:3] if c.name in BY_NAME]
+    if verdict == "unexplained" or case.suspects:
+        document["suspects"] = _suspects(case)
     views = _views(case, samples)
     evidence = Evidence(tuple(views), tuple(_ladder(case)), residual_map(samples), case.noise, case.output_unit,
                         case.recordings[0].input_unit, spectrum)
@@ -68,6 +67,14 @@ def _missing(case: Case) -> list[dict]:
     effects = [_effect(case, name) for name in case.told_effects]
     effects.sort(key=lambda e: (BY_NAME[e["effect"]].once, -float(np.sum(score(case.confirmed.without[e["effect"]].misfit, 1.0)))))
     return effects + sensors
+
+
+def _suspects(case: Case) -> list[dict]:
+    """The laws without a name that act here, then what else the first round found."""
+    first = case.selection.rounds[0] if case.selection.rounds else ()
+    others = [c for c in first[:3] if c.name in BY_NAME] if case.verdict == "unexplained" else []
+    return ([{"effect": c.name, "sentence": f"{BY_NAME[c.name].sentence}: buys {c.gain:.1f} of the misfit"} for c in case.suspects]
+            + [{"effect": c.name, "sentence": f"buys {c.gain:.1f} of {case.start.fit.cost:.1f} of the misfit"} for c in others])
 
 
 def _effect(case: Case, name: str) -> dict:
@@ -194,7 +201,8 @@ def _sentence(case: Case, missing: list, found: list[Place]) -> str:
             before, after = (_shown(fits[f"recalibrated_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
         return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
     place = next((p.sentence for p in found if p.axis != "subsystem"), "")
-    return (f"Something acts here that no effect of the library accounts for (the best explains {case.explained:.0%} of the held-out "
+    alike = f", but acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}" if case.suspects else ""
+    return (f"Something acts here that no effect of the library accounts for{alike} (the best explains {case.explained:.0%} of the held-out "
             f"error); {place or 'it is spread over the whole record'}.")
 
 
@@ -254,8 +262,9 @@ def _ladder(case: Case):
 
 def _improved(case: Case) -> Datasheet:
     """The improved model: refitted lumped values in [lumped], effects in a reader's units."""
-    lumped = {k: float(case.model.values[k]) for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")}
-    extra = {k: float(case.model.values[k]) for k in ("tau_e", "emf_share")}
+    model = case.model if case.told_effects or not case.model.names else case.start.fit.model
+    lumped = {k: float(model.values[k]) for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")}
+    extra = {k: float(model.values[k]) for k in ("tau_e", "emf_share")}
     effects = []
     for name in case.told_effects:
         entries = {p["name"]: p["entry"]["value"] for p in _effect_parameters(case, name)}

@@ -98,7 +98,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         ranked = rounds[-1]
         took = ranked[0].gain / max(ranked[0].gain, float(score(current.misfit, tau).sum()))
         before, judged_at = current, tau
-        current = _pruned(ranked[0].fit, ranked[0].name, traces, tau)
+        current = pruned(ranked[0].fit, ranked[0].name, traces, tau)
         current, rounds = _reconsidered(current, rounds, traces, tau)
         tau = tau_of(current.misfit)
         traces = _restarted(current.model, traces)
@@ -343,7 +343,7 @@ def _begun_anew(name: str, without: Model) -> list[Model]:
     return [model for model in begun if _of_two_bodies(plant := model.plant()) and not plant.bends] if not without.plant().has_motor_side else []
 
 
-def _pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> Fit:
+def pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> Fit:
     """Without the earlier effects that no longer pay; what a few steps along one Jacobian show to be sorely MISSED is not tried to the end."""
     for name in (n for n in current.model.names if n != newest):
         without = fit(current.model.without_effect(name), traces, tau=tau, steps=4, renewals=1)

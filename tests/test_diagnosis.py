@@ -117,6 +117,15 @@ def test_what_the_library_has_no_name_for_is_unexplained(step):
     assert ("sensor_quantisation" in [m["effect"] for m in document["missing"]]) is bool(step)
 
 
+def test_a_mimic_is_not_named_where_a_law_without_a_name_explains_more(dead_zone):
+    """A motor whose iron saturates is no sagging supply, which takes two thirds of it; a dead zone is no form of such a law."""
+    document = diagnose(recordings([("torque_saturation", np.array([0.15, 24.0]))]), read_datasheet("table1")).document
+    assert (document["verdict"], document["missing"]) == ("unexplained", [])
+    assert [s["effect"] for s in document["suspects"][:2]] == ["torque_saturation", "supply_sag"]
+    assert document["remainder"]["significant"] and "acts like a torque that is not in proportion to the current" in document["sentence"]
+    assert "suspects" not in dead_zone.document
+
+
 def test_without_a_datasheet_everything_is_identified():
     document = diagnose(recordings(names=("multisine", "steps")), None).document
     assert document["verdict"] != "consistent"

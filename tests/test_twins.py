@@ -18,7 +18,8 @@ SIZES = {  # where the first start of an effect is too small to be seen beside t
     "end_stop": [0.15, 0.35, 100.0, 0.3], "sensor_quantisation": [0.0213], "voltage_saturation": [5.0, 8.0],
     "load_disturbance": [150.0, 0.6, 0.5, 0.0], "sensor_dropout": [4.0, 0.08], "sensor_lag": [0.01, 0.0103],
     "cogging": [22.0, 0.125, 0.0, 0.3, 1.0], "sensor_nonlinearity": [0.2, 0.1, np.inf, np.inf, np.inf],
-    "shaft_compliance": [12.0, 0.1, 0.6, 0.2, 0.03],
+    "shaft_compliance": [12.0, 0.1, 0.6, 0.2, 0.03], "torque_saturation": [0.5, 24.0], "running_in": [0.5, 0.5],
+    "uneven_damping": [5.0, 3.0, 0.3, np.inf, np.inf, np.inf],
 }
 
 

@@ -21,6 +21,7 @@ def _members() -> tuple[Effect, ...]:
 
 EFFECTS: tuple[Effect, ...] = _members()
 BY_NAME: dict[str, Effect] = {effect.name: effect for effect in EFFECTS}
+SUSPECTS: tuple[str, ...] = tuple(effect.name for effect in EFFECTS if not effect.named)
 
 EQUIVALENT: tuple[frozenset[str], ...] = (
     frozenset({"bias_torque", "asymmetric_friction"}),
@@ -29,5 +30,5 @@ EQUIVALENT: tuple[frozenset[str], ...] = (
     frozenset({"cogging", "transmission_ripple"}),
 )
 
-__all__ = ["BY_NAME", "EFFECTS", "EQUIVALENT", "Coefficients", "Drive", "Effect", "Friction", "Load", "Parameter",
+__all__ = ["BY_NAME", "EFFECTS", "EQUIVALENT", "SUSPECTS", "Coefficients", "Drive", "Effect", "Friction", "Load", "Parameter",
            "Scales", "Sensor", "Transmission", "Twin"]

@@ -166,6 +166,7 @@ class Effect:
     sentence: ClassVar[str] = ""
     subsystem: ClassVar[str] = ""
     mjcf: ClassVar[str] = ""
+    named: ClassVar[bool] = True  # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see mimics.py)
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     wave: ClassVar[tuple[tuple[int, ...], int] | None] = None  # amplitudes (of which a start has one) and phase: the screening finds both from two quarter periods
