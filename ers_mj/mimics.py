@@ -15,7 +15,7 @@ from ers_mj.screening import screen
 from ers_mj.selection import Selection, pruned
 from ers_mj.traces import Trace
 
-NAMELESS_PRICE = 1.0  # of C by which a law without a name must be better: it is less common than any that has one
+NAMELESS_PRICE = 2.0  # of C by which a law without a name must be better: it is less common than those that have one
 QUICK, LONG = 8, 20  # steps of a first refit on a borrowed Jacobian, and of one to its end
 BEHIND = 0.5  # share of what the named effect buys by which a first refit may be behind it
 
