@@ -278,7 +278,8 @@ def test_proofs_of_several_seeds_are_pooled(tmp_path, capsys):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
     pooling = pytest.importorskip("pool_proofs", reason="analysis/ is not beside the tests")
     told = {41: [truth_and_answer("null", [], []), truth_and_answer("several", ["cogging", "stribeck"], ["cogging"], each={"cogging": 8.0, "stribeck": 0.6})],
-            42: [truth_and_answer("single", ["cogging"], ["cogging"]), truth_and_answer("single", ["cogging"], ["stribeck"])]}
+            42: [truth_and_answer("single", ["cogging"], ["cogging"]), truth_and_answer("single", ["cogging"], ["stribeck"]),
+                 truth_and_answer("outside", ["running_in"], [], verdict="unexplained", significant=True), truth_and_answer("outside", ["brush_drop"], ["stribeck"])]}
     for seed, pairs in told.items():
         (tmp_path / str(seed)).mkdir()
         (tmp_path / str(seed) / "results.json").write_text(json.dumps(plain({"seed": seed, "rows": [scoring.row_of(*pair) for pair in pairs]})))
@@ -288,7 +289,8 @@ def test_proofs_of_several_seeds_are_pooled(tmp_path, capsys):
     assert lines["single effects named right, by class"][:3] == ["1", "of", "2"]
     assert lines["effects found, of several at once"][:3] == ["1", "of", "2"]
     assert lines["null cases with a named effect"][:3] == ["0", "of", "1"]
-    assert "4 cases of seeds 41 (2 cases), 42 (2 cases)" in lines and "0 to 1                0 of 1" in lines
+    assert "6 cases of seeds 41 (2 cases), 42 (4 cases)" in lines and "0 to 1                0 of 1" in lines
+    assert {"kinds with a suspect's law     1 of 1", "kinds without                  0 of 1"} <= set(lines)
     for bad, word in (([folders[0]] * 2, "twice"), ([str(tmp_path)], "results.json")):
         assert pooling.main(bad) == 2
         assert word in capsys.readouterr().err
