@@ -198,7 +198,11 @@ class Case:
         return [], {}
 
     def rivals(self) -> tuple[tuple[str, Fit], list[tuple[str, Fit, float]]]:
-        """The answer and what the recordings do not exclude in its place, with probabilities: of the effect with the least certain name."""
+        """The answer and what the recordings do not exclude in its place, with probabilities: of the effect with the least certain name. Of a law without a name
+        the effect that explained most before."""
+        if self.suspects:
+            law, first = self.suspects[0], [c for ranked in self.selection.rounds[:1] for c in ranked if c.name in BY_NAME and c.name not in self.model.names]
+            return (law.name, law.fit), [(c.name, c.fit, probabilities({law.name: law.fit, c.name: c.fit})[c.name]) for c in first[:1]]
         chosen = self.selection.chosen
         best = (" and ".join(self.model.names) or "baseline", chosen), []
         for name in self.model.names or [ranked[0].name for ranked in self.selection.rounds[-1:] if ranked and self.more_is_missing]:

@@ -201,9 +201,9 @@ def _sentence(case: Case, missing: list, found: list[Place]) -> str:
             before, after = (_shown(fits[f"recalibrated_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
         return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
     place = next((p.sentence for p in found if p.axis != "subsystem"), "")
-    alike = f", but acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}" if case.suspects else ""
-    return (f"Something acts here that no effect of the library accounts for{alike} (the best explains {case.explained:.0%} of the held-out "
-            f"error); {place or 'it is spread over the whole record'}.")
+    much = (f"; it acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}" if case.suspects
+            else f" (the best explains {case.explained:.0%} of the held-out error)")
+    return f"Something acts here that no effect of the library accounts for{much}; {place or 'it is spread over the whole record'}."
 
 
 def _remainder(case: Case) -> dict:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.identification import Fit, fit, near_noise, polished
+from ers_mj.model import Model
 from ers_mj.race import LEAST_GAIN, LEAST_Z, Candidate, is_clocked, judged, priced
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import screen
@@ -50,7 +51,8 @@ def unmasked(selection: Selection, traces: Sequence[Trace], jobs: int) -> tuple[
     return replace(selection, chosen=told), tuple(suspects)
 
 
-def _is_slow(model) -> bool:
+def _is_slow(model: Model) -> bool:
+    """Whether a model has a second body or a bristle, beside which refits take long."""
     plant = model.plant()
     return plant.coupled or plant.bends
 

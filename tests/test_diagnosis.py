@@ -123,6 +123,7 @@ def test_a_mimic_is_not_named_where_a_law_without_a_name_explains_more(dead_zone
     assert (document["verdict"], document["missing"]) == ("unexplained", [])
     assert [s["effect"] for s in document["suspects"][:2]] == ["torque_saturation", "supply_sag"]
     assert document["remainder"]["significant"] and "acts like a torque that is not in proportion to the current" in document["sentence"]
+    assert [*document["next_recording"]["checked"]["against"]] == ["supply_sag"]
     assert "suspects" not in dead_zone.document
 
 
