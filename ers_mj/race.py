@@ -121,14 +121,15 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
 
     def overlooked(best):
         """The cheap laws, with models to refit, that explain less than CLOCKED of what leads with a clock of its own: on a borrowed Jacobian, or seen by its
-        secant, what has a threshold (a stop, a limit) does nothing until that is passed.
+        secant, what has a threshold (a stop, a limit) does nothing until that is passed. Beside what takes long to simulate, those alone that were screened.
         """
         leader = min(best, key=lambda name: total(best[name]), default=None)
         if leader is None or not is_clocked(leader) or reference - total(best[leader]) < least:
             return []
         laws = [effect for effect in BY_NAME.values() if not (is_clocked(effect.name) or effect.dear or effect.name in exclude)
                 and (effect.name not in best or reference - total(best[effect.name]) < CLOCKED * (reference - total(best[leader])))]
-        own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)] for effect in laws if not effect.sized}
+        own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)]
+               for effect in laws if not (effect.sized or is_dear(base))}
         twists = base.model.plant().has_motor_side  # a play or a shaft, which takes longest, is no knock
         return [(name, begin) for name in (effect.name for effect in laws) for begin in starts.get((name, 0), own.get(name, []))
                 if begin.model.plant().has_motor_side == twists]
