@@ -18,6 +18,7 @@ from ers_mj.effects import BY_NAME, EQUIVALENT
 from ers_mj.identification import Fit, converged, fit, near_noise, residuals_in, score
 from ers_mj.isolability import PARAMETER_PRICE, probabilities
 from ers_mj.model import OBSERVER_RATE, STATES, Model
+from ers_mj.plants.reduced import EFFORT
 from ers_mj.screening import PEAK, Begin, attainable, screen
 from ers_mj.traces import Blocks, Trace
 
@@ -78,12 +79,13 @@ def judged(name: str, found: Fit, base: Fit, tau: float) -> Candidate:
 
 
 def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str],
-               anchors: Sequence[Mapping[str, float]] = (), least: float = 0.0) -> list[Candidate]:
+               anchors: Sequence[Mapping[str, float]] = (), least: float = 0.0, last: float = math.inf) -> list[Candidate]:
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
 
     They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow and a
     mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that
-    matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for.
+    matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for. Once the EFFORT reaches ``last`` they are left
+    at their first refits, or where the last stage brought them: beside a bristle that stays wrong a race may take minutes.
     """
     if attainable(base.misfit, Blocks.of(traces).counts, tau) < LEAST_GAIN and score(base.misfit, tau).max() < math.log(PEAK):
         return []
@@ -113,6 +115,13 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
 
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
+
+    def spent():
+        return EFFORT.spent >= last  # asked between stages only, so that the answer does not hang on the number of jobs
+
+    def told(found):
+        """Those that the recordings can show, the likeliest first."""
+        return likeliest_first(sorted((c for c in found if shows(c) and not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
 
     def contending(labels, ends):
         """Those labels that may still be the explanation: all while none explains everything, then those with RIVAL of the best one's gain."""
@@ -153,19 +162,22 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         most = max((reference - total(f) for f in first.values()), default=0.0)
         foremost = [name for name in screened.promising(failed) if name not in failed][:FOREMOST]
         own = {*foremost, *(name for name in screened.promising() if base.model.names and not is_dear(base) and not BY_NAME[name].dear)}  # where bent
-        best, ahead = dict(first), [label for label in starts if label[1] == 0 and label[0] in own] if bent else []
+        best, ahead = dict(first), [label for label in starts if label[1] == 0 and label[0] in own] if bent and not spent() else []
         early = [(label, begin) for label in ahead for begin in starts[label]]
         ended = list(pool.map(finish, early))
         for label, found in ended:
             best[label] = min(best[label], found, key=total)
         worth = {name for name, found in leaders(best).items() if bent or reference - total(found) >= AGAIN * most}
         worth = {*contending(worth, leaders(best)), *foremost, *(name for name in screened.promising(failed) if not BY_NAME[name].sized)}
-        again = refitted([(label, begin) for label, begins in starts.items() if label[0] in worth and label not in ahead for begin in begins[1:]])
+        more = starts.items() if not spent() else ()
+        again = refitted([(label, begin) for label, begins in more if label[0] in worth and label not in ahead for begin in begins[1:]])
         best |= {label: min(best[label], found, key=total) for label, found in again.items()}
         if not bent:
             best = {(name, 0): found for name, found in leaders(best).items()}
         running = contending(best, best)
         for _ in range(LATER_LAPS if base.model.names else LAPS):
+            if spent():
+                break
             leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
             pace = max(PACE * least, PACE_SHARE * leading)
             ends = dict(pool.map(onward, ((label, best[label]) for label in running)))
@@ -174,7 +186,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
             running = contending(running, best)
         best = leaders(best)
-        late = list(pool.map(onward, overlooked(best)))
+        late = list(pool.map(onward, overlooked(best) if not spent() else []))
         leading = reference - min(map(total, best.values()), default=reference)
         for name, found in pool.map(finish, [(name, found) for name, found in late if reference - total(found) >= AGAIN * leading]):
             best[name] = min(best.get(name, found), found, key=total)
@@ -182,6 +194,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
             return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
+        if spent():
+            return told(judged(*item, base, tau) for item in rough)
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
         finished = dict(pool.map(finish, rough[:close]))
         explained = min(map(total, finished.values())) <= QUIET * base.misfit.size
@@ -202,7 +216,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         if rivals > 1:
             lead, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau), base, tau), ranked[:rivals])
-    return likeliest_first(sorted((c for c in ranked if shows(c) and not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
+    return told(ranked)
 
 
 def shows(candidate: Candidate) -> bool:

@@ -31,8 +31,8 @@ SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of st
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH)
-MOST_EFFORT, LAST_BEGUN = 60_000_000, 160_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked for that does not show by itself,
-# and no round is begun; more by as much as the recordings last longer than a MINUTE together
+MOST_EFFORT, LAST_RACED, LAST_BEGUN = 60_000_000, 50_000_000, 160_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
+# for that does not show by itself, a round beside a bristle is left at its first refits, and none is begun; more by as much as the recordings last longer than a MINUTE together
 MINUTE = 60.0  # [s]
 GOOD_PART = 0.35  # share of C that a round must take away for a third where the model stays wrong
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
@@ -58,17 +58,17 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle, is left out after MOST_EFFORT, and no round
-    begins after LAST_BEGUN.
+    begins after LAST_BEGUN; one beside a bristle that is under way at LAST_RACED goes no further than its first refits.
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
-    end, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_BEGUN))
+    end, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN))
     current, rounds, mended, swept, reviewed, took = base, [], 0, False, False, 0.0
     tau = tau_of(base.misfit)
     while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took) and EFFORT.spent < last:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
         unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
-        ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), least)
+        ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), least, raced if is_dear(current) else math.inf)
         if ranked and least <= ranked[0].gain <= MODEST and mended < _most_mended(current):
             again = _less(ranked[0], traces, tau)
             won = float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum())

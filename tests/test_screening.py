@@ -287,6 +287,21 @@ def test_a_sweep_ends_when_enough_has_been_simulated(pushed):
     assert [c.name for c in _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, before + 1)] == ["bias_torque"]  # one body first
 
 
+def test_a_race_ends_when_enough_has_been_simulated():
+    traces = []
+    for k, name in enumerate(("multisine", "steps")):
+        y = ReducedModel(lumped(TRUTH), [("input_delay", np.array([0.012]))]).simulate(T, INPUTS[name](T)).measured
+        traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+    start = baseline(traces, Datasheet(lumped=TRUTH), True, 1)
+    tau, efforts, told = tau_of(start.fit.misfit), [], []
+    for last in (np.inf, 0.0):
+        before = EFFORT.spent
+        told.append(candidates(start.fit, start.traces, tau, 1, (), (), LEAST_GAIN, last))
+        efforts.append(EFFORT.spent - before)
+    assert efforts[1] < 0.8 * efforts[0]
+    assert told[1] and told[1][0].gain > 0.5 * told[0][0].gain > LEAST_GAIN  # what was begun is told
+
+
 def test_what_bends_and_twists_takes_longest(pushed):
     model = pushed.fit.model
     beside = {name: _bending_and_twisting(model.with_effect(name, BY_NAME[name].starts(model.scales)[0])) for name in ("presliding", "backlash", "stribeck")}
