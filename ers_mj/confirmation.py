@@ -14,6 +14,7 @@ from ers_mj.evaluation import Fold, Score, folds, halves, paired_p, pooled, reca
 from ers_mj.identification import Fit, fit, polished, residuals_in, score
 from ers_mj.intervals import half_widths
 from ers_mj.model import OBSERVER_RATE, Model
+from ers_mj.race import stands_alone
 from ers_mj.selection import Selection
 from ers_mj.traces import START, Blocks, Trace
 
@@ -46,6 +47,7 @@ class Confirmed:
 def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) -> tuple[Selection, Confirmed]:
     """Judge each effect on held-out data; those that do not improve it beyond chance are taken out again."""
     parts, sentence = folds(start.traces, held)
+    alone = {ranked[0].name for ranked in selection.rounds if ranked and stands_alone(ranked[0], ranked)}
     base_models = refits(start.fit.model, parts, selection.tau, jobs)
     while True:
         model = selection.chosen.model
@@ -57,11 +59,11 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
             lesser_models[name] = refits(less, parts, selection.tau, jobs) if len(model.names) > 1 else base_models
             lesser = _scores(lesser_models[name], parts)
             without[name] = pooled(lesser)
-            p[name] = _p_of(name, after, lesser)
+            p[name] = _p_of(name, after, lesser, name in alone)
             pairs[name] = after, lesser
             if (p[name] > LARGEST_P or _no_closer(after, lesser, p[name])) and not held and len(start.traces) > 1:
                 record, *halved = _halved(model, less, after, lesser, start, selection.tau, jobs)
-                if (chance := _p_of(name, *halved)) < LARGEST_P:
+                if (chance := _p_of(name, *halved, name in alone)) < LARGEST_P:
                     p[name], pairs[name] = chance, halved
                     by_halves.add(record)
         failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(*pairs[n], p[n]))
@@ -82,8 +84,8 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         selection = replace(selection, chosen=reduced if reduced.model.names or reduced.model.states else start.fit)
 
 
-def _p_of(name: str, after: Sequence[Score], without: Sequence[Score]) -> float:
-    return paired_p(pooled(after).misfit, pooled(without).misfit, BY_NAME[name].once)
+def _p_of(name: str, after: Sequence[Score], without: Sequence[Score], alone: bool = False) -> float:
+    return paired_p(pooled(after).misfit, pooled(without).misfit, BY_NAME[name].once, alone)
 
 
 def _no_closer(after: Sequence[Score], without: Sequence[Score], p: float) -> bool:

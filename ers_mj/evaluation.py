@@ -19,6 +19,7 @@ from ers_mj.traces import Blocks, Trace
 TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
 LEAST_LOSS = 0.02  # of the score, which one block's noise makes of two equal models
 NULL_GAIN, NULL_GAIN_ONCE = 0.8, 1.5  # of C: decay of the tails of the largest gains that effect-free servos offer to laws, and to what acts once
+NULL_ALONE = 0.2  # share of them to which one law offers twice what any other does
 NULL_PEAK, PEAK_TAIL = 0.63, 1.2  # the worst block's (1 + misfit) / 2 of effect-free servos exceeds x in a share (x / NULL_PEAK)^-PEAK_TAIL of them
 RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
 LAST_PART = 0.7  # where the only recording is cut into training and held out
@@ -166,7 +167,7 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     return scored(found.model, trace, 1, cut), {name: (float(v[1]), *ends[name]) for name, v in found.model.states.items()}
 
 
-def paired_p(better: np.ndarray, worse: np.ndarray, once: bool = False) -> float:
+def paired_p(better: np.ndarray, worse: np.ndarray, once: bool = False, alone: bool = False) -> float:
     """One-sided p-value that ``better`` predicts held-out blocks no better than ``worse``: wins against losses over blocks.
 
     If neither is better the differences d of the scores lie alike on both sides of zero, so that the losses alone tell their scatter:
@@ -176,11 +177,12 @@ def paired_p(better: np.ndarray, worse: np.ndarray, once: bool = False) -> float
     Blocks are not independent, and the best of many effects was taken: the p-value is never below the share of servos without missing
     physics in which as large a gain is offered, by an exponential tail (analysis/null_gains.py: of 48 the largest gain of a law is 1.8; stick
     and slip that fork offer what acts ``once`` 2.2 to 3.6 in four of them). A knock is also known by the block that it serves best: the
-    worst one of 61 such servos is off by 3.7 to 5.8 sigma in three, by more than 2 in twelve.
+    worst one of 61 such servos is off by 3.7 to 5.8 sigma in three, by more than 2 in twelve. A law whose round offers no other nearly as much, ``alone``
+    (race.stands_alone), has what chance offers to one only, in a share NULL_ALONE of them.
     """
     d = score(worse, 1.0) - score(better, 1.0)
     losses = float(np.sum(np.minimum(d, 0.0) ** 2)) + d.size * LEAST_LOSS**2
-    chance = math.exp(-max(float(np.sum(d)), 0.0) / (NULL_GAIN_ONCE if once else NULL_GAIN))
+    chance = (NULL_ALONE if alone else 1.0) * math.exp(-max(float(np.sum(d)), 0.0) / (NULL_GAIN_ONCE if once else NULL_GAIN))
     if once:
         chance = min(chance, math.exp(-PEAK_TAIL * max(float(np.max(d)) - math.log(NULL_PEAK), 0.0)))
     return max(chance, 0.5 * math.erfc(float(np.sum(d)) / math.sqrt(2.0 * losses) / math.sqrt(2.0)))

@@ -23,6 +23,7 @@ from ers_mj.screening import PEAK, Begin, attainable, screen
 from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 3.0  # decrease of C that an effect must buy: one servo in forty without missing physics offers as much (evaluation.NULL_GAIN)
+ALONE = 1.5  # times what the best other explanation buys, that an effect buys which stands alone
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
 QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
@@ -87,7 +88,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for. Once the EFFORT reaches ``last`` they are left
     at their first refits, or where the last stage brought them: beside a bristle that stays wrong a race may take minutes.
     """
-    if attainable(base.misfit, Blocks.of(traces).counts, tau) < LEAST_GAIN and score(base.misfit, tau).max() < math.log(PEAK):
+    if attainable(base.misfit, Blocks.of(traces).counts, tau) < min(LEAST_GAIN, least) and score(base.misfit, tau).max() < math.log(PEAK):
         return []
     reference = float(score(base.misfit, tau).sum())
 
@@ -147,7 +148,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
     with ThreadPoolExecutor(jobs) as pool:
         quiet, bent = is_quiet(base, tau), not near_noise(base) or reference > BENT * base.misfit.size
-        screened = screen(places, traces, tau, exclude, bent, quiet)
+        screened = screen(places, traces, tau, exclude, bent, quiet, least=min(LEAST_GAIN, least))
         if quiet and not screened.promising():
             return []
         starts = dict(states)
@@ -217,6 +218,16 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             lead, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau), base, tau), ranked[:rivals])
     return told(ranked)
+
+
+def stands_alone(candidate: Candidate, ranked: Sequence[Candidate]) -> bool:
+    """Whether a law buys ALONE times what any other of its round does, those aside that are one with it (effects.EQUIVALENT): chance, forks of stick and slip and a
+    law of somewhat another form offer much the same to several, what acts offers it to its own.
+    """
+    if candidate.name not in BY_NAME or is_clocked(candidate.name):
+        return False
+    own = next((group for group in EQUIVALENT if candidate.name in group), {candidate.name})
+    return all(candidate.gain >= ALONE * c.gain for c in ranked if c.name not in own)
 
 
 def shows(candidate: Candidate) -> bool:

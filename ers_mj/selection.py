@@ -14,13 +14,14 @@ from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residu
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.reduced import EFFORT, ReducedModel
 from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, is_quiet, judged,
-                         likeliest, likeliest_first, priced, really, shows)
+                         likeliest, likeliest_first, priced, really, shows, stands_alone)
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, stands_out
 from ers_mj.starts import with_starts
 from ers_mj.traces import Trace
 
 LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the one that acts
+FAINT_GAIN = 1.5  # there too, where it stands alone (see race.stands_alone)
 LEAST_SHARE = 0.1  # and the share of what is left to explain
 LATER_Z = 2.0  # and beside an effect
 PLAIN = 1.3  # noise levels of what a model leaves of a coarse converter's readings, rounding being noise, from which it is wrong
@@ -66,15 +67,15 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     tau = tau_of(base.misfit)
     while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took) and EFFORT.spent < last:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
-        least = max(LATER_GAIN if current.model.names else LEAST_GAIN, LEAST_SHARE * float(score(current.misfit, tau).sum()))
+        least, faint = _gains_that_matter(current, tau)
         unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
-        ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), least, raced if is_dear(current) else math.inf)
-        if ranked and least <= ranked[0].gain <= MODEST and mended < _most_mended(current):
+        ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), faint, raced if is_dear(current) else math.inf)
+        if ranked and faint <= ranked[0].gain <= MODEST and mended < _most_mended(current):
             again = _less(ranked[0], traces, tau)
             won = float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum())
             if won > DENT:
                 base, current, mended = base if current.model.names else again, again, mended + 1
-                if ranked[0].gain - won < least or any(c.worth >= ranked[0].worth - won for c in ranked[1:]):
+                if ranked[0].gain - won < faint or any(c.worth >= ranked[0].worth - won for c in ranked[1:]):
                     continue
                 ranked = [judged(c.name, c.fit, current, tau) for c in ranked]
         least_z = LATER_Z if current.model.names else LEAST_Z
@@ -87,7 +88,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             ranked = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, _of_two_bodies))
         if rounds and ranked and EFFORT.spent < end and not is_quiet(current, tau):
             ranked = _other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
-        asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME) and _asked_for(c, least, least_z, outstanding)]
+        asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)
+                 and _asked_for(c, faint if c.gain < least and stands_alone(c, ranked) else least, least_z, outstanding)]
         rounds.append(tuple(sorted(ranked, key=lambda c: c not in asked[:1])))
         if not asked:
             other = None if reviewed or EFFORT.spent >= end or not _is_doubtful(current, tau) else _reviewed(current, rounds, traces, tau, exclude, jobs, end)
@@ -111,6 +113,13 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         if near_noise(current):
             current = _exchanged(current, rounds, traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau, traces)
+
+
+def _gains_that_matter(current: Fit, tau: float) -> tuple[float, float]:
+    """What an effect must buy beside this model, and what one that stands alone must."""
+    share = LEAST_SHARE * float(score(current.misfit, tau).sum())
+    usual = LATER_GAIN if current.model.names else LEAST_GAIN
+    return max(usual, share), max(FAINT_GAIN if current.model.names and not is_dear(current) else usual, share)
 
 
 def _restarted(model: Model, traces: Sequence[Trace]) -> Sequence[Trace]:

@@ -14,7 +14,7 @@ from ers_mj.identification import fit, residuals, residuals_in, run_of, score, t
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
-from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first
+from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first, stands_alone
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, _between, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
 from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
@@ -170,6 +170,24 @@ def test_two_effects_are_found_from_either(pushed):
     assert [c.name for c in ranked] == ["drive_dead_zone"] and set(ranked[0].fit.model.names) == {"drive_dead_zone", "input_delay"}
     found = dict(ranked[0].fit.model.effects)
     assert found["drive_dead_zone"][0] == pytest.approx(0.95, rel=0.02) and found["input_delay"][0] == pytest.approx(0.0157, rel=0.02)
+
+
+def test_a_faint_law_beside_an_effect_must_stand_alone():
+    """A friction of 1 % of the drive's torque beside a drag that leaves twenty times as much, and what no law of the servo offers more than another."""
+    traces = []
+    for k, name in enumerate(("multisine", "steps", "chirp")):
+        u, laws = INPUTS[name](T), [("quadratic_drag", np.array([1.0])), ("load_dependent_friction", np.array([0.01]))]
+        y = ReducedModel(lumped(TRUTH), laws).simulate(T, u).measured
+        traces.append(trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+    start = baseline(traces, Datasheet(lumped=TRUTH), True, 1)
+    found = selection.select(start.fit, start.traces, jobs=1)
+    assert found.chosen.model.names == ("quadratic_drag", "load_dependent_friction")
+    assert selection.FAINT_GAIN < found.rounds[1][0].gain < selection.LATER_GAIN
+    first, second = replace(found.rounds[1][0], gain=2.0), replace(found.rounds[1][0], name="stribeck", gain=1.5)
+    assert stands_alone(first, (first, replace(second, gain=1.2))) and not stands_alone(first, (first, second))
+    assert not stands_alone(replace(first, name="periodic_gust"), (first,))
+    torque = replace(first, name="bias_torque")
+    assert stands_alone(torque, (torque, replace(second, name="asymmetric_friction")))  # which is one with it
 
 
 def test_one_block_stands_out_among_bad_ones():
