@@ -19,7 +19,7 @@ from ers_mj.traces import Blocks, Trace
 TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
 LEAST_LOSS = 0.02  # of the score, which one block's noise makes of two equal models
 NULL_GAIN, NULL_GAIN_ONCE = 0.8, 1.5  # of C: decay of the tails of the largest gains that effect-free servos offer to laws, and to what acts once
-NULL_ALONE = 0.2  # share of them to which one law offers twice what any other does
+NULL_ALONE = 0.2  # share of effect-free servos whose best law stands alone: 2 of 12 nulls of seed 4141, one by its own clutter
 NULL_PEAK, PEAK_TAIL = 0.63, 1.2  # the worst block's (1 + misfit) / 2 of effect-free servos exceeds x in a share (x / NULL_PEAK)^-PEAK_TAIL of them
 RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
 LAST_PART = 0.7  # where the only recording is cut into training and held out
