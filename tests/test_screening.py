@@ -388,8 +388,8 @@ def test_a_stop_that_is_touched_once_is_no_knock(monkeypatch):
         traces.append(trace_of(from_arrays(t, u, y + 1e-4 * np.random.default_rng(k).standard_normal(t.size), name=name), None))
     start = baseline(traces, Datasheet(lumped=values), True, 1)
 
-    def knocks(*arguments):
-        found = screen(*arguments)
+    def knocks(*arguments, **options):
+        found = screen(*arguments, **options)
         return replace(found, promises={"load_disturbance": found.promises["load_disturbance"]})
 
     monkeypatch.setattr(race, "screen", knocks)
