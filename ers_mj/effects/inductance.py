@@ -4,6 +4,7 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter
 
+SHORTEST = 2e-5  # [s] of a winding: no sample tells a shorter one from none, and to simulate it takes as much longer as it is shorter
 HALVED = 1.5  # times the drive's largest torque at which the inductance is half where a fall is looked for first
 
 
@@ -18,7 +19,7 @@ class Inductance(Drive):
     sentence = "the motor current lags by an extra {tau_L}, more winding inductance than the datasheet has"
     mjcf = "the inductance of the dcmotor; where it falls with the current it is set step by step"
     parameters = (
-        Parameter("tau_L", "time", "electrical time constant beyond the baseline's"),
+        Parameter("tau_L", "time", "electrical time constant beyond the baseline's", lower=SHORTEST),
         Parameter("half", "torque", "torque at the rudder under whose current the inductance is half (infinite: it does not fall)", absent=np.inf),
     )
     needs = (("tau_L",),)
