@@ -214,7 +214,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
     """See ``descend``: the fit, its run, the Jacobian that it ended with, and how many it may still take.
 
     Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised; ``jacobian`` is changed by it. A step of which a fresh
-    one promises less than ``tolerance`` is not simulated.
+    one promises less than ``tolerance``, no part of it cut short, is not simulated.
     """
     layout, blocks = run.model.layout(), Blocks.of(traces)
     stride = max(1, round(DENSE / max(trace.sample_time for trace in traces)))
@@ -250,7 +250,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
             goal = there.vector(layout)
             moved = goal - z
             promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
-            if fresh and promised < tolerance:
+            if fresh and promised < tolerance and np.abs(step).max() < 1.0:
                 step = None
                 break
             trial = judged(run_of(there, traces, rate), goal)

@@ -24,6 +24,7 @@ from ers_mj.traces import Blocks, Trace
 
 LEAST_GAIN = 3.0  # decrease of C that an effect must buy: one servo in forty without missing physics offers as much (evaluation.NULL_GAIN)
 ALONE = 1.5  # times what the best other explanation buys, that an effect buys which stands alone
+SAME = 0.5  # share of its gain by which the scores of all blocks differ at most, summed, of one that explains the same
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
 QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
@@ -221,13 +222,18 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
 
 
 def stands_alone(candidate: Candidate, ranked: Sequence[Candidate]) -> bool:
-    """Whether a law buys ALONE times what any other of its round does, those aside that are one with it (effects.EQUIVALENT): chance, forks of stick and slip and a
-    law of somewhat another form offer much the same to several, what acts offers it to its own.
+    """Whether a law buys ALONE times what any other of its round does, those aside that are one with it (effects.EQUIVALENT) or leave the same in all blocks, as a small
+    imbalance and a torque do: chance, forks of stick and slip and a law of somewhat another form offer much the same to several, what acts offers it to its own.
     """
     if candidate.name not in BY_NAME or is_clocked(candidate.name):
         return False
     own = next((group for group in EQUIVALENT if candidate.name in group), {candidate.name})
-    return all(candidate.gain >= ALONE * c.gain for c in ranked if c.name not in own)
+    left = score(candidate.fit.misfit, 1.0)
+
+    def is_one(other):
+        return other.name in own or float(np.abs(score(other.fit.misfit, 1.0) - left).sum()) < SAME * candidate.gain
+
+    return all(candidate.gain >= ALONE * c.gain or is_one(c) for c in ranked)
 
 
 def shows(candidate: Candidate) -> bool:

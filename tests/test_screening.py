@@ -183,8 +183,9 @@ def test_a_faint_law_beside_an_effect_must_stand_alone():
     found = selection.select(start.fit, start.traces, jobs=1)
     assert found.chosen.model.names == ("quadratic_drag", "load_dependent_friction")
     assert selection.FAINT_GAIN < found.rounds[1][0].gain < selection.LATER_GAIN
-    first, second = replace(found.rounds[1][0], gain=2.0), replace(found.rounds[1][0], name="stribeck", gain=1.5)
+    first, second = replace(found.rounds[1][0], gain=2.0), replace(found.rounds[0][1], name="stribeck", gain=1.5)
     assert stands_alone(first, (first, replace(second, gain=1.2))) and not stands_alone(first, (first, second))
+    assert stands_alone(first, (first, replace(first, name="stribeck")))  # which leaves the same in all blocks
     assert not stands_alone(replace(first, name="periodic_gust"), (first,))
     torque = replace(first, name="bias_torque")
     assert stands_alone(torque, (torque, replace(second, name="asymmetric_friction")))  # which is one with it

@@ -265,9 +265,11 @@ def _linear(c, x, m, drive, tau, a_emf, dt, scale):
     if motor_free and not bristle:
         a2_m = c[BETA] * 0.5 * (c[A_PLUS] + c[A_MINUS])
         force_m = kt * m[4] * c[GAP] - _motor_friction(c) * m[3]
-    rate = abs(a2) + math.sqrt(abs(a1)) + (1.0 / tau + math.sqrt(abs(a_emf) / tau) if tau > 0 else a_emf)
+    rate = abs(a2) + math.sqrt(abs(a1)) + (math.sqrt(abs(a_emf) / tau) if tau > 0 else a_emf)
     if two:
         rate = (rate + math.sqrt(kt) + dt_) / min(rho, rest)
+    if tau > 0:
+        rate += 1.0 / tau
     n = int(0.7 * rate * dt) + 1
     h = dt / n
     for _ in range(n):
@@ -425,8 +427,10 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
 def _rate(c, m, x, tau, a_emf):
     """An upper bound [1/s] of the fastest rate in a mode, at the state x."""
     rate = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
-    if tau > 0:
-        rate = max(rate, 1.0 / tau) + math.sqrt(a_emf / tau)
+    apart = c[TWO] > 0 and not _has_bristle(c)
+    winding = 1.0 / tau if tau > 0 else 0.0
+    if tau > 0:  # the light one of two bodies is quicker, and no winding is
+        rate = max(rate, 0.0 if apart else winding) + math.sqrt(a_emf / tau)
     if m[2] != 0:
         rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
     if _has_bristle(c):
@@ -436,8 +440,8 @@ def _rate(c, m, x, tau, a_emf):
                 most = min(abs(1.0 - math.copysign(2.0, x[1]) * c[K_BRISTLE] * (x[0] - x[3]) / (c[C_PLUS] + c[C_MINUS])) + LEAST_LEFT, 2.0)
             rate += (math.sqrt(c[K_BRISTLE]) + c[D_BRISTLE]
                      + 2.0 * c[DAHL] * most ** (c[DAHL] - 1.0) * c[K_BRISTLE] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS]))
-    elif c[TWO] > 0:
-        rate = rate / min(c[RHO], 1.0 - c[RHO])
+    elif apart:
+        rate = max(rate / min(c[RHO], 1.0 - c[RHO]), winding)
         if m[4] != 0:
             share = c[RHO] * (1.0 - c[RHO])
             stiffer = 1.0 + 3.0 * c[HARDEN] * (x[3] - x[0]) ** 2
