@@ -16,6 +16,7 @@ from ers_mj.traces import BLOCK, Blocks, Trace
 
 MOST_SENT, MOST_BENT, LATER = 10, 14, 5  # candidates of the screening that are refitted at most, in the first round, there if bent, and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
+LESS = 0.1  # share of the best one's promise from which an effect is screened from further places where the first is bent
 LEAST_PROMISE = 0.6  # of the gain that matters, that the secant of a candidate must promise where a model is quiet
 LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the screening may scale it
 HOTTEST, KNOCKS, NEARER = 3, (0.08, 0.25), 60  # blocks in which a knock is looked for, the lengths [s] from which its fit is begun, and simulations of it
@@ -64,9 +65,9 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     at the start's visible size, and what the place's own parameters could do as well is projected out. An effect's promise is the
     largest share of the weighted residual that a secant explains, at the weights of C and at those of least squares: the first see
     a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
-    the first place, or from all of them where it is far from the noise, ``bent`` by what is missing: MOST_SENT (MOST_BENT) at most, those with
-    PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is worth LEAST_PROMISE of the ``least`` gain that matters. (How far C
-    lies above zero is no such sign: it hangs on the noise, which is an estimate.)
+    the first place, or from all of them where it is far from the noise, ``bent`` by what is missing (from the further ones of those with LESS of the best one's
+    promise so far): MOST_SENT (MOST_BENT) at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is
+    worth LEAST_PROMISE of the ``least`` gain that matters. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
 
     A knock is looked for from the first place only, what is dear to simulate is refitted from its most promising one, and each effect from as many
     starts as it declares, or ``tries`` if more.
@@ -98,8 +99,8 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
                     promises[effect.name] = max(promises.get(effect.name, 0.0), found[0][0])
         if quiet and not floor:
             floor = 2.0 * LEAST_PROMISE * least / float(targets[0][2] @ targets[0][2])
-        if not bent:
-            names = Screened(promises, begins, floor, most).promising()
+        bar = LESS * max(promises.values(), default=0.0)
+        names = [name for name in names if promises.get(name, 0.0) >= bar] if bent else Screened(promises, begins, floor, most).promising()
     return Screened(promises, begins, floor, most)
 
 

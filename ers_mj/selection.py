@@ -13,12 +13,12 @@ from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residuals_in, score, tau_of
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.reduced import EFFORT, ReducedModel
-from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, is_quiet, judged,
+from ers_mj.race import (LEAST_GAIN, LEAST_Z, NEAR_LEAST, RIVAL, TIE, Candidate, bends_and_twists, candidates, is_clocked, is_dear, judged,
                          likeliest, likeliest_first, priced, really, shows, stands_alone)
 from ers_mj.remainder import left_by_sensor, more_is_missing
-from ers_mj.screening import PEAK, stands_out
+from ers_mj.screening import PEAK, attainable, stands_out
 from ers_mj.starts import with_starts
-from ers_mj.traces import Trace
+from ers_mj.traces import Blocks, Trace
 
 LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the one that acts
 FAINT_GAIN = 1.5  # there too, where it stands alone (see race.stands_alone)
@@ -86,7 +86,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             ranked, swept = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, kinds, rough)), True
         elif ranked and EFFORT.spent < end and _may_twist(current) and not ranked[0].fit.model.plant().has_motor_side:
             ranked = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, _of_two_bodies))
-        if rounds and ranked and EFFORT.spent < end and not is_quiet(current, tau):
+        if rounds and ranked and EFFORT.spent < end and attainable(current.misfit, Blocks.of(traces).counts, tau) >= least:
             ranked = _other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
         asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)
                  and _asked_for(c, faint if c.gain < least and stands_alone(c, ranked) else least, least_z, outstanding)]

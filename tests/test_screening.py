@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj import race, selection
+from ers_mj import race, screening, selection
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
@@ -40,6 +40,14 @@ def test_a_place_far_from_the_data_takes_no_candidate_from_one_near_it(pushed):
     alone, both = (screen(places, pushed.traces, 1.0, (), False, False) for places in ([near], [near, far]))
     assert "bias_torque" in alone.promising() and set(alone.promising()) <= set(both.promising())
     assert all(len(both.begins[name]) == 2 for name in both.promising() if not BY_NAME[name].dear)
+
+
+def test_where_much_is_missing_what_promises_least_is_not_screened_from_every_place(pushed):
+    near, far = pushed.fit.model, replace(pushed.fit.model, values={**pushed.fit.model.values, "b": 60.0})
+    alone, both = (screen(places, pushed.traces, 1.0, (), True, False) for places in ([near], [near, far]))
+    bar = screening.LESS * max(alone.promises.values())
+    again = {name: len(both.begins[name]) for name in alone.promises if not (BY_NAME[name].dear or BY_NAME[name].once)}
+    assert again == {name: 1 + (alone.promises[name] >= bar) for name in again} and set(again.values()) == {1, 2}
 
 
 def test_a_search_that_is_given_up_still_tells_the_cost_that_was_asked_for(pushed):
