@@ -69,6 +69,22 @@ def test_a_shaft_beside_a_bristle_equals_an_independent_scheme(name, x_s_deg, de
     assert np.sqrt(np.mean((ours - truth) ** 2)) < 0.05 * np.sqrt(np.mean((rigid - truth) ** 2))
 
 
+@pytest.mark.parametrize("label, strength, shape, ours", [
+    ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08]),
+    ("cogging", 0.04, {"cycles_per_motor_rev": 4, "phase": 0.7}, [-0.04 / 0.0031, 2.0 * np.pi / (4 * 22.26), 0.7, np.inf, np.inf])], ids=["friction", "cogging"])
+@pytest.mark.parametrize("name", ["multisine", "steps"])
+def test_a_law_acts_on_its_own_body_beside_a_shaft(name, label, strength, shape, ours):
+    """The motor's share of a friction, and what the motor's magnets make of its own angle, equal an independent scheme at a far smaller step."""
+    J, rho, phi, k, zeta = TABLE_1.parameters["J"], 0.6, 0.3, 30.0, 0.1
+    shaft = {"label": "shaft_compliance", "strength": np.degrees(1.0 / k), "shape": {"zeta": zeta, "motor_friction_share": phi}}
+    u, shares = INPUTS[name](T), {"motor_inertia_share": rho, "motor_damping_share": rho}
+    law = {"label": label, "strength": strength, "shape": shape}
+    truth, plain = (quick.simulate(dict(TABLE_1.parameters) | shares, some, T, u, step=5e-6, stand=0.0).true for some in ([shaft, law], [shaft]))
+    effects = [("shaft_compliance", np.array([np.sqrt(k / J) / (2.0 * np.pi), zeta * np.sqrt(rho * (1.0 - rho)), rho, phi, np.inf])), (label, np.array(ours))]
+    found = ReducedModel(table_1().coefficients, effects).simulate(T, u).theta
+    assert np.degrees(np.max(np.abs(found - truth))) < 1e-3 < 0.01 * np.degrees(np.max(np.abs(plain - truth)))
+
+
 @pytest.mark.parametrize("name", ["multisine", "chirp", "ramp", "steps"])
 def test_eq_5_is_the_limit_of_vanishing_inductance(name):
     u = INPUTS[name](T)

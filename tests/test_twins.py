@@ -107,6 +107,18 @@ def test_two_bodies_beside_a_bristle_agree(second, bristle):
     assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(T, u).theta - law.theta) < 1e-9
 
 
+@pytest.mark.parametrize("name", ["cogging", "supply_sag", "thermal_drift", "variable_ratio", "load_dependent_friction", "stribeck", "position_dependent_friction"])
+@pytest.mark.parametrize("road", ["rudder", "lumped"])
+def test_a_law_acts_on_its_own_body_in_either_plant(name, road):
+    """Beside a soft shaft a drive's law acts on the motor, at its own angle and speed, and a friction on each body by its share."""
+    both = [("shaft_compliance", np.array([12.0, 0.1, 0.6, 0.4, np.inf])), (name, values(BY_NAME[name]))]
+    u = INPUTS["steps" if BY_NAME[name].friction else "multisine"](T)
+    law, plain = ReducedModel(EQ_1, both).simulate(T, u), ReducedModel(EQ_1, both[:1]).simulate(T, u)
+    twin = MechanicalPlant(EQ_1, both, parameters=SHEET.parameters if road == "rudder" else None).simulate(T, u)
+    assert rms_deg(law.theta - plain.theta) > VISIBLE
+    assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - plain.theta)
+
+
 def test_a_shaft_beside_a_play_does_not_harden():
     shaft, play = (lambda c: BY_NAME["shaft_compliance"].coefficients(np.array([20.0, 0.2, 0.6, 0.2, 0.01]), c),
                    lambda c: BY_NAME["backlash"].coefficients(np.array([0.012, 0.6, 0.2, 120.0, 0.2]), c))

@@ -179,6 +179,7 @@ class Effect:
     together: ClassVar[tuple[tuple[str, ...], ...]] = ()  # numbers that say something only together
     sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
     follows_current: ClassVar[bool] = False  # its law changes as fast as the current, or within a small angle: half the segment length
+    at_motor: ClassVar[bool] = False  # its torque and memory are the motor's, at whose angle and speed they are taken where a play or a shaft parts it from the rudder
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
@@ -272,7 +273,7 @@ class Effect:
 class Drive(Effect):
     """Between the command and the motor's torque."""
 
-    subsystem = "drive"
+    subsystem, at_motor = "drive", True
 
 
 class Transmission(Effect):

@@ -16,7 +16,7 @@ class Cogging(Drive):
 
     name = "cogging"
     sentence = "the motor cogs: a torque of amplitude {A} at the rudder that returns every {period} of its angle"
-    mjcf = "a passive dcmotor on the rudder's angle, its cogging of one pole behind a gear of 2 pi / period, and another for the second harmonic"
+    mjcf = "a passive dcmotor on the rudder's angle, or the motor's where that is a body of its own, its cogging of one pole behind a gear of 2 pi / period, and another for the second harmonic"
     parameters = (
         Parameter("A", "torque", "amplitude, seen at the output", positive=False),
         Parameter("period", "position", "period, seen at the output"),
@@ -52,8 +52,10 @@ class Cogging(Drive):
         import mujoco
 
         waves = [(p[0], p[1], p[2])] + ([(p[0] * p[3], 2.0 * p[1], 2.0 * p[2] + p[4])] if p[3] != 0.0 else [])
+        parted = any(joint.name == "gap" for joint in twin.spec.joints)
+        place = (mujoco.mjtTrn.mjTRN_JOINT, "rocker") if parted else (mujoco.mjtTrn.mjTRN_TENDON, "rudder_angle")
         for k, (amplitude, rate, phase) in enumerate(waves):
-            magnets = twin.spec.add_actuator(name=("cogging", "cogging_2")[k], trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle")
+            magnets = twin.spec.add_actuator(name=("cogging", "cogging_2")[k], trntype=place[0], target=place[1])
             magnets.set_to_dcmotor(motorconst=[0.0, 0.0], resistance=1.0, cogging=[twin.inertia * amplitude / rate, 1.0, phase],
                                    ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE))
             magnets.gear[0] = rate

@@ -23,7 +23,7 @@ class VariableRatio(Transmission):
         Parameter("rho", "ratio", "motor side's share of the inertia at theta_0", lower=0.1, upper=0.9, absent=0.5),
     )
     needs = (("slope", "bend"),)
-    sized, tries = 2, 2
+    sized, tries, at_motor = 2, 2, True
 
     def starts(self, scales):
         """Mostly slope, mostly bend, and both."""

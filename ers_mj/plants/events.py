@@ -27,7 +27,7 @@ from numba import njit, types
 
 from ers_mj.effects.base import LEAST_IRON, Coefficients
 from ers_mj.plants.compiled import compiled_cache, inlined, part
-from ers_mj.plants.laws import friction_level, moved, remember, total_torque
+from ers_mj.plants.laws import drive_torque, friction_level, is_lawful, moved, remember, total_torque
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
 (A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
@@ -166,11 +166,22 @@ def _motor_friction(c):
 
 
 @inlined
-def _held_motor(c, x, m):
+def _motor_level(c, on, p, lawful, x):
+    """The same with what laws make of it at the motor's speed, the mean of both directions."""
+    up, down = c[C_PLUS], c[C_MINUS]
+    if lawful and c[PHI] > 0 and on[1, 0] > 0:
+        up, down = friction_level(on, p, up, x[0], x[4], x[2], 1.0), friction_level(on, p, down, x[0], x[4], x[2], -1.0)
+    return c[PHI] * 0.5 * (up + down)
+
+
+@inlined
+def _held_motor(c, on, p, lawful, t, x, m):
     """(net acceleration without friction on the motor's side at rest, its friction), per total inertia."""
     theta, w, j, theta_m, w_m = x
     a = j - _twist_force(c, m[4], theta, w, theta_m, 0.0)
-    return a, _motor_friction(c)
+    if lawful:
+        a += drive_torque(on, p, theta_m, 0.0, j, t)
+    return a, _motor_level(c, on, p, lawful, (theta, w, j, theta_m, 0.0))
 
 
 @inlined
@@ -210,8 +221,10 @@ def _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf):
     dw_m = 0.0
     if two and m[3] != 0:
         a_mech = c[A_PLUS] if w_m > 0 else c[A_MINUS]
-        level = _motor_friction(c)
-        dw_m = (j - push - c[BETA] * a_mech * w_m - level * m[3]) / c[RHO]
+        force_m = j - push - c[BETA] * a_mech * w_m - m[3] * _motor_level(c, on, p, lawful, (theta, w, j, theta_m, w_m))
+        if lawful:
+            force_m += drive_torque(on, p, theta_m, w_m, j, t)
+        dw_m = force_m / c[RHO]
     return w, dw, dj, w_m, dw_m
 
 
@@ -364,7 +377,7 @@ def _violation(e, c, on, p, lawful, t, x, m):
         return -_push(depth, rate, c[K_TWIST], c[D_TWIST])
     if m[3] != 0:
         return -1.0
-    a, level = _held_motor(c, x, m)
+    a, level = _held_motor(c, on, p, lawful, t, x, m)
     return abs(a) - level * (1.0 + CREPT)
 
 
@@ -414,7 +427,7 @@ def _switch(e, c, on, p, lawful, t, x, m, corner):
         s_m = 0 if e == 4 else (1 if w > 0 else -1)
     elif e == 4 or e == 6:
         x = (theta, w, j, theta_m, 0.0)
-        a, level = _held_motor(c, x, m)
+        a, level = _held_motor(c, on, p, lawful, t, x, m)
         s_m = _direction(a, level, level) if e == 4 else (1 if a > 0 else -1)
     elif twist == 0:
         twist = 1 if theta_m > theta else -1
@@ -599,9 +612,9 @@ def _unit(k):
 
 
 @part
-def _fill_map(e, c, m, tau, a_emf, h):
-    """The exact map over h in a mode with side 0: e (5, 14), columns x (5), constant, drive, side, force on the rudder 1, s, s^2 (s = t/h), and the same
-    of a force between the two bodies where their shaft hardens."""
+def _fill_map(e, c, m, tau, a_emf, h, driven):
+    """The exact map over h in a mode with side 0: e (5, 17), columns x (5), constant, drive, side, force on the rudder 1, s, s^2 (s = t/h), the same
+    of a force between the two bodies where their shaft hardens, and of one on the motor where it is ``driven`` by laws."""
     for k in range(5):
         z = _linear(c, _unit(k), m, 0.0, tau, a_emf, h, 0.0)
         for i in range(5):
@@ -612,7 +625,7 @@ def _fill_map(e, c, m, tau, a_emf, h):
     share = 1.0 - c[RHO] if c[TWO] > 0 else 1.0
     for i in range(5):
         e[i, 5], e[i, 6] = base[i], pull[i] - base[i]
-        for k in range(8, 14):
+        for k in range(8, 17):
             e[i, k] = 0.0
     if m[0] != 0:
         for g in range(GAUSS_X.size):
@@ -629,14 +642,20 @@ def _fill_map(e, c, m, tau, a_emf, h):
             for i in range(5):
                 for k in range(3):
                     e[i, 11 + k] += z[i] * h * GAUSS_W[g] * GAUSS_X[g] ** k
+    if driven and m[3] != 0:
+        for g in range(GAUSS_X.size):
+            z = _linear(c, (0.0, 0.0, 0.0, 0.0, 1.0 / c[RHO]), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0)
+            for i in range(5):
+                for k in range(3):
+                    e[i, 14 + k] += z[i] * h * GAUSS_W[g] * GAUSS_X[g] ** k
     for i in range(5):
         e[i, 7] = -c[C_1] * e[i, 8]
 
 
 @njit(nogil=True)
-def _maps(c, tau, a_emf, h):
-    """Maps over h and over h/2 for every mode away from the stops: (2, 3, 3, 3, 5, 14), indices s + 1, s_m + 1, twist + 1."""
-    e = np.zeros((2, 3, 3, 3, 5, 14))
+def _maps(c, tau, a_emf, h, driven):
+    """Maps over h and over h/2 for every mode away from the stops: (2, 3, 3, 3, 5, 17), indices s + 1, s_m + 1, twist + 1."""
+    e = np.zeros((2, 3, 3, 3, 5, 17))
     for half in range(2):
         for s in range(-1, 2):
             for s_m in range(-1, 2):
@@ -645,7 +664,7 @@ def _maps(c, tau, a_emf, h):
                         continue
                     if c[TWO] > 0 or (s_m == 0 and twist == 0 and s != 0):
                         _fill_map(e[half, s + 1, s_m + 1, twist + 1], c, (s, 0, 0, s_m, twist), tau, a_emf,
-                                  h / (1 + half))
+                                  h / (1 + half), driven)
     return e
 
 
@@ -669,12 +688,23 @@ def _mapped(e, two, x, drive, side, f0, f1, f2):
 
 
 @inlined
-def _twisted(e, x, drive, side, f, q):
-    """The same of a shaft that hardens, under the force f (3,) on the rudder and q (3,) between the two bodies."""
+def _three(e, i, k, f):
+    return e[i, k] * f[0] + e[i, k + 1] * f[1] + e[i, k + 2] * f[2]
+
+
+@inlined
+def _parted(e, x, drive, side, f, q, r):
+    """The same of two bodies under the force f (3,) on the rudder, q (3,) between the two, of a shaft that hardens, and r (3,) on the motor."""
     z = _mapped(e, True, x, drive, side, f[0], f[1], f[2])
-    return (z[0] + e[0, 11] * q[0] + e[0, 12] * q[1] + e[0, 13] * q[2], z[1] + e[1, 11] * q[0] + e[1, 12] * q[1] + e[1, 13] * q[2],
-            z[2] + e[2, 11] * q[0] + e[2, 12] * q[1] + e[2, 13] * q[2], z[3] + e[3, 11] * q[0] + e[3, 12] * q[1] + e[3, 13] * q[2],
-            z[4] + e[4, 11] * q[0] + e[4, 12] * q[1] + e[4, 13] * q[2])
+    return (z[0] + _three(e, 0, 11, q) + _three(e, 0, 14, r), z[1] + _three(e, 1, 11, q) + _three(e, 1, 14, r),
+            z[2] + _three(e, 2, 11, q) + _three(e, 2, 14, r), z[3] + _three(e, 3, 11, q) + _three(e, 3, 14, r),
+            z[4] + _three(e, 4, 11, q) + _three(e, 4, 14, r))
+
+
+@inlined
+def _parabola(begin, middle, end):
+    """(3,) of a force over a segment, from its values at three instants."""
+    return begin, 4.0 * middle - 3.0 * begin - end, 2.0 * (end - 2.0 * middle + begin)
 
 
 @inlined
@@ -692,6 +722,16 @@ def _extra(c, on, p, load, t, x, s):
 
 
 @inlined
+def _beside(c, on, p, lawful, load, t, x, m):
+    """(force on the rudder, between the bodies, on the motor) beside the linear ones of two bodies, per total inertia."""
+    f = load + _extra(c, on, p, load, t, x, m[0]) if lawful and m[0] != 0 else load
+    r = 0.0
+    if lawful and m[3] != 0:
+        r = drive_torque(on, p, x[3], x[4], x[2], t) - m[3] * (_motor_level(c, on, p, lawful, x) - _motor_friction(c))
+    return f, _hardening(c, x) if c[HARDEN] > 0 else 0.0, r
+
+
+@inlined
 def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
     """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they add now (NaN: unknown)."""
     two = c[TWO] > 0
@@ -702,22 +742,20 @@ def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
         c[BIAS] = bias
         return z, np.nan
     whole, half = e[0, m[0] + 1, m[3] + 1, m[4] + 1], e[1, m[0] + 1, m[3] + 1, m[4] + 1]
-    if c[HARDEN] > 0:
-        laws = lawful and m[0] != 0
-        g0, q0 = load + (_extra(c, on, p, load, t, x, m[0]) if laws else 0.0), _hardening(c, x)
-        z = _twisted(half, x, drive, m[1], (g0, 0.0, 0.0), (q0, 0.0, 0.0))
-        ga, qa = load + (_extra(c, on, p, load, t + 0.5 * h, z, m[0]) if laws else 0.0), _hardening(c, z)
-        z = _twisted(whole, x, drive, m[1], (g0, 2.0 * (ga - g0), 0.0), (q0, 2.0 * (qa - q0), 0.0))
-        gb, qb = load + (_extra(c, on, p, load, t + h, z, m[0]) if laws else 0.0), _hardening(c, z)
-        return _twisted(whole, x, drive, m[1], (g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0)),
-                        (q0, 4.0 * qa - 3.0 * q0 - qb, 2.0 * (qb - 2.0 * qa + q0))), np.nan
+    if two and not _has_bristle(c) and (lawful or c[HARDEN] > 0):
+        f0, q0, r0 = _beside(c, on, p, lawful, load, t, x, m)
+        z = _parted(half, x, drive, m[1], (f0, 0.0, 0.0), (q0, 0.0, 0.0), (r0, 0.0, 0.0))
+        fa, qa, ra = _beside(c, on, p, lawful, load, t + 0.5 * h, z, m)
+        z = _parted(whole, x, drive, m[1], (f0, 2.0 * (fa - f0), 0.0), (q0, 2.0 * (qa - q0), 0.0), (r0, 2.0 * (ra - r0), 0.0))
+        fb, qb, rb = _beside(c, on, p, lawful, load, t + h, z, m)
+        return _parted(whole, x, drive, m[1], _parabola(f0, fa, fb), _parabola(q0, qa, qb), _parabola(r0, ra, rb)), np.nan
     if not lawful or m[0] == 0:
         return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0), np.nan
     g0 = load + (extra if extra == extra else _extra(c, on, p, load, t, x, m[0]))
     ga = load + _extra(c, on, p, load, t + 0.5 * h, _mapped(half, two, x, drive, m[1], g0, 0.0, 0.0), m[0])
     end = _extra(c, on, p, load, t + h, _mapped(whole, two, x, drive, m[1], g0, 2.0 * (ga - g0), 0.0), m[0])
     gb = load + end
-    return _mapped(whole, two, x, drive, m[1], g0, 4.0 * ga - 3.0 * g0 - gb, 2.0 * (gb - 2.0 * ga + g0)), end
+    return _mapped(whole, two, x, drive, m[1], *_parabola(g0, ga, gb)), end
 
 
 @inlined
@@ -835,7 +873,7 @@ def _last(ends):
 def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out):
     """See ``_simulate``: through the samples, by maps over segments (late, early, the first of a sample) or, if it ``leaps``, over a whole sample."""
     n = t.size
-    lawful, two, bristle, slips = on[0, 0] + on[1, 0] > 0, c[TWO] > 0, _has_bristle(c), _never_sticks(c, on)
+    lawful, two, bristle, slips = is_lawful(on), c[TWO] > 0, _has_bristle(c), _never_sticks(c, on)
     h0, last = t[1] - t[0], _last(ends)
     tau, a_emf, bias = c[TAU], c[A_EMF], c[BIAS]
     h_max = np.inf
@@ -858,7 +896,7 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[1], x[2], x[0] if bristle else x[3]
         if k == n - 1:
             break
-        remember(on, p, x[0], x[1], x[2], t[k + 1] - t[k])
+        remember(on, p, x, t[k + 1] - t[k])
         if gain > 0.0 and k % every == 0 and y[k] == y[k]:
             resting, extra = -1, np.nan
             x, m = _corrected(c, on, p, lawful, t[k], x, m, gain * (y[k] - x[0]))
@@ -947,12 +985,13 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     holds the rows of the effects with a law (see laws.rows_of), ``p`` (effects, N_PARAMETERS) their constants, of which memories change; ``refine``
     divides the segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
     """
-    lawful, h0 = on[0, 0] + on[1, 0] > 0, t[1] - t[0]
+    lawful, h0 = is_lawful(on), t[1] - t[0]
     tau, a_emf = c[TAU], c[A_EMF]
     ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
-    late, early = _maps(c, tau, a_emf, _last(ends)), _maps(c, tau, a_emf, ends[0])
+    driven = lawful and c[TWO] > 0 and not _has_bristle(c)
+    late, early = _maps(c, tau, a_emf, _last(ends), driven), _maps(c, tau, a_emf, ends[0], driven)
     leaps = c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0 and c[FALL] <= 0 and not lawful and ends.size > 1 and fresh[0] == 1
-    whole = _maps(c, tau, a_emf, h0) if leaps else early
+    whole = _maps(c, tau, a_emf, h0, driven) if leaps else early
     _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out)
 
 

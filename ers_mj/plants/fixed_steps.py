@@ -17,8 +17,8 @@ from numba import njit, types
 from ers_mj.plants.compiled import compiled_cache, inlined, part
 from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BETA, BIAS, C_1, C_MINUS, C_PLUS, D_BRISTLE, D_STOP, D_TWIST, DAHL, DELAY, FADE, FALL, GAP,
                                   HARDEN, K_BRISTLE, K_STOP, K_TWIST, LAWS, LEAST_LEVEL, LOWER, PHI, READ, READ_BOOL, RHO, ROWS, RUNAWAY, TAU, THETA_0,
-                                  UPPER, VECTOR, _faster)
-from ers_mj.plants.laws import friction_level, remember, total_torque
+                                  UPPER, VECTOR, _faster, _motor_level)
+from ers_mj.plants.laws import drive_torque, friction_level, is_lawful, remember, total_torque
 
 LONGEST = 2e-4  # [s] of a step
 SPRING_STEP = 0.35  # frequency [rad/s] of the stiffest spring times the step
@@ -162,8 +162,10 @@ def _step(c, on, p, lawful, t, x, drive, closed, load, h):
     j = _charged(c, j, drive, w_m, half) if closed else 0.0
     level = _full_level(c, on, p, lawful, theta, w, j)
     force = c[BIAS] + load + c[A_1] * (c[THETA_0] - theta) - share * c[K_BRISTLE] * z
+    force_m, holds = 0.0, _motor_level(c, on, p, lawful, (theta, w, j, theta_m, w_m))
     if lawful:
         force += total_torque(on, p, theta, w, j, t + half)
+        force_m = drive_torque(on, p, theta_m, w_m, j, t + half)
     wall, d_wall = _stop(c, theta)
     twist, d = _contact(c, theta_m - theta)
     own = share * _bristle_damping(c, w, z, level) + (1.0 - c[BETA]) * _damping(c, w)
@@ -173,8 +175,8 @@ def _step(c, on, p, lawful, t, x, drive, closed, load, h):
     for _ in range(2):
         a, e = 1.0 - c[RHO] + half * (own + d_wall + d), c[RHO] + half * (own_m + d)
         push = (2.0 * (1.0 - c[RHO]) - a) * w + half * d * w_m + h * (force + wall + twist)
-        push_m = (2.0 * c[RHO] - e) * w_m + half * d * w + h * (j - twist)
-        w_1, w_m1 = _speeds(a, e, half * d, push, push_m, (theta - c[THETA_0]) / h, h * c[C_1], h * c[PHI] * 0.5 * (c[C_PLUS] + c[C_MINUS]))
+        push_m = (2.0 * c[RHO] - e) * w_m + half * d * w + h * (j + force_m - twist)
+        w_1, w_m1 = _speeds(a, e, half * d, push, push_m, (theta - c[THETA_0]) / h, h * c[C_1], h * holds)
         pulls = c[GAP] > 0.0 and d > 0.0 and (twist + 0.5 * d * (w_m1 + w_m - w_1 - w)) * twist < 0.0
         sucks = d_wall > 0.0 and (wall - 0.5 * d_wall * (w_1 + w)) * wall < 0.0
         if not (pulls or sucks):
@@ -217,7 +219,7 @@ def _bent_start(c, theta, w, j):
 def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     """As events.simulate_kernel, of a plant that has both a motor's side and a bristle."""
     n, h0 = t.size, t[1] - t[0]
-    lawful, longest = on[0, 0] + on[1, 0] > 0, _step_length(c, refine)
+    lawful, longest = is_lawful(on), _step_length(c, refine)
     skip = int(c[DELAY] / h0 + 1e-9)
     late = c[DELAY] - skip * h0
     if late < 1e-9 * h0:
@@ -228,7 +230,7 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
         if k == n - 1:
             break
         h = t[k + 1] - t[k]
-        remember(on, p, x[0], x[1], x[2], h)
+        remember(on, p, x, h)
         if gain > 0.0 and k % every == 0 and y[k] == y[k]:
             jump = gain * (y[k] - x[0])
             if c[C_1] > 0.0:  # none in the corner, which holds the rudder
@@ -245,10 +247,10 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
 
 def _sample(t, h0, before, now, c, on, p, refine, x):
     """Move x (6,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first, ``now`` afterwards."""
-    lawful, longest = on[0, 0] + on[1, 0] > 0, _step_length(c, refine)
+    lawful, longest = is_lawful(on), _step_length(c, refine)
     late = c[DELAY] - int(c[DELAY] / h0 + 1e-9) * h0
     z = (x[0], x[1], x[2], x[3], x[4], x[5])
-    remember(on, p, x[0], x[1], x[2], h0)
+    remember(on, p, x, h0)
     if late >= 1e-9 * h0:
         z = _through(c, on, p, lawful, t, z, c[B] * before, True, 0.0, late, longest)
     else:

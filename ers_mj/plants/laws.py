@@ -98,12 +98,28 @@ _inertia_of = _chain_inertia([(row, e.inertia) for row, e in enumerate(EFFECTS) 
 
 @inlined
 def total_torque(on, p, theta, w, j, t):
-    """Sum of the torques of the effects that are on."""
+    """Sum of the torques of the effects that are on: those on the rudder only where the motor is a body of its own."""
     a = 0.0
     for i in range(on[0, 0]):
         k = on[0, i + 1]
         a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, t)
     return a
+
+
+@inlined
+def drive_torque(on, p, theta_m, w_m, j, t):
+    """The same on a motor that is a body of its own, at its angle and speed seen at the output."""
+    a = 0.0
+    for i in range(on[4, 0]):
+        k = on[4, i + 1]
+        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta_m, w_m, j, t)
+    return a
+
+
+@inlined
+def is_lawful(on):
+    """Whether a law adds to the forces."""
+    return on[0, 0] + on[1, 0] + on[4, 0] > 0
 
 
 @inlined
@@ -126,19 +142,23 @@ def moved(on, p, theta, w, a):
 
 
 @inlined
-def remember(on, p, theta, w, j, h):
-    """Bring the memories of effects, their last constants, on by a sample of length h."""
+def remember(on, p, x, h):
+    """Bring the memories of effects, their last constants, on by a sample of length h from the state x = (theta, w, j, theta_m, w_m, ...)."""
     for i in range(on[3, 0]):
         k = on[3, i + 1]
-        p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, h)
+        p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), x[0], x[1], x[2], h)
+    for i in range(on[5, 0]):
+        k = on[5, i + 1]
+        p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), x[3], x[4], x[2], h)
 
 
 @lru_cache
-def rows_of(names):
-    """A tuple of effects as the laws are called: (4, 1 + effects) their number and rows, of torques, of frictions, of inertias and of memories."""
-    on = np.zeros((4, 1 + len(EFFECTS)), np.int64)
-    for kind, laws in enumerate(([e.torque for e in EFFECTS], [e.friction for e in EFFECTS], [e.inertia for e in EFFECTS],
-                                 [e.memory for e in EFFECTS])):
-        rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and laws[row]]
+def rows_of(names, parted=False):
+    """A tuple of effects as the laws are called: (6, 1 + effects) their number and rows, of torques, of frictions, of inertias and of memories, and where the
+    motor is ``parted`` from the rudder of those torques and memories that are its own."""
+    on = np.zeros((6, 1 + len(EFFECTS)), np.int64)
+    for kind, (law, own) in enumerate((("torque", False), ("friction", False), ("inertia", False), ("memory", False), ("torque", True), ("memory", True))):
+        rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and getattr(effect, law)
+                and (law not in ("torque", "memory") or own == (parted and effect.at_motor))]
         on[kind, 0], on[kind, 1:1 + len(rows)] = len(rows), rows
     return on

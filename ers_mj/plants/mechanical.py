@@ -167,7 +167,7 @@ class MechanicalPlant:
         for name, values in self.effects:
             effect, constants = BY_NAME[name], BY_NAME[name].constants(values, c)
             if not effect.edit_spec(constants, c, twin):
-                laws.append(Law(name, constants, effect.torque, effect.friction, effect.inertia, effect.memory))
+                laws.append(Law(name, constants, effect.torque, effect.friction, effect.inertia, effect.memory, effect.at_motor))
         if c.a_mech_plus != c.a_mech_minus:
             laws.append(_viscous_asymmetry(c))
         if c.has_bristle and (c.c_2_plus != c.c_2_minus or np.isfinite(c.fade) or c.dahl != 1.0):

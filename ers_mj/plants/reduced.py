@@ -88,7 +88,7 @@ class ReducedModel:
             if effect.torque or effect.friction or effect.inertia or effect.memory:
                 constants = effect.constants(values, c)
                 p[ROW[name], :len(constants)] = constants
-        object.__setattr__(self, "_lowered", (np.array(c, float), rows_of(tuple(name for name, _ in self.effects)), p))
+        object.__setattr__(self, "_lowered", (np.array(c, float), rows_of(tuple(name for name, _ in self.effects), c.has_motor_side), p))
 
     @property
     def coupled(self) -> bool:

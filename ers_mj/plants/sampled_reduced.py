@@ -12,13 +12,13 @@ from ers_mj.plants import fixed_steps
 from ers_mj.plants.compiled import compiled_cache
 from ers_mj.plants.events import (A_EMF, B, BRISTLE_CORNER, C_1, C_PLUS, CONTACT_STEP, CORNER, D_STOP, DELAY, K_BRISTLE, K_STOP, LOWER, RHO, TAU, TWO, UPPER,
                                   _advance, _bounded, _cuts, _has_bristle, _last, _start_mode)
-from ers_mj.plants.laws import remember
+from ers_mj.plants.laws import is_lawful, remember
 from ers_mj.plants.reduced import ReducedModel
 
 
 def _begin(t, c, on, p, x, m):
     """Fill x (5,) after its first three entries, theta w j, and the mode m (5,) that fits them: both bodies together, a bristle bent."""
-    lawful, bristle = on[0, 0] + on[1, 0] > 0, _has_bristle(c)
+    lawful, bristle = is_lawful(on), _has_bristle(c)
     x[3], x[4] = x[0], 0.0
     if bristle:
         slip = c[C_PLUS] / c[K_BRISTLE]
@@ -35,7 +35,7 @@ def _sample(t, h0, before, now, c, on, p, refine, x, m):
 
     The slow road of events._simulate, which goes by the same segments. A motion that runs away becomes NaN.
     """
-    lawful, two, bristle = on[0, 0] + on[1, 0] > 0, c[TWO] > 0, _has_bristle(c)
+    lawful, two, bristle = is_lawful(on), c[TWO] > 0, _has_bristle(c)
     tau, a_emf = c[TAU], c[A_EMF]
     ends, fresh, _ = _cuts(c, h0, tau, a_emf, lawful, refine)
     last = _last(ends)
@@ -49,7 +49,7 @@ def _sample(t, h0, before, now, c, on, p, refine, x, m):
         corner = max(corner, BRISTLE_CORNER * c[C_1] * last * refine)
     z, mode = (x[0], x[1], x[2], x[3], x[4]), (m[0], m[1], m[2], m[3], m[4])
     start = 0.0
-    remember(on, p, x[0], x[1], x[2], h0)
+    remember(on, p, x, h0)
     for i in range(ends.size):
         drive = c[B] * (now if fresh[i] == 1 else before)
         z, mode, _ = _advance(c, on, p, lawful, t + start, z, mode, drive, tau, a_emf, ends[i] - start, h_max, corner)

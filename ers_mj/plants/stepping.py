@@ -22,7 +22,8 @@ LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dyn
 
 @dataclass(frozen=True)
 class Law:
-    """A law that the stepping evaluates: an effect's torque, friction, inertia or memory (see effects/base.py) and its constants p."""
+    """A law that the stepping evaluates: an effect's torque, friction, inertia or memory (see effects/base.py) and its constants p; its torque and memory
+    are the motor's where that is a body of its own and the law ``at_motor``."""
 
     name: str
     p: np.ndarray
@@ -30,6 +31,7 @@ class Law:
     friction: Callable | None
     inertia: Callable | None = None
     memory: Callable | None = None
+    at_motor: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,12 +74,12 @@ class Stepper:
         self.gap = self._address("gap") if self.c.has_motor_side else None
         self.current = int(self.model.actuator_actadr[self.motor])
         self.bristle = self.model.actuator("bristle").id if self.c.has_bristle else None
-        laws = [(law, law.p.copy()) for law in self.laws]
-        self.torques = [(law.torque, p) for law, p in laws if law.torque]
-        self.frictions = [(law.friction, p) for law, p in laws if law.friction]
-        self.inertias = [(law.inertia, p) for law, p in laws if law.inertia and not self.c.has_motor_side]
+        laws = [(law, law.p.copy(), law.at_motor and self.c.has_motor_side) for law in self.laws]
+        self.torques = [(law.torque, p, own) for law, p, own in laws if law.torque]
+        self.frictions = [(law.friction, p) for law, p, _ in laws if law.friction]
+        self.inertias = [(law.inertia, p) for law, p, _ in laws if law.inertia and not self.c.has_motor_side]
         self.falls = self.current >= 0 and self.c.fall > 0
-        self.memories = [(law.memory, p) for law, p in laws if law.memory]
+        self.memories = [(law.memory, p, own) for law, p, own in laws if law.memory]
         self.turning = self.model.joint("rocker").dofadr[0]
         self.armature = float(self.model.dof_armature[self.turning])
 
@@ -174,23 +176,25 @@ class Stepper:
         return theta, omega, theta, v[self.rotor] / self.ratio, self.drive
 
     def _apply_laws(self, v: float, load: float, h: float) -> None:
-        """Set load torque, frictionloss, armature and inductance from the laws at the present state, for the next h [s]."""
-        theta, w, _, _, _ = self._observe()
+        """Set load torque, motor torque, frictionloss, armature and inductance from the laws at the present state, for the next h [s]."""
+        theta, w, theta_m, w_m, _ = self._observe()
         j, t, c = self._drive(v), self.data.time, self.c
         if self.falls:
             self.model.actuator_dynprm[self.motor, TIME_CONSTANT] = c.tau_e * max(1.0 / (1.0 + (c.fall * j) ** 2), LEAST_IRON)
-        for memory, p in self.memories:
-            p[-1] = memory(p, theta, w, j, h)
-        force = load + sum(torque(p, theta, w, j, t) for torque, p in self.torques)
+        for memory, p, own in self.memories:
+            p[-1] = memory(p, theta_m if own else theta, w_m if own else w, j, h)
+        force = load + sum(torque(p, theta, w, j, t) for torque, p, own in self.torques if not own)
+        if c.has_motor_side:
+            self.data.qfrc_applied[self.turning] = self.inertia * sum(torque(p, theta_m, w_m, j, t) for torque, p, own in self.torques if own)
         for inertia, p in self.inertias:
             relative, half_slope = inertia(p, theta)
             self.model.dof_armature[self.turning] = self.armature + self.inertia * (relative - 1.0)
             force -= half_slope * w * w
         if self.frictions:
             share = 1.0 - c.phi if c.has_motor_side else 1.0
-            up, down = c.c_2_plus, c.c_2_minus
-            for friction, p in self.frictions:
-                up, down = friction(p, up, theta, w, j, 1.0), friction(p, down, theta, w, j, -1.0)
+            up, down = self._levels(theta, w, j)
+            if c.has_motor_side:
+                self.model.dof_frictionloss[self.turning] = 0.5 * c.phi * self.inertia * sum(self._levels(theta, w_m, j))
             if self.bristle is None:
                 self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
                 force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
@@ -199,6 +203,12 @@ class Stepper:
                 self.model.actuator_dynprm[self.bristle, LUGRE_DAMPING] = share * self.inertia * c.d_bristle * math.exp(-(w / c.fade) ** 2)
         self.data.ctrl[self.load] = self.inertia * force
 
+    def _levels(self, theta: float, w: float, j: float) -> tuple[float, float]:
+        """The friction levels up and down, per inertia, after every law."""
+        up, down = self.c.c_2_plus, self.c.c_2_minus
+        for friction, p in self.frictions:
+            up, down = friction(p, up, theta, w, j, 1.0), friction(p, down, theta, w, j, -1.0)
+        return up, down
 
     def _yielding(self, level: float, w: float) -> float:
         """The level at which MuJoCo's bristle, of exponent 1, bends as fast as one of another exponent under this ``level`` (both per inertia)."""

@@ -59,9 +59,9 @@ def _prepare(t, load, path, c, on, p, maps, out):
     by theta, w and j along the motion."""
     h = t[1] - t[0]
     if not _has_bristle(c):
-        closed, opened = _maps(c, c[TAU], c[A_EMF], h)[0], _maps(c, 0.0, 0.0, h)[0]
+        closed, opened = _maps(c, c[TAU], c[A_EMF], h, False)[0], _maps(c, 0.0, 0.0, h, False)[0]
         for s in range(3):
-            maps[0, s], maps[1, s] = closed[s, 1, 1], opened[s, 1, 1]
+            maps[0, s], maps[1, s] = closed[s, 1, 1, :, :14], opened[s, 1, 1, :, :14]
     if on[0, 0] + on[1, 0] == 0:
         return
     size = np.zeros(3)
@@ -70,7 +70,7 @@ def _prepare(t, load, path, c, on, p, maps, out):
             size[i] = max(size[i], abs(path[k, i]))
     for k in range(t.size):
         w = path[k, 1]
-        remember(on, p, path[k, 0], w, path[k, 2], h)
+        remember(on, p, (path[k, 0], w, path[k, 2], path[k, 0], w), h)
         if w == 0.0:
             out[k, 0] = out[k, 1] = out[k, 2] = 0.0
             continue
@@ -109,8 +109,8 @@ def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p,
         if k == t.size - 1:
             break
         theta, w, j = path[k, 0], path[k, 1], path[k, 2]
-        remember(on, p, theta, w, j, h)
-        remember(on_2, p_2, theta, w, j, h)
+        remember(on, p, (theta, w, j, theta, w), h)
+        remember(on_2, p_2, (theta, w, j, theta, w), h)
         theta_1, w_1, j_1 = path[k + 1, 0], path[k + 1, 1], path[k + 1, 2]
         side = 0.0 if c[C_1] <= 0 else (1.0 if theta > c[THETA_0] else (-1.0 if theta < c[THETA_0] else 0.0))
         side_1 = 0.0 if c[C_1] <= 0 else (1.0 if theta_1 > c[THETA_0] else (-1.0 if theta_1 < c[THETA_0] else 0.0))
@@ -216,8 +216,8 @@ def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, 
             break
         theta, w, j = path[i, 0], path[i, 1], path[i, 2]
         theta_1, w_1, j_1 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
-        remember(on, p, theta, w, j, h)
-        remember(on_2, p_2, theta, w, j, h)
+        remember(on, p, (theta, w, j, theta, w), h)
+        remember(on_2, p_2, (theta, w, j, theta, w), h)
         side = 0.0 if c[C_1] <= 0 else (1.0 if theta > c[THETA_0] else (-1.0 if theta < c[THETA_0] else 0.0))
         side_1 = 0.0 if c[C_1] <= 0 else (1.0 if theta_1 > c[THETA_0] else (-1.0 if theta_1 < c[THETA_0] else 0.0))
         cornered, jump = w == 0.0 and c[C_1] > 0 and abs(theta - c[THETA_0]) < CORNER, 0.0
