@@ -249,10 +249,10 @@ def _runge_kutta(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
 
 
 @part
-def _linear(c, x, m, drive, tau, a_emf, dt, scale):
+def _linear(c, x, m, drive, tau, a_emf, dt, scale, f, r):
     """The flow within a mode without laws, exact: Taylor series in steps of about one time constant.
 
-    ``scale`` 1 includes the constant forces, 0 leaves them and the drive out (the homogeneous flow).
+    ``scale`` 1 includes the constant forces, f on the rudder and r on the motor among them, 0 leaves them and the drive out (the homogeneous flow).
     """
     theta, w, j, theta_m, w_m = x
     bristle = _has_bristle(c)
@@ -269,7 +269,7 @@ def _linear(c, x, m, drive, tau, a_emf, dt, scale):
             a2, level = a2 * (1.0 - c[BETA]), level * (1.0 - c[PHI])
         elif bristle:
             a2, level = _viscous(c, m[3], 0.0), 0.0
-        force = c[BIAS] + c[A_1] * c[THETA_0] - c[C_1] * m[1] - level * m[0] - kt * m[4] * c[GAP]
+        force = f + c[BIAS] + c[A_1] * c[THETA_0] - c[C_1] * m[1] - level * m[0] - kt * m[4] * c[GAP]
         if m[2] != 0:
             a1, a2 = a1 + c[K_STOP], a2 + c[D_STOP]
             force += c[K_STOP] * (c[UPPER] if m[2] > 0 else c[LOWER])
@@ -277,7 +277,7 @@ def _linear(c, x, m, drive, tau, a_emf, dt, scale):
             force -= (c[C_PLUS] if m[3] > 0 else c[C_MINUS]) * m[3]
     if motor_free and not bristle:
         a2_m = c[BETA] * 0.5 * (c[A_PLUS] + c[A_MINUS])
-        force_m = kt * m[4] * c[GAP] - _motor_friction(c) * m[3]
+        force_m = r + kt * m[4] * c[GAP] - _motor_friction(c) * m[3]
     rate = abs(a2) + math.sqrt(abs(a1)) + (math.sqrt(abs(a_emf) / tau) if tau > 0 else a_emf)
     if two:
         rate = (rate + math.sqrt(kt) + dt_) / min(rho, rest)
@@ -463,10 +463,20 @@ def _rate(c, m, x, tau, a_emf):
 
 
 @part
+def _driven(c, on, p, t, x, m, drive, tau, a_emf, dt):
+    """The flow of two bodies under laws, by the exponential midpoint rule: the linear one under the forces of the middle, whose change is slow."""
+    f, _, r = _beside(c, on, p, True, 0.0, t, x, m)
+    f, _, r = _beside(c, on, p, True, 0.0, t + 0.5 * dt, _linear(c, x, m, drive, tau, a_emf, 0.5 * dt, 1.0, f, r), m)
+    return _linear(c, x, m, drive, tau, a_emf, dt, 1.0, f, r)
+
+
+@part
 def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     """The state dt later within the mode."""
     if not _bends(c, m) and c[HARDEN] <= 0 and (not lawful or (m[0] == 0 and c[TWO] <= 0)):
-        return _linear(c, x, m, drive, tau, a_emf, dt, 1.0)
+        return _linear(c, x, m, drive, tau, a_emf, dt, 1.0, 0.0, 0.0)
+    if c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0:
+        return _driven(c, on, p, t, x, m, drive, tau, a_emf, dt)
     n = int(_rate(c, m, x, tau, a_emf) * dt / RATE_STEP) + 1
     for k in range(n):
         x = _runge_kutta(c, on, p, lawful, t + k * dt / n, x, m, drive, tau, a_emf, dt / n)
@@ -616,12 +626,12 @@ def _fill_map(e, c, m, tau, a_emf, h, driven):
     """The exact map over h in a mode with side 0: e (5, 17), columns x (5), constant, drive, side, force on the rudder 1, s, s^2 (s = t/h), the same
     of a force between the two bodies where their shaft hardens, and of one on the motor where it is ``driven`` by laws."""
     for k in range(5):
-        z = _linear(c, _unit(k), m, 0.0, tau, a_emf, h, 0.0)
+        z = _linear(c, _unit(k), m, 0.0, tau, a_emf, h, 0.0, 0.0, 0.0)
         for i in range(5):
             e[i, k] = z[i]
     zero = _unit(9)
-    base = _linear(c, zero, m, 0.0, tau, a_emf, h, 1.0)
-    pull = _linear(c, zero, m, 1.0, tau, a_emf, h, 1.0)
+    base = _linear(c, zero, m, 0.0, tau, a_emf, h, 1.0, 0.0, 0.0)
+    pull = _linear(c, zero, m, 1.0, tau, a_emf, h, 1.0, 0.0, 0.0)
     share = 1.0 - c[RHO] if c[TWO] > 0 else 1.0
     for i in range(5):
         e[i, 5], e[i, 6] = base[i], pull[i] - base[i]
@@ -629,7 +639,7 @@ def _fill_map(e, c, m, tau, a_emf, h, driven):
             e[i, k] = 0.0
     if m[0] != 0:
         for g in range(GAUSS_X.size):
-            z = _linear(c, (0.0, 1.0 / share, 0.0, 0.0, 0.0), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0)
+            z = _linear(c, (0.0, 1.0 / share, 0.0, 0.0, 0.0), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0, 0.0, 0.0)
             for i in range(5):
                 v = z[i] * h * GAUSS_W[g]
                 e[i, 8] += v
@@ -638,13 +648,13 @@ def _fill_map(e, c, m, tau, a_emf, h, driven):
     if c[HARDEN] > 0:
         push = (0.0, 1.0 / share if m[0] != 0 else 0.0, 0.0, 0.0, -1.0 / c[RHO] if m[3] != 0 else 0.0)
         for g in range(GAUSS_X.size):
-            z = _linear(c, push, m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0)
+            z = _linear(c, push, m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0, 0.0, 0.0)
             for i in range(5):
                 for k in range(3):
                     e[i, 11 + k] += z[i] * h * GAUSS_W[g] * GAUSS_X[g] ** k
     if driven and m[3] != 0:
         for g in range(GAUSS_X.size):
-            z = _linear(c, (0.0, 0.0, 0.0, 0.0, 1.0 / c[RHO]), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0)
+            z = _linear(c, (0.0, 0.0, 0.0, 0.0, 1.0 / c[RHO]), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0, 0.0, 0.0)
             for i in range(5):
                 for k in range(3):
                     e[i, 14 + k] += z[i] * h * GAUSS_W[g] * GAUSS_X[g] ** k
@@ -789,6 +799,12 @@ def _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
             and _derivative(c, on, p, lawful, t + h, z, m, drive, tau, a_emf)[1] * m[0] > 0.0)
 
 
+@inlined
+def _law_step(c, a_emf):
+    """Length of a segment [s] at most under a law."""
+    return LAW_STEP / (max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf)
+
+
 @njit(nogil=True)
 def _cuts(c, h0, tau, a_emf, lawful, refine):
     """Segment ends within a uniform sample [s] and whether the input of this sample (1) or the one before (0) acts in each.
@@ -797,8 +813,7 @@ def _cuts(c, h0, tau, a_emf, lawful, refine):
     """
     step = h0
     if lawful:
-        mechanical = max(abs(c[A_PLUS]), abs(c[A_MINUS])) + math.sqrt(abs(c[A_1])) + a_emf
-        step = min(step, LAW_STEP / mechanical)
+        step = min(step, _law_step(c, a_emf))
     if c[FALL] > 0 and c[TAU] > 0:
         step = min(step, FALL_STEP * c[TAU])
     if c[TWO] > 0:
@@ -990,7 +1005,8 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
     driven = lawful and c[TWO] > 0 and not _has_bristle(c)
     late, early = _maps(c, tau, a_emf, _last(ends), driven), _maps(c, tau, a_emf, ends[0], driven)
-    leaps = c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0 and c[FALL] <= 0 and not lawful and ends.size > 1 and fresh[0] == 1
+    leaps = c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0 and c[FALL] <= 0 and ends.size > 1 and fresh[0] == 1
+    leaps = leaps and (not lawful or refine * h0 <= _law_step(c, a_emf))
     whole = _maps(c, tau, a_emf, h0, driven) if leaps else early
     _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out)
 
