@@ -213,8 +213,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
              renewals: float, by_tangents: bool = True) -> tuple[Fit, Run, np.ndarray | None, float]:
     """See ``descend``: the fit, its run, the Jacobian that it ended with, and how many it may still take.
 
-    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised; ``jacobian`` is changed by it. A step of which a fresh
-    one promises less than ``tolerance``, no part of it cut short, is not simulated.
+    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised; ``jacobian`` is changed by it.
     """
     layout, blocks = run.model.layout(), Blocks.of(traces)
     stride = max(1, round(DENSE / max(trace.sample_time for trace in traces)))
@@ -248,11 +247,6 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
             step = np.clip(-np.linalg.solve(hessian + damping * np.diag(scale), slope), -1.0, 1.0)
             there = run.model.at(layout, z + step)
             goal = there.vector(layout)
-            moved = goal - z
-            promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
-            if fresh and promised < tolerance and np.abs(step).max() < 1.0:
-                step = None
-                break
             trial = judged(run_of(there, traces, rate), goal)
             if trial[2] < cost:
                 break
@@ -265,7 +259,8 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
                 by_tangents, final, damping = False, True, 1e-3
             jacobian = None
             continue
-        gain, was_fresh = cost - trial[2], fresh
+        moved, gain, was_fresh = goal - z, cost - trial[2], fresh
+        promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
         if gain > 0.3 * promised and moved @ moved > 0:
             dger(1.0 / float(moved @ moved), trial[0].left - run.left - jacobian @ moved, moved, a=jacobian, overwrite_a=1)  # in place
             fresh = False
