@@ -126,19 +126,29 @@ def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]
 def _hopeful(run: Run, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace], tries: int) -> list[np.ndarray]:
     """Of many starts of a law, those that promise most to first order along a place's own motion.
 
-    To choose among them the tangents of one body are near enough, whatever stops, delays and sensors make of them.
+    To choose among them the tangents of one body are near enough, whatever stops, delays, sensors and a motor that a shaft or a play parts from the rudder make of them.
     """
-    place = run.model
-    if len(starts) <= tries + 1 or not (effect.torque or effect.friction) or place.plant().has_motor_side:
+    if len(starts) <= tries + 1 or not (effect.torque or effect.friction):
         return starts
+    place, motions = _of_one_body(run.model), run.motions
+    if effect.at_motor and place is not run.model:
+        motions = [np.ascontiguousarray(motion[:, [3, 1, 2, 3]]) for motion in motions]  # along the motor's angle, of which its law is
     waves = 2 if effect.wave else 1
     every = [turned for start in starts for turned in ((start, _quarter(effect, start)) if effect.wave else (start,))]
-    changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, run.motions).T
+    changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, motions).T
     changes[~(np.max(np.abs(changes), axis=1) < RUNAWAY)] = 0.0
     ends = _ends(effect, traces)
     shares = np.max([_shares(changes, waves, ends, target, effect.signed)[0] for target in targets], axis=0)
     best = sorted(np.argsort(shares)[::-1][:tries])
     return [starts[i] for i in best]
+
+
+def _of_one_body(model: Model) -> Model:
+    """The model without what parts the motor from the rudder."""
+    for name in model.names:
+        if BY_NAME[name].subsystem == "transmission" and model.plant().has_motor_side:
+            model = model.without_effect(name)
+    return model
 
 
 def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):

@@ -199,6 +199,20 @@ def test_a_faint_law_beside_an_effect_must_stand_alone():
     assert stands_alone(torque, (torque, replace(second, name="asymmetric_friction")))  # which is one with it
 
 
+def test_beside_a_shaft_the_starts_of_a_wave_are_chosen_along_the_motion_of_one_body(pushed):
+    """A cog of a motor that a shaft of 20 Hz parts from the rudder: the start of the nearest period is among the few that are simulated."""
+    period, shaft = 0.03, ("shaft_compliance", np.array([20.0, 0.1, 0.5, 0.2, np.inf]))
+    traces = []
+    for k, name in enumerate(("multisine", "steps", "chirp")):
+        y = ReducedModel(lumped(TRUTH), [shaft, ("cogging", np.array([12.0, period, 0.4, np.inf, np.inf]))]).simulate(T, u := INPUTS[name](T)).measured
+        traces.append(trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+    model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}).with_effect(*shaft)
+    run, effect = run_of(model, traces, 5.0), BY_NAME["cogging"]
+    starts, targets = effect.starts(model.scales), _targets(model, run.left, traces, 1.0)[1]
+    chosen = [start[1] for start in _hopeful(run, effect, starts, targets, traces, 3)]
+    assert len(chosen) == 3 and min((start[1] for start in starts), key=lambda p: abs(1.0 / p - 1.0 / period)) in chosen
+
+
 def test_one_block_stands_out_among_bad_ones():
     misfit = np.concatenate([np.ones(150), np.full(50, 30.0)])
     assert not stands_out(misfit, 1.0) and not stands_out(np.append(misfit, 500.0), 1.0) and stands_out(np.append(misfit, 1000.0), 1.0)
