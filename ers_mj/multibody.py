@@ -17,7 +17,7 @@ from ers_mj.plants.reduced import lumped
 from ers_mj.plants.skeletons import bodily
 from ers_mj.traces import Trace
 
-MOST_SECONDS = 5.0  # [s] of held-out recordings that are run in MuJoCo, which takes a thousand times as long as the reduced model
+MOST_SECONDS = 2.5  # [s] of held-out recordings that are run in MuJoCo, which takes a thousand times as long as the reduced model
 
 
 def run_in_mujoco(parts: Sequence[Fold]) -> list[Trace]:

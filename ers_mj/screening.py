@@ -17,6 +17,7 @@ from ers_mj.traces import BLOCK, Blocks, Trace
 MOST_SENT, MOST_BENT, LATER = 10, 14, 5  # candidates of the screening that are refitted at most, in the first round, there if bent, and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
 LESS = 0.1  # share of the best one's promise from which an effect is screened from further places where the first is bent
+UNLIKELY = 0.05  # share of the promise from which a law is refitted, below which what it promises to first order is not followed up
 LEAST_PROMISE = 0.6  # of the gain that matters, that the secant of a candidate must promise where a model is quiet
 LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the screening may scale it
 HOTTEST, KNOCKS, NEARER = 3, (0.08, 0.25), 60  # blocks in which a knock is looked for, the lengths [s] from which its fit is begun, and simulations of it
@@ -52,7 +53,7 @@ class Screened:
         Neither a knock's promise, what it gains as it is, is a measure for the others' secants, nor that of an effect whose refit ``failed``: where stick and slip
         fork, a secant may be all chance.
         """
-        best = sorted(self.promises, key=self.promises.get, reverse=True)[: self.most]
+        best = sorted((name for name in self.promises if name in self.begins), key=self.promises.get, reverse=True)[: self.most]
         bar = max((self.promises[name] for name in best if not BY_NAME[name].once and name not in failed), default=0.0)
         return [name for name in best if self.promises[name] >= max(self.floor, (PROMISING_DEAR if BY_NAME[name].dear else PROMISING) * bar)]
 
@@ -67,7 +68,8 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
     the first place, or from all of them where it is far from the noise, ``bent`` by what is missing (from the further ones of those with LESS of the best one's
     promise so far): MOST_SENT (MOST_BENT) at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is
-    worth LEAST_PROMISE of the ``least`` gain that matters. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
+    worth LEAST_PROMISE of the ``least`` gain that matters. A law that to first order promises UNLIKELY of that, or of what the second best must, is not
+    simulated. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
 
     A knock is looked for from the first place only, what is dear to simulate is refitted from its most promising one, and each effect from as many
     starts as it declares, or ``tries`` if more.
@@ -80,25 +82,30 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         if not np.all(np.isfinite(e)):
             continue
         (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
-        for effect in (BY_NAME[name] for name in names):
-            if effect.once:
-                if place is not places[0]:
-                    continue
-                found = _knocks(run, effect, effect.starts(scales), targets[0][2], traces, tau)
-            else:
-                starts = _hopeful(run, effect, effect.starts(scales), targets, traces, max(effect.tries, tries))
-                found = [p for start in starts if (p := _promise(place, effect, start, e, targets, traces))]
-            if found:
-                found.sort(key=lambda p: -p[0])
-                begun = [Begin(model, known) for _, model in _of_each_form(found)[:max(effect.tries, tries)]]
-                if not effect.dear:
-                    begins.setdefault(effect.name, []).append(begun)
-                elif found[0][0] > promises.get(effect.name, 0.0):
-                    begins[effect.name] = [begun]
-                if bent or place is places[0]:
-                    promises[effect.name] = max(promises.get(effect.name, 0.0), found[0][0])
         if quiet and not floor:
             floor = 2.0 * LEAST_PROMISE * least / float(targets[0][2] @ targets[0][2])
+        starts = {name: BY_NAME[name].starts(scales) for name in names if place is places[0] or not BY_NAME[name].once}
+        shares = {name: _first_order(run, BY_NAME[name], some, targets, traces) for name, some in starts.items()}
+        for name in sorted(starts, key=lambda name: -max(shares[name], default=math.inf)):
+            effect, tried = BY_NAME[name], max(BY_NAME[name].tries, tries)
+            second = sorted((0.0, 0.0, *(promise for other, promise in promises.items() if not BY_NAME[other].once)))[-2]  # the best one's may be a fork
+            if (share := max(shares[name], default=math.inf)) < UNLIKELY * max(floor, PROMISING * second):
+                promises.setdefault(name, share)
+                continue
+            if effect.once:
+                found = _knocks(run, effect, starts[name], targets[0][2], traces, tau)
+            else:
+                some = _hopeful(starts[name], shares[name], tried)
+                found = [p for start in some if (p := _promise(place, effect, start, e, targets, traces))]
+            if found:
+                found.sort(key=lambda p: -p[0])
+                begun = [Begin(model, known) for _, model in _of_each_form(found)[:tried]]
+                if not effect.dear:
+                    begins.setdefault(name, []).append(begun)
+                elif found[0][0] > promises.get(name, 0.0):
+                    begins[name] = [begun]
+                if bent or place is places[0]:
+                    promises[name] = max(promises.get(name, 0.0), found[0][0])
         bar = LESS * max(promises.values(), default=0.0)
         names = [name for name in names if promises.get(name, 0.0) >= bar] if bent else Screened(promises, begins, floor, most).promising()
     return Screened(promises, begins, floor, most)
@@ -123,13 +130,15 @@ def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]
     return [p for k, p in enumerate(found) if forms[k] not in forms[:k]] + [p for k, p in enumerate(found) if forms[k] in forms[:k]]
 
 
-def _hopeful(run: Run, effect: Effect, starts: list[np.ndarray], targets, traces: Sequence[Trace], tries: int) -> list[np.ndarray]:
-    """Of many starts of a law, those that promise most to first order along a place's own motion.
+def _first_order(run: Run, effect: Effect, starts: Sequence[np.ndarray], targets, traces: Sequence[Trace]) -> np.ndarray:
+    """Shares (S,) that the starts of a law promise to first order along a place's own motion; none (0,) where that tells too little.
 
-    To choose among them the tangents of one body are near enough, whatever stops, delays, sensors and a motor that a shaft or a play parts from the rudder make of them.
+    The tangents of one body are near enough to choose by, whatever stops, delays, sensors and a motor that a shaft or a play parts from the rudder make of
+    them; those along a rudder that bends a bristle choose among many starts at best.
     """
-    if len(starts) <= tries + 1 or not (effect.torque or effect.friction):
-        return starts
+    many = len(starts) > effect.tries + 1
+    if not starts or not (effect.torque or effect.friction) or effect.once or run.model.plant().bends and not many:
+        return np.empty(0)
     place, motions = _of_one_body(run.model), run.motions
     if effect.at_motor and place is not run.model:
         motions = [np.ascontiguousarray(motion[:, [3, 1, 2, 3]]) for motion in motions]  # along the motor's angle, of which its law is
@@ -138,9 +147,14 @@ def _hopeful(run: Run, effect: Effect, starts: list[np.ndarray], targets, traces
     changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, motions).T
     changes[~(np.max(np.abs(changes), axis=1) < RUNAWAY)] = 0.0
     ends = _ends(effect, traces)
-    shares = np.max([_shares(changes, waves, ends, target, effect.signed)[0] for target in targets], axis=0)
-    best = sorted(np.argsort(shares)[::-1][:tries])
-    return [starts[i] for i in best]
+    return np.max([_shares(changes, waves, ends, target, effect.signed)[0] for target in targets], axis=0)
+
+
+def _hopeful(starts: Sequence[np.ndarray], shares: np.ndarray, tries: int) -> Sequence[np.ndarray]:
+    """Of many starts those that promise most to first order."""
+    if len(starts) <= tries + 1 or not shares.size:
+        return starts
+    return [starts[i] for i in sorted(np.argsort(shares)[::-1][:tries])]
 
 
 def _of_one_body(model: Model) -> Model:
@@ -170,19 +184,24 @@ def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
 
 def _knocks(run: Run, effect: Effect, starts: Sequence[np.ndarray], target: np.ndarray, traces: Sequence[Trace], tau: float) -> list[tuple[float, Model]]:
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all for a small one, so that no secant
-    may be scaled. The best starts of different side, length or recording, brought nearer, with what they gain in C as a share of the residual. What a coarse
+    may be scaled. The best starts of different side, length or recording, brought nearer, with what they gain in C as a share of the residual. They are
+    compared and brought nearer at a tau that the recording's part around them gives (see fit): at the last one C has a dent wherever one block is met. What a coarse
     converter's thresholds tell counts as rounding here: a knock bends to when one of them was passed.
     """
     place, best = run.model, {}
     column = [p.name for p in effect.parameters].index("record")
     near = _Surroundings(run, traces, tau)
 
-    def gain(start):
+    def gains(start):
+        """What a start gains at the level of its surroundings, and at tau."""
         k = int(start[column])
-        trace, without = near.of(k, start[1])
-        beside = residuals_in(place.with_effect(effect.name, start), trace, k, OBSERVER_RATE)
-        gained = without - near.cost(trace, beside)
-        return gained if np.isfinite(gained) else -math.inf
+        trace, *levels = near.of(k, start[1])
+        misfit = near.misfit(trace, residuals_in(place.with_effect(effect.name, start), trace, k, OBSERVER_RATE))
+        won = [without - float(np.sum(score(misfit, level))) for level, without in levels]
+        return won if np.all(np.isfinite(won)) else [-math.inf, -math.inf]
+
+    def gain(start):
+        return gains(start)[0]
 
     tried: dict[tuple, list[tuple[float, np.ndarray]]] = {}
     for start in starts:
@@ -192,7 +211,7 @@ def _knocks(run: Run, effect: Effect, starts: Sequence[np.ndarray], target: np.n
             kind = int(start[column]), start[0] > 0, start[2]
             best[kind] = max(best.get(kind, (0.0, start)), (won, start), key=lambda found: found[0])
     nearer = [_nearer(gain, start) for won, start in sorted(best.values(), key=lambda found: -found[0])[:effect.tries] if won > 0]
-    return [(2.0 * won / float(target @ target), place.with_effect(effect.name, start)) for won, start in nearer]
+    return [(2.0 * won / float(target @ target), place.with_effect(effect.name, start)) for _, start in nearer if (won := gains(start)[1]) > 0]
 
 
 class _Surroundings:
@@ -205,12 +224,12 @@ class _Surroundings:
         place = run.model
         self.whole = not place.has_tangents or place.plant().bends or any(BY_NAME[name].memory for name in place.names)
 
-    def cost(self, trace: Trace, e: np.ndarray) -> float:
-        """C of the residuals (rows,) of a trace, its converter's thresholds aside."""
-        return float(np.sum(score(Blocks.of([trace]).misfit(trace.plain(e)), self.tau)))
+    def misfit(self, trace: Trace, e: np.ndarray) -> np.ndarray:
+        """Misfits (B,) of the residuals (rows,) of a trace, its converter's thresholds aside."""
+        return Blocks.of([trace]).misfit(trace.plain(e))
 
-    def of(self, record: int, moment: float) -> tuple[Trace, float]:
-        """The part around a moment [s], and C of the run there."""
+    def of(self, record: int, moment: float) -> tuple[Trace, tuple[float, float], tuple[float, float]]:
+        """The part around a moment [s], and (level, C of the run there at it) for the geometric mean of its misfits and for tau."""
         trace = self.traces[record]
         begin, end = 0, trace.t.size
         if not self.whole and trace.converter is None:
@@ -220,7 +239,9 @@ class _Surroundings:
             theta, omega = self.run.motions[record][begin, :2]
             start = (theta + self.run.model.offset(record), omega) if begin else trace.start
             part = trace if (begin, end) == (0, trace.t.size) else replace(trace.part(begin, end), start=start)
-            self.known[record, begin, end] = part, self.cost(part, residuals_in(self.run.model, part, record, OBSERVER_RATE))
+            misfit = self.misfit(part, residuals_in(self.run.model, part, record, OBSERVER_RATE))
+            levels = float(np.exp(np.mean(np.log(misfit + self.tau)))), self.tau
+            self.known[record, begin, end] = part, *((level, float(np.sum(score(misfit, level)))) for level in levels)
         return self.known[record, begin, end]
 
 
@@ -273,11 +294,12 @@ def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | 
 def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
     """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local.
 
-    Of a wave that is 20 times too large, as a small cog's start may be, the rudder sticks and slips elsewhere, and its secants tell no more than the size to try.
+    Of a wave that is 20 times too large, as a small cog's start may be, the rudder sticks and slips elsewhere, and its secants tell no more than the size to try;
+    what a sensor adds to its reading moves nothing.
     """
     amplitudes, phase = list(effect.wave[0]), effect.wave[1]
     best, ends, whole, size = None, _ends(effect, traces), start, 1.0
-    for _ in range(2):
+    for _ in range(1 if effect.subsystem == "sensor" else 2):
         secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
         if not np.all(np.isfinite(secants)):
             break

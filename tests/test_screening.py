@@ -16,7 +16,7 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first, stands_alone
 from ers_mj.recording import from_arrays
-from ers_mj.screening import Begin, Screened, _between, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
+from ers_mj.screening import Begin, Screened, _between, _first_order, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
 from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
 from ers_mj.traces import trace_of
 
@@ -46,7 +46,7 @@ def test_where_much_is_missing_what_promises_least_is_not_screened_from_every_pl
     near, far = pushed.fit.model, replace(pushed.fit.model, values={**pushed.fit.model.values, "b": 60.0})
     alone, both = (screen(places, pushed.traces, 1.0, (), True, False) for places in ([near], [near, far]))
     bar = screening.LESS * max(alone.promises.values())
-    again = {name: len(both.begins[name]) for name in alone.promises if not (BY_NAME[name].dear or BY_NAME[name].once)}
+    again = {name: len(both.begins[name]) for name in alone.begins if not (BY_NAME[name].dear or BY_NAME[name].once)}
     assert again == {name: 1 + (alone.promises[name] >= bar) for name in again} and set(again.values()) == {1, 2}
 
 
@@ -88,15 +88,16 @@ def test_a_shaft_that_twists_by_less_than_the_noise_is_none(pushed):
 
 
 def test_a_tangent_that_runs_away_promises_nothing(pushed, monkeypatch):
-    """Beside a stiff bristle a law's tangent may leave all bounds: the start is passed over, and the other ones are compared as before."""
+    """Beside a stiff bristle a law's tangent may leave all bounds: the start is passed over, and the other ones are compared."""
     model, effect = pushed.fit.model, BY_NAME["load_dependent_friction"]
     run = run_of(model, pushed.traces, 5.0)
     starts = [size * effect.starts(model.scales)[0] for size in (1.0, 1.1, 1.2, 1.3, 1.4)]
     targets, changes = _targets(model, run.left, pushed.traces, 1.0)[1], type(model).changes
-    whole = _hopeful(run, effect, starts, targets, pushed.traces, 3)
+    assert len(_first_order(run, effect, starts, targets, pushed.traces)) == 5
     monkeypatch.setattr(type(model), "changes", lambda *a: changes(*a) + np.where(np.arange(len(starts)) == lost, size, 0.0))
     for lost, size in ((0, np.inf), (0, np.nan), (2, 1e200)):
-        assert len(whole) == len(some := _hopeful(run, effect, starts, targets, pushed.traces, 3)) == 3
+        shares = _first_order(run, effect, starts, targets, pushed.traces)
+        assert shares[lost] == 0.0 < np.min(np.delete(shares, lost)) and len(some := _hopeful(starts, shares, 3)) == 3
         assert all(start is not starts[lost] for start in some)
 
 
@@ -108,7 +109,8 @@ def test_a_bristle_is_begun_with_damping_that_fades_where_it_was_lost(pushed):
 
 
 def test_a_promise_that_failed_is_no_measure_for_the_others():
-    found = Screened({"load_disturbance": 3.0, "load_dependent_friction": 0.97, "cogging": 0.4, "input_delay": 0.18, "gravity": 0.02}, {}, 0.0, 4)
+    promises = {"load_disturbance": 3.0, "load_dependent_friction": 0.97, "cogging": 0.4, "input_delay": 0.18, "gravity": 0.02}
+    found = Screened(promises, dict.fromkeys(promises, ()), 0.0, 4)
     assert found.promising() == ["load_disturbance", "load_dependent_friction", "cogging"]
     assert found.promising({"load_dependent_friction"}) == ["load_disturbance", "load_dependent_friction", "cogging", "input_delay"]
 
@@ -209,7 +211,7 @@ def test_beside_a_shaft_the_starts_of_a_wave_are_chosen_along_the_motion_of_one_
     model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}).with_effect(*shaft)
     run, effect = run_of(model, traces, 5.0), BY_NAME["cogging"]
     starts, targets = effect.starts(model.scales), _targets(model, run.left, traces, 1.0)[1]
-    chosen = [start[1] for start in _hopeful(run, effect, starts, targets, traces, 3)]
+    chosen = [start[1] for start in _hopeful(starts, _first_order(run, effect, starts, targets, traces), 3)]
     assert len(chosen) == 3 and min((start[1] for start in starts), key=lambda p: abs(1.0 / p - 1.0 / period)) in chosen
 
 
@@ -248,9 +250,13 @@ def test_a_knock_is_tried_in_its_surroundings(pushed):
     near = _Surroundings(run, pushed.traces, 1.0)
     for moment in (0.02, 1.4, 2.95):
         gains = []
-        for part, without in (near.of(1, moment), (trace, near.cost(trace, residuals_in(run.model, trace, 1, 5.0)))):
-            knocked = run.model.with_effect("load_disturbance", np.array([300.0, moment, 0.08, 1.0]))
-            gains.append(without - near.cost(part, residuals_in(knocked, part, 1, 5.0)))
+        knocked = run.model.with_effect("load_disturbance", np.array([300.0, moment, 0.08, 1.0]))
+        part, _, (level, without) = near.of(1, moment)
+        assert level == 1.0
+        for some in (part, trace):
+            before, after = (float(np.sum(score(near.misfit(some, residuals_in(model, some, 1, 5.0)), 1.0))) for model in (run.model, knocked))
+            assert some is trace or before == pytest.approx(without, abs=1e-9)
+            gains.append(before - after)
         assert gains[0] == pytest.approx(gains[1], rel=0.02, abs=0.02) and abs(gains[0]) > 0.5
     assert near.of(1, 2.95)[0].t.size < 0.25 * trace.t.size and near.of(1, 0.02)[0].t.size < trace.t.size
     warm = run.model.with_effect("thermal_drift", BY_NAME["thermal_drift"].starts(run.model.scales)[0])
