@@ -68,8 +68,8 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     a small effect beside the noise, the second a large one that the baseline could not swallow. Which effects are refitted follows from
     the first place, or from all of them where it is far from the noise, ``bent`` by what is missing (from the further ones of those with LESS of the best one's
     promise so far): MOST_SENT (MOST_BENT) at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is
-    worth LEAST_PROMISE of the ``least`` gain that matters. A law that to first order promises UNLIKELY of that, or of what the second best must, is not
-    simulated. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
+    worth LEAST_PROMISE of the ``least`` gain that matters. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
+    A law that to first order promises UNLIKELY of that, or of what follows from the second best promise, is not simulated.
 
     A knock is looked for from the first place only, what is dear to simulate is refitted from its most promising one, and each effect from as many
     starts as it declares, or ``tries`` if more.
@@ -87,7 +87,7 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         starts = {name: BY_NAME[name].starts(scales) for name in names if place is places[0] or not BY_NAME[name].once}
         shares = {name: _first_order(run, BY_NAME[name], some, targets, traces) for name, some in starts.items()}
         for name in sorted(starts, key=lambda name: -max(shares[name], default=math.inf)):
-            effect, tried = BY_NAME[name], max(BY_NAME[name].tries, tries)
+            effect, most_tried = BY_NAME[name], max(BY_NAME[name].tries, tries)
             second = sorted((0.0, 0.0, *(promise for other, promise in promises.items() if not BY_NAME[other].once)))[-2]  # the best one's may be a fork
             if (share := max(shares[name], default=math.inf)) < UNLIKELY * max(floor, PROMISING * second):
                 promises.setdefault(name, share)
@@ -95,11 +95,11 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
             if effect.once:
                 found = _knocks(run, effect, starts[name], targets[0][2], traces, tau)
             else:
-                some = _hopeful(starts[name], shares[name], tried)
-                found = [p for start in some if (p := _promise(place, effect, start, e, targets, traces))]
+                hopeful = _hopeful(starts[name], shares[name], most_tried)
+                found = [p for start in hopeful if (p := _promise(place, effect, start, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
-                begun = [Begin(model, known) for _, model in _of_each_form(found)[:tried]]
+                begun = [Begin(model, known) for _, model in _of_each_form(found)[:most_tried]]
                 if not effect.dear:
                     begins.setdefault(name, []).append(begun)
                 elif found[0][0] > promises.get(name, 0.0):

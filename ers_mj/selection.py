@@ -65,7 +65,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     end, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN))
     current, rounds, mended, swept, reviewed, took = base, [], 0, False, False, 0.0
     tau = tau_of(base.misfit)
-    while len(rounds) - len(current.model.states or {}) < _most_rounds(current, took) and EFFORT.spent < last:
+    while _taken(current, rounds) < _most_rounds(current, took) and EFFORT.spent < last:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least, faint = _gains_that_matter(current, tau)
         unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
@@ -277,6 +277,12 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
     with ThreadPoolExecutor(jobs) as pool:
         ends = list(pool.map(lambda c: judged(c.name, fit(c.fit.model.with_effect(newest, p), traces, tau=tau, steps=20), current, tau), rivals))
     return _joined(ranked, ends)
+
+
+def _taken(current: Fit, rounds: Sequence[tuple[Candidate, ...]]) -> int:
+    """Rounds that count: those for what differs between recordings do not, nor, once, one whose effect a later one made needless."""
+    effects = len(rounds) - len(current.model.states or {})
+    return effects - (effects > len(current.model.names))
 
 
 def _most_rounds(current: Fit, took: float) -> int:

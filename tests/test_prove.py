@@ -2,6 +2,7 @@
 
 import ast
 import json
+import shutil
 import signal
 import sys
 from pathlib import Path
@@ -175,6 +176,13 @@ def test_a_second_run_keeps_what_is_there(tmp_path, asked):
     again = conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
     assert len(asked) == 4  # case 3 is made anew as it was, its answer stands
     assert again.truths["case-003"]["files_sha256"] == sealing.hashes(tmp_path / "p" / "case-003")
+
+
+def test_answers_that_were_taken_away_are_asked_anew(tmp_path, asked):
+    conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
+    shutil.rmtree(tmp_path / "p" / "answers")
+    conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
+    assert len(asked) == 6
 
 
 def test_answers_of_other_code_are_asked_anew(tmp_path, asked, monkeypatch):

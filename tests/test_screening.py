@@ -17,7 +17,7 @@ from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first, stands_alone
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, _between, _first_order, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
-from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept
+from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept, _taken
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -48,6 +48,12 @@ def test_where_much_is_missing_what_promises_least_is_not_screened_from_every_pl
     bar = screening.LESS * max(alone.promises.values())
     again = {name: len(both.begins[name]) for name in alone.begins if not (BY_NAME[name].dear or BY_NAME[name].once)}
     assert again == {name: 1 + (alone.promises[name] >= bar) for name in again} and set(again.values()) == {1, 2}
+
+
+def test_a_round_whose_effect_became_needless_is_given_again_once(pushed):
+    one = replace(pushed.fit, model=pushed.fit.model.with_effect("bias_torque", np.array([0.06])))
+    assert _taken(pushed.fit, []) == 0 and [_taken(one, [()] * rounds) for rounds in (1, 2, 3)] == [1, 1, 2]
+    assert _taken(replace(one, model=one.model.with_state("friction_level", 3)), [(), ()]) == 1
 
 
 def test_a_search_that_is_given_up_still_tells_the_cost_that_was_asked_for(pushed):

@@ -97,23 +97,25 @@ _inertia_of = _chain_inertia([(row, e.inertia) for row, e in enumerate(EFFECTS) 
 
 
 @inlined
-def total_torque(on, p, theta, w, j, t):
-    """Sum of the torques of the effects that are on: those on the rudder only where the motor is a body of its own."""
+def _torques(on, row, p, theta, w, j, t):
+    """Sum of the torques of the effects that a row names."""
     a = 0.0
-    for i in range(on[0, 0]):
-        k = on[0, i + 1]
+    for i in range(on[row, 0]):
+        k = on[row, i + 1]
         a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, t)
     return a
 
 
 @inlined
+def total_torque(on, p, theta, w, j, t):
+    """Sum of the torques of the effects that are on: those on the rudder only where the motor is a body of its own."""
+    return _torques(on, 0, p, theta, w, j, t)
+
+
+@inlined
 def drive_torque(on, p, theta_m, w_m, j, t):
     """The same on a motor that is a body of its own, at its angle and speed seen at the output."""
-    a = 0.0
-    for i in range(on[4, 0]):
-        k = on[4, i + 1]
-        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta_m, w_m, j, t)
-    return a
+    return _torques(on, 4, p, theta_m, w_m, j, t)
 
 
 @inlined

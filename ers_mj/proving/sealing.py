@@ -76,6 +76,7 @@ def begin(folder: Path, settings: Mapping, force: bool) -> bool:
     """
     known = _read(folder / SETTINGS)
     if known == dict(settings):
+        (folder / ANSWERS).mkdir(exist_ok=True)  # somebody may have taken the answers away, to have them given again
         return True
     if known is not None and not force:
         told = " and ".join(f"{key} {known.get(key)}" for key in settings if known.get(key) != settings[key] and key != "made_by")
