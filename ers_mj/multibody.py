@@ -17,16 +17,18 @@ from ers_mj.plants.reduced import lumped
 from ers_mj.plants.skeletons import bodily
 from ers_mj.traces import Trace
 
-MOST_SECONDS = 2.5  # [s] of held-out recordings that are run in MuJoCo, which takes a thousand times as long as the reduced model
+HELD_SECONDS, LEFT_OUT_SECONDS = 10.0, 2.5  # [s] of held-out recordings, and of those left out in turn, that are run in MuJoCo, which takes a thousand times as
+# long as the reduced model
 
 
 def run_in_mujoco(parts: Sequence[Fold]) -> list[Trace]:
-    """The first of the held-out recordings: as many as last MOST_SECONDS together, or the first one's beginning."""
-    traces = [fold.held_out for fold in parts]
+    """The first of the recordings held out (HELD_SECONDS) or left out in turn (LEFT_OUT_SECONDS): as many as last so long together, or the first one's
+    beginning."""
+    traces, most = [fold.held_out for fold in parts], HELD_SECONDS if parts[0].training is None else LEFT_OUT_SECONDS
     ends = np.cumsum([trace.t[-1] - trace.t[0] for trace in traces])
-    whole = int(np.searchsorted(ends, MOST_SECONDS, side="right"))
+    whole = int(np.searchsorted(ends, most, side="right"))
     first = traces[0]
-    return traces[:whole] or [replace(first.part(0, int(np.searchsorted(first.t, first.t[0] + MOST_SECONDS))), start=first.start)]
+    return traces[:whole] or [replace(first.part(0, int(np.searchsorted(first.t, first.t[0] + most))), start=first.start)]
 
 
 @dataclass(frozen=True)

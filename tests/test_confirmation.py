@@ -12,7 +12,7 @@ from ers_mj.datasheet import Datasheet
 from ers_mj.evaluation import Fold, Score, folds, halves, refits
 from ers_mj.identification import fit
 from ers_mj.intervals import half_widths, unseen_widths
-from ers_mj.multibody import MOST_SECONDS, run_in_mujoco
+from ers_mj.multibody import HELD_SECONDS, LEFT_OUT_SECONDS, run_in_mujoco
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
@@ -133,11 +133,12 @@ def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks():
     assert _no_closer(score(0.9, 0.9, 9.0), score(1.0, 1.0, 5.0), 1e-6)
 
 
-def test_mujoco_runs_a_few_seconds_of_what_was_held_out():
+@pytest.mark.parametrize("training, most", [(None, HELD_SECONDS), ((), LEFT_OUT_SECONDS)])
+def test_mujoco_runs_a_few_seconds_of_what_was_held_out(training, most):
     def held(seconds):
         t = np.arange(0.0, seconds, 1e-2)
-        return Fold(trace_of(from_arrays(t, np.sin(t), np.sin(t), name=f"{seconds} s"), None), None)
+        return Fold(trace_of(from_arrays(t, np.sin(t), np.sin(t), name=f"{seconds} s"), None), training)
 
-    (long,) = run_in_mujoco([held(9.0), held(2.0)])
-    assert long.name == "9.0 s" and long.t[-1] == pytest.approx(MOST_SECONDS, abs=0.011)
-    assert [trace.name for trace in run_in_mujoco([held(1.0), held(1.25), held(1.0)])] == ["1.0 s", "1.25 s"]
+    (long,) = run_in_mujoco([held(12.0), held(2.0)])
+    assert long.name == "12.0 s" and long.t[-1] == pytest.approx(most, abs=0.011)
+    assert [trace.name for trace in run_in_mujoco([held(0.4 * most), held(0.5 * most), held(0.4 * most)])] == [f"{0.4 * most} s", f"{0.5 * most} s"]
