@@ -134,7 +134,7 @@ def _first_order(run: Run, effect: Effect, starts: Sequence[np.ndarray], targets
     """Shares (S,) that the starts of a law promise to first order along a place's own motion; none (0,) where that tells too little.
 
     The tangents of one body are near enough to choose by, whatever stops, delays, sensors and a motor that a shaft or a play parts from the rudder make of
-    them; those along a rudder that bends a bristle choose among many starts at best.
+    them; along a rudder that bends a bristle, where they may run away, only laws with many starts are asked.
     """
     many = len(starts) > effect.tries + 1
     if not starts or not (effect.torque or effect.friction) or effect.once or run.model.plant().bends and not many:
