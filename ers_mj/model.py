@@ -279,13 +279,13 @@ class Model:
             here, unseen = self.shown(trace, plant, path), np.flatnonzero(~trace.valid)
             slope = trace.converter and trace.converter.slope(trace.y - plant.read(trace.t, path[:, 0]) - self.offset(k))
             for other, its, move, row in zip(others, plants, moved, changes[:, ends[k]:ends[k + 1]]):
-                np.divide(move[:, 0] + (other.offset(k) - self.offset(k)) * scale, trace.sigma, out=row[:trace.t.size])
+                np.divide(move[:, 3] + (other.offset(k) - self.offset(k)) * scale, trace.sigma, out=row[:trace.t.size])
                 if slope is not None:
                     row[:trace.t.size] *= slope
                 row[unseen] = 0.0
                 if trace.channels:
                     beside = np.empty_like(path)
-                    beside[:, :3], beside[:, 3] = move, move[:, 0]
+                    beside[:, :3], beside[:, 3] = move[:, :3], move[:, 0]
                     beside /= scale
                     beside += path
                     there = other.shown(trace, its, beside)

@@ -32,6 +32,7 @@ RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
 LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
+SEEN = 0.03  # share of the leader's gain that an overlooked law must show in its first steps to be refitted
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well; what cannot be scaled is in any case
 FAILED = 0.05  # share of the best first refit's gain below which a promise was none
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
@@ -112,8 +113,14 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         """The best fit by name of those by (name, place)."""
         return {name: min((found for (other, _), found in ends.items() if other == name), key=total) for name, _ in ends}
 
+    def glanced(item):
+        return item[0], fit(item[1].model, traces, tau=tau, steps=3, renewals=1)
+
     def onward(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=RENEWALS)
+
+    def descended(item):
+        return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit, renewals=20)
 
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
@@ -135,12 +142,12 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         secant, what has a threshold (a stop, a limit) does nothing until that is passed. Beside what takes long to simulate, those alone that were screened.
         """
         leader = min(best, key=lambda name: total(best[name]), default=None)
-        if leader is None or not is_clocked(leader) or reference - total(best[leader]) < least:
+        if leader is None or not is_clocked(leader) or reference - total(best[leader]) < max(least, LEAST_GAIN):
             return []
         laws = [effect for effect in BY_NAME.values() if not (is_clocked(effect.name) or effect.dear or effect.name in exclude)
                 and (effect.name not in best or reference - total(best[effect.name]) < CLOCKED * (reference - total(best[leader])))]
         own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)]
-               for effect in laws if not (effect.sized or is_dear(base))}
+               for effect in laws if not (effect.sized or base.model.plant().coupled)}
         twists = base.model.plant().has_motor_side  # a play or a shaft, which takes longest, is no knock
         return [(name, begin) for name in (effect.name for effect in laws) for begin in starts.get((name, 0), own.get(name, []))
                 if begin.model.plant().has_motor_side == twists]
@@ -166,7 +173,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         own = {*foremost, *(name for name in screened.promising() if base.model.names and not is_dear(base) and not BY_NAME[name].dear)}  # where bent
         best, ahead = dict(first), [label for label in starts if label[1] == 0 and label[0] in own] if bent and not spent() else []
         early = [(label, begin) for label in ahead for begin in starts[label]]
-        ended = list(pool.map(finish, early))
+        ended = list(pool.map(descended, early))
         for label, found in ended:
             best[label] = min(best[label], found, key=total)
         worth = {name for name, found in leaders(best).items() if bent or reference - total(found) >= AGAIN * most}
@@ -176,7 +183,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         best |= {label: min(best[label], found, key=total) for label, found in again.items()}
         if not bent:
             best = {(name, 0): found for name, found in leaders(best).items()}
-        running = contending(best, best)
+        running = contending([label for label in best if label not in ahead], best)
         for _ in range(LATER_LAPS if base.model.names else LAPS):
             if spent():
                 break
@@ -188,8 +195,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
             best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
             running = contending(running, best)
         best = leaders(best)
-        late = list(pool.map(onward, overlooked(best) if not spent() else []))
         leading = reference - min(map(total, best.values()), default=reference)
+        glances = pool.map(glanced, overlooked(best) if not spent() else [])
+        late = list(pool.map(onward, [(name, found) for name, found in glances if reference - total(found) >= SEEN * leading]))
         for name, found in pool.map(finish, [(name, found) for name, found in late if reference - total(found) >= AGAIN * leading]):
             best[name] = min(best.get(name, found), found, key=total)
         rough = sorted(best.items(), key=lambda item: total(item[1]))

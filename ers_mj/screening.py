@@ -89,7 +89,7 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         for name in sorted(starts, key=lambda name: -max(shares[name], default=math.inf)):
             effect, most_tried = BY_NAME[name], max(BY_NAME[name].tries, tries)
             second = sorted((0.0, 0.0, *(promise for other, promise in promises.items() if not BY_NAME[other].once)))[-2]  # the best one's may be a fork
-            if (share := max(shares[name], default=math.inf)) < UNLIKELY * max(floor, PROMISING * second):
+            if (share := max(shares[name], default=math.inf)) < UNLIKELY * max(floor, PROMISING * second) and not place.plant().bends:
                 promises.setdefault(name, share)
                 continue
             if effect.once:
@@ -222,7 +222,7 @@ class _Surroundings:
     def __init__(self, run: Run, traces: Sequence[Trace], tau: float):
         self.run, self.traces, self.tau, self.known = run, traces, tau, {}
         place = run.model
-        self.whole = not place.has_tangents or place.plant().bends or any(BY_NAME[name].memory for name in place.names)
+        self.whole = not place.plant().is_told_by_motion
 
     def misfit(self, trace: Trace, e: np.ndarray) -> np.ndarray:
         """Misfits (B,) of the residuals (rows,) of a trace, its converter's thresholds aside."""

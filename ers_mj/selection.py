@@ -325,7 +325,8 @@ def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequen
         return replace(model, local={**model.local, candidate.name: candidate.fit.model.local[candidate.name]}) if BY_NAME[candidate.name].local else model
 
     def refitted(item):
-        return item[0], fit(item[1], traces, tau=tau, steps=12)
+        found = fit(item[1], traces, tau=tau, steps=4, renewals=1)
+        return item[0], found if found.cost - current.cost > MISSED else fit(found.model, traces, tau=tau, steps=12)
 
     before = current
     for k, ranked in enumerate(rounds):

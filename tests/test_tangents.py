@@ -1,10 +1,9 @@
-"""Tangents along a motion against central differences of simulations, for every coefficient and every effect that has them."""
+"""Tangents of readings along a motion against central differences of simulations, for every coefficient and every effect that has them."""
 
 import numpy as np
 import pytest
 
-from ers_mj.effects import EFFECTS
-from ers_mj.effects.base import Effect
+from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from test_reduced import SCALES, T, TABLE_1
@@ -21,8 +20,8 @@ def agree(plant, up, down, scale, u, **options):
     """Relative RMS distance between tangent and central difference, the worst samples left out."""
     run = {"start": (VALUES["theta_0"], 0.0), **options}
     path = plant.outputs(T, u, **run)[1]
-    found = plant.tangents(T, u, path, [up], scale, **{k: v for k, v in run.items() if k != "start"})[0][:, 0]
-    true = 0.5 * scale * (up.outputs(T, u, **run)[1][:, 0] - down.outputs(T, u, **run)[1][:, 0])
+    found = plant.tangents(T, u, path, [up], scale, **{k: v for k, v in run.items() if k != "start"})[0][:, 3]
+    true = 0.5 * scale * (up.outputs(T, u, **run)[0] - down.outputs(T, u, **run)[0])
     apart = np.sort(np.abs(found - true))[:int((1 - FORKS) * T.size)]
     return np.sqrt(np.mean(apart**2)) / np.sqrt(np.mean(true**2))
 
@@ -77,8 +76,29 @@ def test_an_observer_forgets_a_change():
     assert agree(plain, moved, less, 1 / STEP, u, y=y, gain=0.025, every=5) < CLOSE
 
 
+@pytest.mark.parametrize("beside, name", [*((beside, name) for beside in ("input_delay", "sensor_lag", "sensor_nonlinearity") for name in ("b", "a_2", "c_2")),
+                                          ("sensor_lag", "its own"), ("sensor_nonlinearity", "its own")])
+def test_an_observer_beside_a_delay_or_a_sensors_error(beside, name):
+    """Followed is what the sensor shows, and shown is what it makes of the motion."""
+    start = BY_NAME[beside].starts(SCALES)[0] * 1.3  # a delay of no whole number of samples
+
+    def plant(way):
+        p, values = start.copy(), dict(VALUES)
+        if name == "its own":
+            p[0] *= 1.0 + way * STEP
+        else:
+            values[name] *= 1.0 + way * STEP
+        return ReducedModel(lumped(values), [(beside, p)])
+
+    u = INPUTS["multisine"](T)
+    y = ReducedModel(lumped(VALUES)).simulate(T, u).theta + 0.002 * np.sin(3.0 * T)
+    assert agree(plant(0), plant(1), plant(-1), 1 / STEP, u, y=y, gain=0.025, every=5) < CLOSE
+
+
 def test_what_has_none_says_so():
     with_tangents = {e.name for e in LAWS}
-    assert not with_tangents & {"backlash", "shaft_compliance", "end_stop", "input_delay", "sensor_lag", "sensor_nonlinearity"}
-    assert all(type(e).measure is Effect.measure for e in LAWS)
+    assert not with_tangents & {"backlash", "shaft_compliance", "end_stop"}
+    for name in ("sensor_quantisation", "sensor_dropout"):
+        values = np.array([1e-3, 0.01][:len(BY_NAME[name].parameters)])
+        assert not ReducedModel(lumped(VALUES), [(name, values)]).has_tangents
     assert len(with_tangents) >= 15

@@ -13,6 +13,7 @@ class InputDelay(Drive):
     mjcf = "the delay of the motor actuator"
     parameters = (Parameter("T_d", "time", "dead time of the command"),)
     sized = 1
+    tangible = False
 
     def starts(self, scales):
         return [np.array([2 * scales.sample_time])]

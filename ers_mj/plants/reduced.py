@@ -12,7 +12,7 @@ from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients, Effect
 from ers_mj.plants.events import simulate_kernel
 from ers_mj.plants.laws import N_PARAMETERS, rows_of
-from ers_mj.plants.tangents import prepare_kernel, tangent_kernel
+from ers_mj.plants.tangents import NUDGE, prepare_kernel, tangent_kernel
 
 ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
 PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = 150, 400, 800, 2000, 60  # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on
@@ -64,6 +64,10 @@ class Motion:
     drive: np.ndarray
     theta_m: np.ndarray
     measured: np.ndarray
+
+
+def _touches_sensor(name: str) -> bool:
+    return type(BY_NAME[name]).measure is not Effect.measure
 
 
 @dataclass(frozen=True)
@@ -143,10 +147,9 @@ class ReducedModel:
 
     def outputs(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> tuple[np.ndarray, np.ndarray]:
         """As ``theta``, with the motion (N, 4) beside it: theta, omega, drive acceleration and motor side's angle."""
-        instant = all(BY_NAME[name].instant for name, _ in self.effects if type(BY_NAME[name]).measure is not Effect.measure)
-        motion = self._run(t, u, start, enable, load, self.behind(y) if gain > 0 and instant else y, gain, every, 1)
+        motion = self._run(t, u, start, enable, load, self.behind(y) if gain > 0 and self._is_instant else y, gain, every, 1)
         read = self.read(t, motion[:, 0])
-        if gain > 0 and not instant:
+        if gain > 0 and not self._is_instant:
             motion = self._run(t, u, start, enable, load, y - (read - motion[:, 0]), gain, every, 1)
             read = self.read(t, motion[:, 0])
         return read, motion
@@ -159,30 +162,69 @@ class ReducedModel:
         return j
 
     @property
+    def _touches_reading(self) -> bool:
+        return any(_touches_sensor(name) for name, _ in self.effects)
+
+    @property
+    def _is_instant(self) -> bool:
+        """Whether the reading tells the output at the same time."""
+        return all(BY_NAME[name].instant for name, _ in self.effects if _touches_sensor(name))
+
+    @property
+    def is_told_by_motion(self) -> bool:
+        """Whether the angle read, the speed and the drive at a moment tell all that comes: not what a delay, a sensor, a law or a second body remembers."""
+        return (not self.coupled and Coefficients(*self._lowered[0]).delay <= 0
+                and not any(_touches_sensor(name) or BY_NAME[name].memory for name, _ in self.effects))
+
+    @property
     def has_tangents(self) -> bool:
-        """Whether ``tangents`` can tell how the output changes: of one body, on a bristle or not, that meets no stop, without delay, read by a plain sensor."""
+        """Whether ``tangents`` can tell how the output changes: of one body, on a bristle or not, that meets no stop, read by a sensor of a smooth law."""
         c = Coefficients(*self._lowered[0])
-        return ((c.two_body <= 0 or c.rho <= 0) and c.lower == -np.inf and c.upper == np.inf and c.delay <= 0
-                and all(type(BY_NAME[name]).measure is Effect.measure for name, _ in self.effects))
+        return (not self.has_motor_side and c.lower == -np.inf and c.upper == np.inf
+                and all(BY_NAME[name].tangible for name, _ in self.effects if _touches_sensor(name)))
 
     def tangents(self, t, u, path, others, scale, *, enable=None, load=None, y=None, gain=0.0, every=1) -> list[np.ndarray]:
-        """First-order changes (N, 3) of theta, omega and drive acceleration along a ``path`` (see ``outputs``), towards each of the ``others``.
+        """First-order changes (N, 4) of theta, omega, drive acceleration and reading along a ``path`` (see ``outputs``), towards each of the ``others``.
 
-        Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect.
+        Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect. An observer's second way (see ``theta``)
+        is taken to follow what the other sensor adds, not what the change of the motion makes of it.
         """
         c, on, p = self._lowered
         enable = np.ones(t.size, np.bool_) if enable is None else enable
         load = np.zeros(t.size) if load is None else load
-        maps, slopes, terminal, out = np.empty((2, 3, 5, 14)), np.zeros((t.size, 3)), self.terminal(u), []
+        theta, y, arriving = path[:, 0], t if y is None else y, self._arriving(t, u)
+        read, followed, instant, out = self.read(t, theta), self.behind(y), self._is_instant, []
+        maps, slopes, still = np.empty((2, 3, 5, 14)), np.zeros((t.size, 3)), np.zeros(t.size)
         prepare_kernel(t, load, path, c.copy(), on, p.copy(), maps, slopes)
         EFFORT.add(t, TANGENT * len(others))
         for other in others:
             c_2, on_2, p_2 = other._lowered
-            change = np.empty((t.size, 3))
-            tangent_kernel(t, terminal, (other.terminal(u) - terminal) * scale, enable, load, t if y is None else y, path, maps, slopes, gain, every,
-                           c.copy(), on, p.copy(), c_2, on_2, p_2.copy(), scale, change)
+            change, added, dy = np.empty((t.size, 4)), still, still
+            if self._touches_reading or other._touches_reading:
+                added = (other.read(t, theta) - read) * scale
+                dy = (other.behind(y) - followed) * scale if instant else -added
+            tangent_kernel(t, arriving, (other._arriving(t, u) - arriving) * scale, enable, load, followed if instant else y, dy, path, maps, slopes,
+                           gain, every, c.copy(), on, p.copy(), c_2, on_2, p_2.copy(), scale, change)
+            change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
             out.append(change)
         return out
+
+    def _arriving(self, t: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Mean (N,) over each uniform sample of the input that arrives at the motor: after a dead time the impulse of a switch within a sample is exact."""
+        u, delay, h = self.terminal(u), Coefficients(*self._lowered[0]).delay, t[1] - t[0]
+        if delay <= 0:
+            return u
+        skip = int(delay / h)
+        late, k = delay / h - skip, np.arange(t.size) - skip
+        return late * u[np.maximum(k - 1, 0)] + (1.0 - late) * u[np.maximum(k, 0)]
+
+    def _read_change(self, t: np.ndarray, theta: np.ndarray, read: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """First-order change (N,) of the reading that a change (N,) of the output makes."""
+        most = float(np.max(np.abs(change)))
+        if not self._touches_reading or not 0.0 < most < np.inf:
+            return change
+        small = NUDGE * float(np.ptp(theta)) / most
+        return (self.read(t, theta + small * change) - read) / small
 
     def read(self, t: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """What the sensor reads (N,) of the true output theta (N,); theta itself where no effect touches the sensor."""

@@ -86,7 +86,7 @@ def _prepare(t, load, path, c, on, p, maps, out):
 
 
 @inlined
-def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
+def _along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
     """See ``_tangent``; ``dc`` is the change of c per unit."""
     h = t[1] - t[0]
     tau, a_emf = c[TAU], c[A_EMF]
@@ -116,7 +116,7 @@ def _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p,
         side_1 = 0.0 if c[C_1] <= 0 else (1.0 if theta_1 > c[THETA_0] else (-1.0 if theta_1 < c[THETA_0] else 0.0))
         cornered = w == 0.0 and c[C_1] > 0 and abs(theta - c[THETA_0]) < CORNER
         if gain > 0.0 and k % every == 0 and y[k] == y[k] and not cornered:
-            a *= 1.0 - gain
+            a += gain * (dy[k] - a)
         if cornered:
             a = dc[THETA_0]
         circuit = 0 if enable[k] else 1
@@ -198,7 +198,7 @@ def _unbent(c, left, way):
 
 
 @inlined
-def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
+def _along_bristle(t, u, du, enable, load, y, dy, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
     """See ``_tangent``: of a rudder on a bristle, whose bend z along the path and its change bent are integrated here."""
     n, h = t.size, t[1] - t[0]
     lawful, k = on[0, 0] + on[1, 0] > 0, c[K_BRISTLE]
@@ -224,7 +224,7 @@ def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, 
         if gain > 0.0 and i % every == 0 and y[i] == y[i] and not cornered:
             jump = gain * (y[i] - theta)
             near = min(abs(theta - c[THETA_0]) / max(2.0 * abs(jump), 1e-300), 1.0) if c[C_1] > 0 else 1.0
-            a *= 1.0 - gain * near
+            a += gain * near * (dy[i] - a)
             jump *= near
         rate, emf, pull = 0.0, 0.0, 0.0
         if enable[i]:
@@ -278,24 +278,25 @@ def _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, 
         z = z_1
 
 
-def _tangent(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, scale, out):
-    """Fill out (N, 3) with the change of (theta, w, j) per unit of the change that made c_2, on_2, p_2 of c, on, p, times ``scale``.
+def _tangent(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, scale, out):
+    """Fill out (N, >= 3) with the change of (theta, w, j) per unit of the change that made c_2, on_2, p_2 of c, on, p, times ``scale``.
 
-    ``du`` (N,) is the change of the input per unit. The rest as in simulate_kernel, which has made ``path`` (N, >= 3) of it.
+    ``du`` (N,) and ``dy`` (N,) are the changes per unit of the input and of what an observer follows. The rest as in simulate_kernel, which has made
+    ``path`` (N, >= 3) of it.
     """
     dc = np.zeros(c.size)
     for i in range(c.size):
         if c[i] != c_2[i]:
             dc[i] = (c_2[i] - c[i]) * scale
     if _has_bristle(c):
-        _along_bristle(t, u, du, enable, load, y, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
+        _along_bristle(t, u, du, enable, load, y, dy, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
     else:
-        _along(t, u, du, enable, load, y, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
+        _along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
 
 
 TABLE, MAPS = types.float64[:, ::1], types.float64[:, :, :, ::1]
 
 with compiled_cache():
     prepare_kernel = njit(types.void(READ, READ, TABLE, VECTOR, ROWS, LAWS, MAPS, TABLE), nogil=True, cache=True)(_prepare)
-    tangent_kernel = njit(types.void(READ, READ, READ, READ_BOOL, READ, READ, TABLE, MAPS, TABLE, types.float64, types.int64, VECTOR, ROWS, LAWS,
+    tangent_kernel = njit(types.void(READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, types.float64, types.int64, VECTOR, ROWS, LAWS,
                                      VECTOR, ROWS, LAWS, types.float64, TABLE), nogil=True, cache=True)(_tangent)
