@@ -55,8 +55,15 @@ def told(proofs: Sequence[Mapping]) -> list[str]:
     lines += ["", "time a case, of one processor [s]"]
     for kind in (*KINDS, "all"):
         some = [row["cpu_s"] for row in rows if kind in (row["kind"], "all")]
-        lines += [f"  {kind:20} median {statistics.median(some):.1f}, at most {max(some):.1f}"] if some else []
+        lines += [_times(kind, some)] if some else []
+    for effects in (2, 3):
+        some = [row["cpu_s"] for row in rows if row["kind"] == "several" and len(row["labels"]) == effects]
+        lines += [_times(f"several: {effects} effects", some)] if some else []
     return lines
+
+
+def _times(what: str, some: Sequence[float]) -> str:
+    return f"  {what:20} median {statistics.median(some):.1f}, at most {max(some):.1f} ({len(some)} cases)"
 
 
 def _read(folders: Sequence[Path]) -> list[dict]:
