@@ -137,7 +137,7 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int, steps: in
     def one(fold: Fold) -> Model:
         if fold.training is None:
             return settled(_strange(model), fold.held_out, tau)
-        found = fit(model.of_records(fold.known), fold.training, tau=tau, steps=steps, renewals=steps).model
+        found = fit(model.of_records(fold.known), fold.training, tau=tau, steps=steps).model
         mine = {name: rows[[fold.record]] for name, rows in (model.local or {}).items()}
         return settled(replace(found, local=mine or None), fold.held_out, tau)
 
