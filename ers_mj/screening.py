@@ -69,7 +69,8 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     the first place, or from all of them where it is far from the noise, ``bent`` by what is missing (from the further ones of those with LESS of the best one's
     promise so far): MOST_SENT (MOST_BENT) at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is
     worth LEAST_PROMISE of the ``least`` gain that matters. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
-    A law that to first order promises UNLIKELY of that, or of what follows from the second best promise, is not simulated.
+    A law that to first order promises UNLIKELY of that, or of what follows from the second best promise, is not simulated; beside a
+    bristle, where tangents may run away, what they tell only chooses among starts.
 
     A knock is looked for from the first place only, what is dear to simulate is refitted from its most promising one, and each effect from as many
     starts as it declares, or ``tries`` if more.
