@@ -15,7 +15,7 @@ from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.evaluation import Score, pooled, recalibrated, scored
 from ers_mj.identification import Fit, residuals, score
-from ers_mj.intervals import half_widths, unseen_widths
+from ers_mj.intervals import half_widths, slopes_of, unseen_widths
 from ers_mj.isolability import probabilities
 from ers_mj.model import STATES, Model
 from ers_mj.multibody import Rig, run_in_mujoco
@@ -220,7 +220,8 @@ class Case:
         layout = model.layout()
         z, out = model.vector(layout), {}
         traces, tau = self.start.traces, self.selection.tau
-        for f, q, e in zip(layout, z, np.hypot(half_widths(model, traces, left_out, tau), unseen_widths(model, traces, tau))):
+        jacobian = slopes_of(model, traces)
+        for f, q, e in zip(layout, z, np.hypot(half_widths(model, traces, left_out, tau, jacobian), unseen_widths(model, traces, tau, jacobian))):
             if (f.owner, f.name) in out:  # of a further recording
                 continue
             ends = f.ends(q, e)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import fit, residuals, residuals_in, score, tau_of
-from ers_mj.model import OBSERVER_RATE, Model
+from ers_mj.identification import fit, jacobian_of, residuals, residuals_in, run_of, score, tau_of
+from ers_mj.model import OBSERVER_RATE, Columns, Model
 from ers_mj.starts import fitted_start
 from ers_mj.intervals import half_widths
 from ers_mj.traces import Blocks, Trace
@@ -22,6 +22,7 @@ NULL_GAIN, NULL_GAIN_ONCE = 0.8, 1.5  # of C: decay of the tails of the largest 
 NULL_ALONE = 0.2  # share of effect-free servos whose best law stands alone: 2 of 12 nulls of seed 4141, one by its own clutter
 NULL_PEAK, PEAK_TAIL = 0.63, 1.2  # the worst block's (1 + misfit) / 2 of effect-free servos exceeds x in a share (x / NULL_PEAK)^-PEAK_TAIL of them
 RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
+REFIT_STEPS, REFIT_END = 12, 1e-3  # steps at most of a fold's refit, and gain in C of one at which it ends
 LAST_PART = 0.7  # where the only recording is cut into training and held out
 
 
@@ -132,17 +133,45 @@ def halves(traces: Sequence[Trace], record: int) -> list[Fold]:
     return [Fold(out, (*traces[:record], left, *traces[record + 1:]), record, halved=True) for out, left in (both, both[::-1])]
 
 
-def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int, steps: int = 6) -> list[Model]:
-    """The model of each fold, refitted to its training recordings where it has some."""
+def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[Model]:
+    """The model of each fold, refitted to its training recordings where it has some.
+
+    A refit goes along one Jacobian by finite differences and its updates, so that with and without an effect the same kind of slope leads there; where
+    whole recordings are held out along that of all of them, since no fold's optimum is far, unless it leads nowhere. It ends late: along a valley that
+    the training recordings hardly see, what is held out would otherwise be judged by where the refit began.
+    """
+    whole = [fold.held_out for fold in parts if fold.training is not None and not fold.halved]
+    slopes = _slopes(model, whole) if whole else {}
+
+    def along(begun: Model, fold: Fold, known: Columns) -> Model:
+        return fit(begun, fold.training, tau=tau, steps=REFIT_STEPS, known=known, renewals=0, tolerance=REFIT_END).model
+
     def one(fold: Fold) -> Model:
         if fold.training is None:
             return settled(_strange(model), fold.held_out, tau)
-        found = fit(model.of_records(fold.known), fold.training, tau=tau, steps=steps).model
+        begun = model.of_records(fold.known)
+        found = along(begun, fold, _beside(slopes, begun, fold, whole)) if slopes else begun
+        if np.array_equal(found.vector(begun.layout()), begun.vector(begun.layout())):
+            found = along(begun, fold, _slopes(begun, fold.training))
         mine = {name: rows[[fold.record]] for name, rows in (model.local or {}).items()}
         return settled(replace(found, local=mine or None), fold.held_out, tau)
 
     with ThreadPoolExecutor(jobs) as pool:
         return list(pool.map(one, parts))
+
+
+def _slopes(model: Model, traces: Sequence[Trace]) -> Columns:
+    """The Jacobian's columns of a model along its recordings, by finite differences."""
+    layout = model.layout()
+    run = run_of(model.at(layout, model.vector(layout)), traces, OBSERVER_RATE)
+    return {f.key: column for f, column in zip(layout, jacobian_of(run, traces, OBSERVER_RATE, by_tangents=False).T)}
+
+
+def _beside(slopes: Columns, begun: Model, fold: Fold, traces: Sequence[Trace]) -> Columns:
+    """The columns for a fold's own recordings."""
+    rows = np.repeat(np.arange(len(traces)) != fold.record, [trace.rows for trace in traces])
+    keys = {f.key: (f.owner, f.name, fold.known[f.key[-1]]) if f.local else f.key for f in begun.layout()}
+    return {key: slopes[whole][rows] for key, whole in keys.items()}
 
 
 def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[float, float, float]]]:

@@ -23,6 +23,7 @@ from ers_mj.traces import Blocks, Trace
 
 POLISHED = 100.0  # median misfit (ten sigma) from which parameters are polished by free-run least squares
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
+LEAST_STEP = 0.01  # gain in C of one step below which a fit ends
 FLOOR = 1e-4  # gain in C of one step below which a fit stands on its valley's floor
 HOP = 30.0  # C by which a hop would raise the cost, were its curvature the same all the way
 MOST_HOPS = 3
@@ -77,13 +78,15 @@ def residuals_in(model: Model, trace: Trace, record: int, rate: float) -> np.nda
 
 def _run_in(model, trace, record, rate):
     (theta, *others), motion = model.observed(trace, record, rate)
-    parts = [np.where(trace.valid, trace.weighed(theta), 0.0)]
-    for channel, seen in zip(trace.channels, others):
-        known = np.isfinite(channel.values)
-        if channel.kind == "current":  # before the dead time is over it follows a command that was not recorded
-            known &= trace.t >= trace.t[0] + model.dead_time
-        parts.append(np.where(known, (channel.values - seen) / channel.sigma, 0.0))
-    return np.concatenate(parts), motion
+    left = np.empty((1 + len(others), trace.t.size))
+    left[0] = trace.weighed(theta)
+    for channel, seen, row in zip(trace.channels, others, left[1:]):
+        np.divide(channel.values - seen, channel.sigma, out=row)
+        if channel.kind == "current" and model.dead_time > 0:  # before it is over it follows a command that was not recorded
+            row[trace.t < trace.t[0] + model.dead_time] = 0.0
+    left = left.ravel()
+    left[trace.unseen] = 0.0
+    return left, motion
 
 
 def score(misfit: np.ndarray, tau: float) -> np.ndarray:
@@ -103,13 +106,14 @@ def tau_of(misfit: np.ndarray) -> float:
 
 
 def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25,
-        ceiling: np.ndarray | None = None, known: Columns | None = None, renewals: float = math.inf, by_tangents: bool = True) -> Fit:
-    """Minimise C over the model's free numbers, from the model's own values.
+        ceiling: np.ndarray | None = None, known: Columns | None = None, renewals: float = math.inf, by_tangents: bool = True,
+        tolerance: float = LEAST_STEP) -> Fit:
+    """Minimise C over the model's free numbers, from the model's own values, until a step gains less than the ``tolerance``.
 
     ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
     given up, since its start was a bad one. ``known`` are columns of a Jacobian taken near by, with which the search begins; after
-    ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further. Where their number is unlimited a search
-    ``by_tangents`` (see jacobian_of) does not end before finite differences lead no further either, unless these are dear.
+    ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further. Where their number is unlimited it does not end before one
+    that was taken where an earlier one led no further leads no further either, by finite differences if these are not dear (see jacobian_of).
 
     Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
     mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
@@ -117,14 +121,15 @@ def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, t
     wherever the search ends.
     """
     run = _begun(model, traces, rate)
-    now, jacobian, blocks = math.inf, jacobian_of(run, traces, rate, known) if known is not None else None, Blocks.of(traces)
+    now, jacobian, sure, blocks = math.inf, jacobian_of(run, traces, rate, known) if known is not None else None, False, Blocks.of(traces)
     while True:
         misfit = blocks.misfit(run.left)
         sound = np.all(np.isfinite(misfit))  # a runaway has one descent to find a motion
         level = float(np.exp(np.mean(np.log(misfit + tau)))) if sound else 0.0
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
-        found, run, jacobian, renewals = _descend(run, traces, rate, tau if last else now, steps, 0.01 if last else 0.3, jacobian, renewals, by_tangents)
+        found, run, jacobian, renewals, sure = _descend(run, traces, rate, tau if last else now, steps, tolerance if last else 0.3, jacobian, renewals,
+                                                        by_tangents, sure)
         if last:
             return found
         if ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size:
@@ -184,12 +189,17 @@ def near_noise(found: Fit) -> bool:
     return float(np.median(found.misfit)) <= ROUGH
 
 
+def is_at_observer(found: Fit) -> bool:
+    """Whether a fit stays one of the observer form, near enough to the noise, when it is ``polished``."""
+    return float(np.median(found.misfit)) < POLISHED
+
+
 def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
     """The fit carried on in free run by plain least squares, where model error and not noise decides (see POLISHED).
 
     The free run has more than one valley, so it is reached directly and by way of slower observers; the lower one counts.
     """
-    if float(np.median(found.misfit)) < POLISHED:
+    if is_at_observer(found):
         return found
     ends = []
     for rates in ((0.0,), (1.0, 0.0), (2.0, 0.5, 0.0)):
@@ -205,20 +215,23 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
 
 
 def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float) -> Fit:
-    """Levenberg-Marquardt on C at one ``tau``, until a step along a fresh Jacobian gains less than ``tolerance``."""
+    """Levenberg-Marquardt on C at one ``tau``, until a step gains less than ``tolerance`` along a fresh Jacobian, or one taken where such a step was."""
     return _descend(_begun(model, traces, rate), traces, rate, tau, steps, tolerance, None, math.inf)[0]
 
 
 def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, jacobian: np.ndarray | None,
-             renewals: float, by_tangents: bool = True) -> tuple[Fit, Run, np.ndarray | None, float]:
-    """See ``descend``: the fit, its run, the Jacobian that it ended with, and how many it may still take.
+             renewals: float, by_tangents: bool = True, sure: bool = False) -> tuple[Fit, Run, np.ndarray | None, float, bool]:
+    """See ``descend``: the fit, its run, the Jacobian that it ended with, how many it may still take, and whether that one is ``sure``: taken where one had
+    led no further, so that the search may end on its updates.
 
     Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised; ``jacobian`` is changed by it.
     """
     layout, blocks = run.model.layout(), Blocks.of(traces)
     stride = max(1, round(DENSE / max(trace.sample_time for trace in traces)))
-    z, damping, fresh = run.model.vector(layout), 1e-3, False
-    final = not by_tangents or math.isfinite(renewals) or not _has_tangents(run.model, traces) or any(BY_NAME[name].dear for name in run.model.names)
+    z, damping, fresh, resting = run.model.vector(layout), 1e-3, False, sure
+    lasting = math.isfinite(renewals) or any(BY_NAME[name].dear for name in run.model.names)  # tangents to the end
+    by_tangents = by_tangents and (lasting or not sure)
+    final = lasting or not by_tangents or not _has_tangents(run.model, traces)
 
     def judged(run, z):
         """(run, misfits (B,), cost), the last two None and infinite of a runaway."""
@@ -235,7 +248,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
         if jacobian is None:
             if renewals <= 0:
                 break
-            jacobian, fresh = jacobian_of(run, traces, rate, by_tangents=by_tangents), True
+            jacobian, fresh, sure = jacobian_of(run, traces, rate, by_tangents=by_tangents), True, resting and final
             renewals -= 1
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
         some = jacobian.T[:, ::stride] * np.sqrt(weight[::stride])
@@ -257,7 +270,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
                 break
             if fresh:
                 by_tangents, final, damping = False, True, 1e-3
-            jacobian = None
+            jacobian, resting = None, True
             continue
         moved, gain, was_fresh = goal - z, cost - trial[2], fresh
         promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
@@ -269,12 +282,11 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
         z, (run, m, cost) = goal, trial
         damping = max(damping / 8, 1e-9)
         if gain < tolerance:
-            if (was_fresh and final) or renewals <= 0:
+            if ((was_fresh or sure) and final) or renewals <= 0:
                 break
-            if was_fresh:
-                by_tangents, final = False, True
-            jacobian = None
-    return Fit(run.model, cost, m, hessian), run, jacobian, renewals
+            by_tangents, final = by_tangents and final, True
+            jacobian, resting = None, True
+    return Fit(run.model, cost, m, hessian), run, jacobian, renewals, sure
 
 
 def _has_tangents(model: Model, traces: Sequence[Trace]) -> bool:

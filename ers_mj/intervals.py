@@ -26,14 +26,20 @@ LOST = 1e6  # sigmas that a run leaves where it ran away
 RUN = 4  # neighbouring blocks that are resampled together
 
 
-def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> np.ndarray:
+def slopes_of(model: Model, traces: Sequence[Trace]) -> np.ndarray:
+    """The Jacobian (N, k) from which intervals follow."""
+    layout = model.layout()
+    return central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
+
+
+def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
     """95 % half-widths (k,) of the model's transformed numbers: those of jackknife and sandwich, squared and added.
 
     ``left_out`` holds the model refitted without each recording in turn; with fewer than three, or where
-    some numbers belong to one recording only, the sandwich serves alone.
+    some numbers belong to one recording only, the sandwich serves alone. The ``jacobian`` is ``slopes_of`` the model, where it is known.
     """
     layout = model.layout()
-    widths = _sandwich(model, traces, tau)
+    widths = _sandwich(model, traces, tau, slopes_of(model, traces) if jacobian is None else jacobian)
     if len(left_out) >= FEWEST_RECORDS and not any(f.local for f in layout):
         z = np.array([m.vector(layout) for m in left_out])
         n = len(left_out)
@@ -41,11 +47,9 @@ def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model]
     return widths
 
 
-def _sandwich(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
+def _sandwich(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray) -> np.ndarray:
     """95 % half-widths (k,) by H^-1 (sum of outer products of the slopes of runs of blocks) H^-1."""
-    layout, blocks = model.layout(), Blocks.of(traces)
-    e, z = _left(model, traces), model.vector(layout)
-    jacobian = central_jacobian(model, layout, z, traces, OBSERVER_RATE)
+    layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     weighted = jacobian * weight[:, None]
     hessian = weighted.T @ jacobian
@@ -62,15 +66,14 @@ def _left(model: Model, traces: Sequence[Trace]) -> np.ndarray:
     return np.nan_to_num(residuals(model, traces, OBSERVER_RATE), nan=LOST)
 
 
-def unseen_widths(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
+def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
     """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move to make up for them.
 
     Each effect's secant, at a size that would gain UNSEEN_GAIN beside the model and never larger than its start, shifts the numbers by what a fit
-    makes of it; any effect is as likely as the next, UNSEEN of them act.
+    makes of it; any effect is as likely as the next, UNSEEN of them act. The ``jacobian`` is as in ``half_widths``.
     """
-    layout, blocks = model.layout(), Blocks.of(traces)
-    e = _left(model, traces)
-    jacobian = central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
+    layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
+    jacobian = slopes_of(model, traces) if jacobian is None else jacobian
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     hessian = jacobian.T @ (weight[:, None] * jacobian)
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)

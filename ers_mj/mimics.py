@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from ers_mj.effects import BY_NAME, SUSPECTS
-from ers_mj.identification import Fit, fit, near_noise, polished
+from ers_mj.identification import Fit, fit, is_at_observer, near_noise, polished
 from ers_mj.model import Model
 from ers_mj.race import LEAST_GAIN, LEAST_Z, Candidate, is_clocked, judged, priced
 from ers_mj.remainder import left_by_sensor, more_is_missing
@@ -28,7 +28,7 @@ def unmasked(selection: Selection, traces: Sequence[Trace], jobs: int) -> tuple[
     named and more than noise is left, the one that explains most of it is told, if it explains as much as an effect must.
     """
     tau, suspects = selection.tau, []
-    current = fit(selection.chosen.model, traces, tau=tau, steps=LONG)
+    current = selection.chosen if is_at_observer(selection.chosen) else fit(selection.chosen.model, traces, tau=tau, steps=LONG)
     if not current.model.names:
         if _is_slow(current.model) or not more_is_missing(left_by_sensor(current.model, traces), None):
             return selection, ()

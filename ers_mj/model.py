@@ -12,7 +12,7 @@ import numpy as np
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Parameter, Scales
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.traces import Trace
+from ers_mj.traces import Channel, Trace
 
 OBSERVER_RATE = 5.0  # [1/s]
 OBSERVER_STEP = 0.005  # [s] between corrections of the observer
@@ -276,22 +276,28 @@ class Model:
             path, clock = motions[k], {key: v for key, v in run.items() if key != "start"}
             plants = [other.plant(k, trace.supply) for other in others]
             moved = plant.tangents(trace.t, trace.u, path, plants, scale, **clock)
-            here, unseen = self.shown(trace, plant, path), np.flatnonzero(~trace.valid)
+            here = self.shown(trace, plant, path)
             slope = trace.converter and trace.converter.slope(trace.y - plant.read(trace.t, path[:, 0]) - self.offset(k))
             for other, its, move, row in zip(others, plants, moved, changes[:, ends[k]:ends[k + 1]]):
-                np.divide(move[:, 3] + (other.offset(k) - self.offset(k)) * scale, trace.sigma, out=row[:trace.t.size])
+                read, *beside = row.reshape(-1, trace.t.size)
+                np.divide(move[:, 3] + (other.offset(k) - self.offset(k)) * scale, trace.sigma, out=read)
                 if slope is not None:
-                    row[:trace.t.size] *= slope
-                row[unseen] = 0.0
-                if trace.channels:
-                    beside = np.empty_like(path)
-                    beside[:, :3], beside[:, 3] = move[:, :3], move[:, 0]
-                    beside /= scale
-                    beside += path
-                    there = other.shown(trace, its, beside)
-                    row[trace.t.size:] = np.concatenate([np.where(np.isfinite(c.values), (b - a) * scale, 0.0) / c.sigma
-                                                         for c, a, b in zip(trace.channels, here, there)])
+                    read *= slope
+                for channel, shown, out in zip(trace.channels, here, beside):
+                    np.divide(self._shown_change(channel, trace, plant, other, its, path, move, shown, scale), channel.sigma, out=out)
+                row[trace.unseen] = 0.0
         return changes.T
+
+    def _shown_change(self, channel: Channel, trace: Trace, plant: ReducedModel, other: Model, its: ReducedModel, path: np.ndarray,
+                      move: np.ndarray, shown: np.ndarray, scale: float) -> np.ndarray:
+        """First-order change (N,) of what a further channel shows of one body towards another model, times ``scale``; ``shown`` is what it shows here."""
+        if channel.kind != "current":
+            return move[:, 1 if channel.kind == "speed" else 0]
+        if plant.draws_drive and its.draws_drive:
+            here, there = self.values["ampere"], other.values["ampere"]
+            return move[:, 2] / there + path[:, 2] * (scale / there - scale / here) if here != there else move[:, 2] / here
+        beside = np.column_stack([path[:, :3] + move[:, :3] / scale, path[:, 3] + move[:, 0] / scale])
+        return (its.current(trace.t, beside) / other.values["ampere"] - shown) * scale
 
     def staged(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
         """The plant of a recording, and how it is run along it; ``start`` is the (reading, speed) it begins with, the trace's own if None."""

@@ -28,7 +28,7 @@ SAME = 0.5  # share of its gain by which the scores of all blocks differ at most
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 BENT = 0.5  # C per block from which a model has been bent by what is missing, even if half the blocks are explained
 QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
-RENEWALS = 2  # Jacobians of their own with which the refits go on each lap
+RENEWALS = 2  # Jacobians of their own with which the refits go on each lap, and one where they are finite differences beside an effect
 LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
@@ -117,7 +117,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         return item[0], fit(item[1].model, traces, tau=tau, steps=3, renewals=1)
 
     def onward(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=RENEWALS)
+        renewals = RENEWALS if item[1].model.has_tangents or not base.model.names else 1
+        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=renewals)
 
     def descended(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit, renewals=20)

@@ -228,7 +228,7 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
         begun.setdefault(name, []).append(model)
 
     def refitted(model):
-        return fit(model, traces, tau=tau, steps=SWEEP)
+        return fit(model, traces, tau=tau, steps=SWEEP, renewals=SWEEP)
 
     def carried_on(candidate):
         found = fit(candidate.fit.model, traces, tau=tau, steps=20)
@@ -274,8 +274,17 @@ def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequenc
     p = dict(current.model.effects)[newest]
     rivals = [c for c in earlier[1:] if c.name in BY_NAME and c.name not in names and not BY_NAME[c.name].dear and not BY_NAME[c.name].once
               and c.gain >= REVERSED * earlier[0].gain][:FEWER_REVERSED if is_dear(current) else MOST_REVERSED]
+
+    def begun(c):
+        return judged(c.name, fit(c.fit.model.with_effect(newest, p), traces, tau=tau, steps=20, renewals=20), current, tau)
+
+    def finished(c):
+        return judged(c.name, fit(c.fit.model, traces, tau=tau, steps=20), current, tau) if c.worth >= best - TIE else c
+
     with ThreadPoolExecutor(jobs) as pool:
-        ends = list(pool.map(lambda c: judged(c.name, fit(c.fit.model.with_effect(newest, p), traces, tau=tau, steps=20), current, tau), rivals))
+        ends = list(pool.map(begun, rivals))
+        best = max((c.worth for c in (*ranked, *ends)), default=0.0)
+        ends = list(pool.map(finished, ends))
     return _joined(ranked, ends)
 
 

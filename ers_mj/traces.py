@@ -92,10 +92,15 @@ class Trace:
         made = make_trace(self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum)
         return replace(made, start=self.start, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans))
 
-    @property
+    @cached_property
     def seen(self) -> np.ndarray:
         """Which of its residuals (rows,) a sensor saw."""
         return np.concatenate([self.valid, *(np.isfinite(c.values) for c in self.channels)])
+
+    @cached_property
+    def unseen(self) -> np.ndarray:
+        """The places of the others among them."""
+        return np.flatnonzero(~self.seen)
 
     @cached_property
     def followed(self) -> np.ndarray:

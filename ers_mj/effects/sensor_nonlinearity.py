@@ -5,7 +5,7 @@ import numpy as np
 from ers_mj.effects.base import Parameter, Sensor
 
 NEWTON, FLATTEST = 6, 0.2  # steps that take a sensor's error off a reading at most, and the least slope of a reading
-SETTLED = 1e-12  # [output unit] of a step after which no other follows
+SETTLED = 1e-7  # [output unit] of a step after which no other follows: its error is of the order of its square
 ORDERS = (0.5, 1, 2, 3, 4, 6, 8)  # periods within the travel from which a fit is begun
 
 

@@ -162,6 +162,11 @@ class ReducedModel:
         return j
 
     @property
+    def draws_drive(self) -> bool:
+        """Whether the winding's current is the drive acceleration itself."""
+        return all(type(BY_NAME[name]).winding is Effect.winding for name, _ in self.effects)
+
+    @property
     def _touches_reading(self) -> bool:
         return any(_touches_sensor(name) for name, _ in self.effects)
 
