@@ -222,14 +222,15 @@ def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, step
 def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, jacobian: np.ndarray | None,
              renewals: float, by_tangents: bool = True, sure: bool = False) -> tuple[Fit, Run, np.ndarray | None, float, bool]:
     """See ``descend``: the fit, its run, the Jacobian that it ended with, how many it may still take, and whether that one is ``sure``: taken where one had
-    led no further, so that the search may end on its updates.
+    led no further, so that the search may end on its updates (beside a bristle, where there are tangents only and they may lead astray, on none).
 
     Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised; ``jacobian`` is changed by it.
     """
     layout, blocks = run.model.layout(), Blocks.of(traces)
     stride = max(1, round(DENSE / max(trace.sample_time for trace in traces)))
     z, damping, fresh, resting = run.model.vector(layout), 1e-3, False, sure
-    lasting = math.isfinite(renewals) or any(BY_NAME[name].dear for name in run.model.names)  # tangents to the end
+    dear = any(BY_NAME[name].dear for name in run.model.names)
+    lasting = math.isfinite(renewals) or dear  # tangents to the end
     by_tangents = by_tangents and (lasting or not sure)
     final = lasting or not by_tangents or not _has_tangents(run.model, traces)
 
@@ -248,7 +249,7 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
         if jacobian is None:
             if renewals <= 0:
                 break
-            jacobian, fresh, sure = jacobian_of(run, traces, rate, by_tangents=by_tangents), True, resting and final
+            jacobian, fresh, sure = jacobian_of(run, traces, rate, by_tangents=by_tangents), True, resting and final and not dear
             renewals -= 1
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
         some = jacobian.T[:, ::stride] * np.sqrt(weight[::stride])
