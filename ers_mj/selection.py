@@ -228,7 +228,7 @@ def _swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau:
         begun.setdefault(name, []).append(model)
 
     def refitted(model):
-        return fit(model, traces, tau=tau, steps=SWEEP, renewals=SWEEP)
+        return fit(model, traces, tau=tau, steps=SWEEP)
 
     def carried_on(candidate):
         found = fit(candidate.fit.model, traces, tau=tau, steps=20)
