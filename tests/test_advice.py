@@ -12,8 +12,9 @@ from ers_mj.commands.diagnose import _input_table
 from ers_mj.datasheet import Datasheet
 from ers_mj.design import SETTLED, drawn
 from ers_mj.excitation import SHARES, WAVES, Limits, excitations, signal
-from ers_mj.identification import fit
+from ers_mj.identification import descend, fit
 from ers_mj.isolability import isolability, probabilities
+from ers_mj.model import OBSERVER_RATE
 from ers_mj.starts import with_starts
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
@@ -36,15 +37,15 @@ def traces_of(effects, names=("ramp", "steps")):
 
 
 def explained(traces, *starts):
-    """The traces, at rest when they begin, and the best fit of each effect begun at a start, beside the baseline's letters and beside the servo's own."""
+    """The traces, at rest when they begin, and the best fit of each effect begun at a start and carried on to its valley's floor, beside the baseline's letters and beside the servo's own."""
     sheet = Datasheet(lumped={k: TRUTH[k] for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")},
                       baseline={k: TRUTH[k] for k in ("tau_e", "emf_share")})
     start = baseline(traces, sheet, True, 1)
     traces = [replace(t, start=(TRUTH["theta_0"], 0.0)) for t in start.traces]
     base = start.fit.model
     models = base, replace(base, values={**base.values, **{k: TRUTH[k] for k in sheet.lumped}})
-    return traces, {name: min((fit(m.with_effect(name, np.array(at)), traces, steps=40) for m in models), key=lambda found: found.cost)
-                    for name, *at in starts}
+    ends = {name: min((fit(m.with_effect(name, np.array(at)), traces, steps=40) for m in models), key=lambda found: found.cost) for name, *at in starts}
+    return traces, {name: descend(found.model, traces, OBSERVER_RATE, 1.0, 40, 1e-4) for name, found in ends.items()}
 
 
 @pytest.fixture(scope="module")
