@@ -37,11 +37,15 @@ AGAIN = 0.1  # share of the best first refit's gain from which an effect is refi
 FAILED = 0.05  # share of the best first refit's gain below which a promise was none
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
 # an effect that is not dear all that promise and are not: there a borrowed Jacobian has been bent by two)
+TAUT = 10.0  # times the observer's rate, at which C has few dents: a refit that begins so finds valleys that others miss
+FEW_STARTS = 4  # of an effect's own, up to which it is refitted from them as they are
+EXPLAINED = 0.25  # share of C that a leader which explains everything leaves at most
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 TIE, NEAR_TIE = 1.0, 0.02  # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
 NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) that this other must win itself to be told in its place
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 HALF_STEP = 0.5  # of a coarse converter's, by which an effect moves the reading at least
+STEP_GAIN = 30.0  # of C, from which it is told even if that is less: many thresholds together tell what is much smaller than a step
 RIVAL = 0.3  # share of the leader's gain from which a candidate may take its place later
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 ANEW, ANEW_FROM = 8, 0.2  # starts from which a wave is fitted again that leaves so much C per block
@@ -126,12 +130,21 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     def finish(item):
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
 
+    def held_taut(item):
+        """A fit begun with an observer that holds the motion to the reading, which hardly lets it stick where the rudder slipped: C has few dents then."""
+        near = fit(item[1].model, traces, rate=TAUT * OBSERVER_RATE, tau=tau, steps=QUICK, renewals=2).model
+        return item[0], fit(near, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=1)
+
     def spent():
         return EFFORT.spent >= last  # asked between stages only, so that the answer does not hang on the number of jobs
 
     def told(found):
         """Those that the recordings can show, the likeliest first."""
         return likeliest_first(sorted((c for c in found if shows(c) and not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
+
+    def is_half_explained(found):
+        """Whether a fit wins what matters, and leaves more than one that explains everything."""
+        return reference - total(found) >= NEAR_LEAST * max(least, LEAST_GAIN) and total(found) > min(QUIET * base.misfit.size, EXPLAINED * reference)
 
     def contending(labels, ends):
         """Those labels that may still be the explanation: all while none explains everything, then those with RIVAL of the best one's gain."""
@@ -201,6 +214,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         late = list(pool.map(onward, [(name, found) for name, found in glances if reference - total(found) >= SEEN * leading]))
         for name, found in pool.map(finish, [(name, found) for name, found in late if reference - total(found) >= AGAIN * leading]):
             best[name] = min(best.get(name, found), found, key=total)
+        if best and is_half_explained(min(best.values(), key=total)) and not (is_dear(base) or spent()):
+            for name, found in pool.map(held_taut, _more_starts(base.model, screened.promising(), starts)):
+                best[name] = min(best.get(name, found), found, key=total)
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
@@ -253,11 +269,11 @@ def shows(candidate: Candidate) -> bool:
 
 def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
     """Whether a candidate moves the reading by less than a coarse converter's step, if it acts once, or by less than half a step: what is so small is
-    no more than what a model's own error makes of the moments at which thresholds are passed, or of where within a step the rudder began.
+    no more than what a model's own error makes of the moments at which thresholds are passed, or of where within a step the rudder began, unless it gains STEP_GAIN.
 
     Of effects of the sensor itself confirmation judges (confirmation.py).
     """
-    if candidate.name not in BY_NAME or BY_NAME[candidate.name].subsystem == "sensor" or all(trace.converter is None for trace in traces):
+    if candidate.gain >= STEP_GAIN or candidate.name not in BY_NAME or BY_NAME[candidate.name].subsystem == "sensor" or all(trace.converter is None for trace in traces):
         return False
     share = 1.0 if BY_NAME[candidate.name].once else HALF_STEP
     models = candidate.fit.model, candidate.fit.model.without_effect(candidate.name)
@@ -281,6 +297,18 @@ def _anew(finished: Mapping[str, Fit], traces: Sequence[Trace], tau: float) -> l
             others = [other for other in BY_NAME if other != name]
             places = screen([found.model.without_effect(name)], traces, tau, others, True, False, tries=ANEW).begins.get(name, [])
             out += [(name, begin) for begins in places for begin in begins]
+    return out
+
+
+def _more_starts(base: Model, names: Sequence[str], starts: Mapping[tuple[str, int], Sequence[Begin]]) -> list[tuple[str, Begin]]:
+    """More starts of what is simulated fast and lasts: those of the screening, and where they are few the effects' own as large as they are, since a
+    secant across forks of stick and slip may ask for a dent.
+    """
+    out = []
+    for effect in (BY_NAME[name] for name in names if not (BY_NAME[name].dear or BY_NAME[name].once)):
+        own = effect.starts(base.scales)
+        begins = [*starts.get((effect.name, 0), ()), *(Begin(base.with_effect(effect.name, p), {}) for p in own if len(own) <= FEW_STARTS)]
+        out += [(effect.name, begin) for begin in begins if begin.model.has_tangents]
     return out
 
 

@@ -159,7 +159,7 @@ def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
     finest = 8 * max(grain, FLOAT32 * np.abs(levels).max())
     gaps = np.diff(levels)
     gaps = gaps[gaps > finest / 8]
-    usual = np.quantile(gaps, LATTICE_QUANTILES)
+    usual = np.append(np.quantile(gaps, LATTICE_QUANTILES), np.max(gaps[gaps < WITHIN * np.min(gaps)]))  # the rarer kind, too, where there are two
     begun = {*usual, *np.abs(usual[:, None] - usual).ravel()}
     steps = [_refined(gaps, step) for step in begun if step >= finest]
     step = max((step for step in steps if np.mean(_on_lattice(gaps, step)) >= 0.9), default=0.0)

@@ -144,3 +144,4 @@ def test_what_moves_the_reading_by_less_than_half_a_coarse_step_is_nothing_to_na
     model = Model({**truth, "tau_e": 0.0, "emf_share": 0.0, "ampere": 1.0}, FREE, scales=SCALES).with_effect("bias_torque", np.array([torque]))
     candidate = Candidate("bias_torque", replace(fit(model, coarse, steps=1), model=model), 10.0, 3.0, 0.0, 1.0)
     assert _is_within_a_step(candidate, coarse) is within and not _is_within_a_step(candidate, [fine])
+    assert not _is_within_a_step(replace(candidate, gain=90.0), coarse)  # many thresholds tell together what is much smaller than a step

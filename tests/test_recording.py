@@ -429,6 +429,13 @@ def test_a_coarse_step_counts_before_the_converter_behind_it(coarse, fine):
     assert converter_step(np.round(y, 6)) == pytest.approx(coarse, rel=1e-2)
 
 
+@pytest.mark.parametrize("times", [2.15, 2.5, 2.85])
+def test_a_coarse_step_counts_where_the_converter_behind_makes_one_kind_of_gap_rare(times):
+    fine = 5.1133e-4
+    y = np.round(np.floor(travel(4000, 2e-4, 0) / (times * fine)) * times) * fine
+    assert converter_step(np.round(y, 7)) == pytest.approx(times * fine, rel=1e-2)
+
+
 @pytest.mark.parametrize("decimals", [5, 7, None])
 @pytest.mark.parametrize("coarse, fine", [(7.3415e-4, 2.5566e-4), (8.795e-4, 1.2783e-4), (8.795e-4, 0.0), (7.6698e-4, 2.5566e-4)])
 def test_a_converter_behind_another_shows_where_its_step_does_not_fit(coarse, fine, decimals):

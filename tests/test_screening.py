@@ -14,10 +14,10 @@ from ers_mj.identification import fit, residuals, residuals_in, run_of, score, t
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
-from ers_mj.race import LEAST_GAIN, Candidate, _other_forms, _wider, candidates, judged, likeliest_first, stands_alone
+from ers_mj.race import LEAST_GAIN, Candidate, _more_starts, _other_forms, _wider, candidates, judged, likeliest_first, stands_alone
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, _between, _first_order, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
-from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept, _taken
+from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _is_little, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept, _taken
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -322,6 +322,22 @@ def test_a_sweep_finds_what_secants_miss(pushed):
     (size,) = dict(best.fit.model.effects)["bias_torque"]
     assert best.name == "bias_torque" and size == pytest.approx(0.06, rel=0.3) and best.gain > 2.0
     assert not [c for c in _swept(pushed.fit, [best], pushed.traces, 1.0, others, 1) if c.name == "bias_torque" and c.gain > best.gain + 0.1]
+
+
+def test_a_start_that_a_secant_made_too_small_is_no_end(pushed):
+    """Of laws with few starts these count as they are as well, of what happens once or takes long none; what is found does not hang on the secant's size."""
+    small = pushed.fit.model.with_effect("bias_torque", np.array([1e-3]))
+    begun = _more_starts(pushed.fit.model, ["bias_torque", "position_dependent_friction", "load_disturbance", "presliding"], {("bias_torque", 0): [Begin(small, {})]})
+    own = BY_NAME["bias_torque"].starts(pushed.fit.model.scales)
+    assert [name for name, _ in begun] == ["bias_torque"] * 2 and [dict(b.model.effects)["bias_torque"][0] for _, b in begun] == [1e-3, own[0][0]]
+
+
+def test_a_round_that_wins_little_of_much_is_swept(pushed):
+    one = replace(pushed.fit, model=pushed.fit.model.with_effect("bias_torque", np.array([0.06])))
+    much = replace(one, misfit=np.full(one.misfit.size, 2.0 * np.exp(20.0 / one.misfit.size) - 1.0))  # C is 20
+    little, good = (Candidate("quadratic_drag", one, gain, 3.0, 0.0, 1.0) for gain in (6.0, 8.0))
+    assert _is_little(little, much, 1.0) and not _is_little(good, much, 1.0)
+    assert not _is_little(little, one, 1.0) and not _is_little(little, replace(much, model=pushed.fit.model), 1.0)
 
 
 def test_an_effect_that_leaves_much_gives_way_to_what_a_sweep_finds(pushed):
