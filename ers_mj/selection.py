@@ -31,10 +31,9 @@ ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
-MUCH = 18.0  # of C that is left, of which a good part must go
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH)
-MOST_EFFORT, LESS_EFFORT, LAST_RACED, LAST_BEGUN = 120_000_000, 60_000_000, 50_000_000, 160_000_000  # [us] of simulation (plants.reduced.Effort) after
-# which nothing is looked for that does not show by itself, the same beside what takes long to simulate, a round beside a bristle is left at its first refits, and none is begun; more by as much as the recordings last longer than a MINUTE together
+MOST_EFFORT, LAST_RACED, LAST_BEGUN = 60_000_000, 50_000_000, 160_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
+# for that does not show by itself, a round beside a bristle is left at its first refits, and none is begun; more by as much as the recordings last longer than a MINUTE together
 MINUTE = 60.0  # [s]
 GOOD_PART = 0.35  # share of C that a round must take away for a third where the model stays wrong
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
@@ -59,22 +58,19 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
            jobs: int = 1, progress: Callable[[str, float], None] = lambda text, share: None) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
-    What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle, is left out after MOST_EFFORT or LESS_EFFORT, and no round
+    What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle, is left out after MOST_EFFORT, and no round
     begins after LAST_BEGUN; one beside a bristle that is under way at LAST_RACED goes no further than its first refits.
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
-    latest, sooner, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LESS_EFFORT, LAST_RACED, LAST_BEGUN))
+    end, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN))
     current, rounds, mended, swept, reviewed, took = base, [], 0, False, False, 0.0
     tau = tau_of(base.misfit)
     while _taken(current, rounds) < _most_rounds(current, took) and EFFORT.spent < last:
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least, faint = _gains_that_matter(current, tau)
-        end = sooner if current.model.plant().coupled else latest
         unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
         ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), faint, raced if is_dear(current) else math.inf)
-        if ranked and EFFORT.spent < end and _is_little(ranked[0], current, tau):
-            ranked = _joined(ranked, _swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, _of_one_body))
-        if ranked and faint <= ranked[0].gain and (ranked[0].gain <= MODEST or _is_cheap_beside_another(current)) and mended < _most_mended(current):
+        if ranked and faint <= ranked[0].gain <= MODEST and mended < _most_mended(current):
             again = _less(ranked[0], traces, tau)
             won = float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum())
             if won > DENT:
@@ -176,17 +172,6 @@ def _is_rough_and_wrong(current: Fit, traces: Sequence[Trace]) -> bool:
 def _is_doubtful(current: Fit, tau: float) -> bool:
     """Whether the effects of a model of one body leave more than forks of stick and slip in two blocks do."""
     return bool(current.model.names) and not current.model.plant().coupled and float(score(current.misfit, tau).sum()) > FORKED
-
-
-def _is_cheap_beside_another(current: Fit) -> bool:
-    """Whether the model is one of one body, which is simulated fast, that has an effect already."""
-    return bool(current.model.names) and not current.model.plant().coupled
-
-
-def _is_little(leader: Candidate, current: Fit, tau: float) -> bool:
-    """Whether what leads a round beside an effect of one body takes away no GOOD_PART of what is left, and that is MUCH."""
-    left = float(score(current.misfit, tau).sum())
-    return _is_cheap_beside_another(current) and left > MUCH and leader.gain < GOOD_PART * left
 
 
 def _joined(ranked: Sequence[Candidate], others: Sequence[Candidate]) -> list[Candidate]:

@@ -17,7 +17,7 @@ from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _more_starts, _other_forms, _wider, candidates, judged, likeliest_first, stands_alone
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, _between, _first_order, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
-from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _is_little, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept, _taken
+from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept, _taken
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -330,14 +330,6 @@ def test_a_start_that_a_secant_made_too_small_is_no_end(pushed):
     begun = _more_starts(pushed.fit.model, ["bias_torque", "position_dependent_friction", "load_disturbance", "presliding"], {("bias_torque", 0): [Begin(small, {})]})
     own = BY_NAME["bias_torque"].starts(pushed.fit.model.scales)
     assert [name for name, _ in begun] == ["bias_torque"] * 2 and [dict(b.model.effects)["bias_torque"][0] for _, b in begun] == [1e-3, own[0][0]]
-
-
-def test_a_round_that_wins_little_of_much_is_swept(pushed):
-    one = replace(pushed.fit, model=pushed.fit.model.with_effect("bias_torque", np.array([0.06])))
-    much = replace(one, misfit=np.full(one.misfit.size, 2.0 * np.exp(20.0 / one.misfit.size) - 1.0))  # C is 20
-    little, good = (Candidate("quadratic_drag", one, gain, 3.0, 0.0, 1.0) for gain in (6.0, 8.0))
-    assert _is_little(little, much, 1.0) and not _is_little(good, much, 1.0)
-    assert not _is_little(little, one, 1.0) and not _is_little(little, replace(much, model=pushed.fit.model), 1.0)
 
 
 def test_an_effect_that_leaves_much_gives_way_to_what_a_sweep_finds(pushed):
