@@ -103,17 +103,17 @@ def _no_closer(after: Sequence[Score], without: Sequence[Score], p: float) -> bo
 def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:
     """Whether what acts once acts at the edge of a recording, and the interval of its size holds zero: it bends to whatever few samples leave.
 
-    Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose. What is over while the start is
-    read, or begins in the last moment, is none.
+    Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose. What begins while the start is
+    read or in the last moment is none.
     """
     if not BY_NAME[name].once:
         return False
     columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
     begun, width = (model.local[name][:, columns.index(column)] for column in ("t_0", "width"))
-    knocks = [(b - t.t[0], t.t[-1] - b - w, t.t[-1] - t.t[0]) for b, w, t in zip(begun, width, traces, strict=True) if np.isfinite(b)]
-    if any(total - after < START or total - before < START for before, after, total in knocks):
+    knocks = [(b - t.t[0], w, t.t[-1] - b) for b, w, t in zip(begun, width, traces, strict=True) if np.isfinite(b)]
+    if any(before < START or left < START for before, _, left in knocks):
         return True
-    if not any(before < EDGE or after < EDGE for before, after, _ in knocks):
+    if not any(before < EDGE or left - w < EDGE for before, w, left in knocks):
         return False
     layout, size = model.layout(), BY_NAME[name].parameters[0].name
     z, widths = model.vector(layout), half_widths(model, traces, (), tau)

@@ -10,14 +10,15 @@ from dataclasses import replace
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.identification import Fit, fit, is_at_observer, near_noise, polished
 from ers_mj.model import Model
-from ers_mj.race import LEAST_GAIN, LEAST_Z, Candidate, is_clocked, judged, priced
+from ers_mj.race import LEAST_GAIN, LEAST_Z, Candidate, candidates, is_clocked, judged, priced
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import screen
-from ers_mj.selection import Selection, pruned
+from ers_mj.selection import FORKED, Selection, pruned
 from ers_mj.traces import Trace
 
 NAMELESS_PRICE = 2.0  # of C by which a law without a name must be better: it is less common than those that have one
 QUICK, LONG = 8, 20  # steps of a first refit on a borrowed Jacobian, and of one to its end
+MANY = 2  # names, beyond which, or beside which more than forks of stick and slip leave, one law without a name is tried in the place of all
 BEHIND = 0.5  # share of what the named effect buys by which a first refit may be behind it
 
 
@@ -42,6 +43,12 @@ def unmasked(selection: Selection, traces: Sequence[Trace], jobs: int) -> tuple[
         if best is not None and priced(best.fit) + NAMELESS_PRICE < priced(current):
             suspects.append(best)
             current = pruned(best.fit, best.name, traces, tau)
+    if not suspects and (len(current.model.names) > MANY or current.model.names[1:] and current.cost > FORKED) and not _is_slow(current.model):
+        bare = selection.base if is_at_observer(selection.base) else fit(selection.base.model, traces, tau=tau, steps=LONG)
+        found = candidates(bare, traces, tau, jobs, [name for name in BY_NAME if name not in SUSPECTS])
+        best = min((c for c in found if c.name in SUSPECTS), key=lambda c: priced(c.fit), default=None)
+        if best is not None and priced(best.fit) + NAMELESS_PRICE < priced(current):
+            suspects, current = [best], best.fit
     if not suspects:
         return selection, ()
     model = current.model

@@ -152,14 +152,16 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         return [label for label in labels if reference - least > QUIET * base.misfit.size or reference - total(ends[label]) >= RIVAL * least]
 
     def overlooked(best):
-        """The cheap laws, with models to refit, that explain less than CLOCKED of what leads with a clock of its own: on a borrowed Jacobian, or seen by its
-        secant, what has a threshold (a stop, a limit) does nothing until that is passed. Beside what takes long to simulate, those alone that were screened.
+        """The cheap laws, with models to refit, that explain less than CLOCKED of what leads with a clock of its own, or are one with a law that leads and were not refitted: on a
+        borrowed Jacobian, or seen by its secant, what has a threshold (a stop, a limit) does nothing until that is passed. Beside what takes long to simulate, those alone
+        that were screened.
         """
         leader = min(best, key=lambda name: total(best[name]), default=None)
-        if leader is None or not is_clocked(leader) or reference - total(best[leader]) < max(least, LEAST_GAIN):
+        if leader is None or reference - total(best[leader]) < max(least, LEAST_GAIN):
             return []
         laws = [effect for effect in BY_NAME.values() if not (is_clocked(effect.name) or effect.dear or effect.name in exclude)
-                and (effect.name not in best or reference - total(best[effect.name]) < CLOCKED * (reference - total(best[leader])))]
+                and (effect.name not in best or is_clocked(leader) and reference - total(best[effect.name]) < CLOCKED * (reference - total(best[leader])))
+                and (is_clocked(leader) or any({leader, effect.name} <= group for group in EQUIVALENT))]
         own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)]
                for effect in laws if not (effect.sized or base.model.plant().coupled)}
         twists = base.model.plant().has_motor_side  # a play or a shaft, which takes longest, is no knock

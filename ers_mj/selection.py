@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
-from ers_mj.effects import BY_NAME
+from ers_mj.effects import BY_NAME, EQUIVALENT
 from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residuals_in, score, tau_of
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.reduced import EFFORT, ReducedModel
@@ -39,6 +40,8 @@ GOOD_PART = 0.35  # share of C that a round must take away for a third where the
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
+PAIRED, FAR, MOST_PAIRS = 0.5, 0.2, 6  # share of what all chosen effects buy, that two rivals must buy one by one to be tried as a pair, and by which the first refit of one
+# that is carried on may be behind; how many are tried
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (see _most_mended)
 
 
@@ -63,9 +66,15 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
     end, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN))
-    current, rounds, mended, swept, reviewed, took = base, [], 0, False, False, 0.0
+    current, rounds, mended, swept, reviewed, paired, took = base, [], 0, False, False, False, 0.0
     tau = tau_of(base.misfit)
-    while _taken(current, rounds) < _most_rounds(current, took) and EFFORT.spent < last:
+    while EFFORT.spent < last:
+        if _taken(current, rounds) >= _most_rounds(current, took):
+            other = None if paired else _paired(current, base, rounds, traces, tau, jobs)
+            if other is None:
+                break
+            (current, rounds), paired = other, True
+            continue
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
         least, faint = _gains_that_matter(current, tau)
         unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
@@ -93,6 +102,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         rounds.append(tuple(sorted(ranked, key=lambda c: c not in asked[:1])))
         if not asked:
             other = None if reviewed or EFFORT.spent >= end or not _is_doubtful(current, tau) else _reviewed(current, rounds, traces, tau, exclude, jobs, end)
+            if other is None and not paired:
+                other, paired = _paired(current, base, rounds, traces, tau, jobs), True
             if other is None:
                 break
             (current, rounds), reviewed = other, True
@@ -261,6 +272,34 @@ def _reviewed(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequenc
     if best is None or priced(best.fit) >= priced(current) - TIE:
         return None
     return best.fit, [*rounds[:k], (best, *(c for c in rounds[k] if c.name != best.name))]
+
+
+def _paired(current: Fit, base: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float,
+            jobs: int) -> tuple[Fit, list[tuple[Candidate, ...]]] | None:
+    """The model with two rivals of the first leader in the place of all that is named, and their rounds, if that is better: what leads may do much of what two
+    others do together, neither of which does as much alone.
+    """
+    if not rounds or not rounds[0] or len(current.model.names) < 2 and not _is_doubtful(current, tau) or current.model.plant().coupled:
+        return None
+    leader, *others = rounds[0]
+    if leader.name not in current.model.names or is_clocked(leader.name):
+        return None
+    won = float(score(base.misfit, tau).sum()) - current.cost
+    rivals = [c for c in others if c.name in BY_NAME and not (is_clocked(c.name) or BY_NAME[c.name].dear or c.fit.model.plant().coupled)
+              and c.gain >= RIVAL * leader.gain]
+    pairs = [(a, b) for a, b in combinations(rivals, 2) if a.gain + b.gain >= PAIRED * won and not any({a.name, b.name} <= group for group in EQUIVALENT)]
+
+    def joined(pair):
+        a, b = pair
+        found = fit(a.fit.model.with_effect(b.name, dict(b.fit.model.effects)[b.name]), traces, tau=tau, steps=20, renewals=4)
+        return fit(found.model, traces, tau=tau, steps=20) if found.cost - current.cost < FAR * won else found
+
+    with ThreadPoolExecutor(jobs) as pool:
+        ends = list(zip(pool.map(joined, pairs[:MOST_PAIRS]), pairs))
+    found, (a, b) = min(ends, key=lambda end: priced(end[0]), default=(current, (leader, leader)))
+    if priced(found) >= priced(current) - TIE:
+        return None
+    return found, [(a, *(c for c in rounds[0] if c is not a)), (judged(b.name, found, a.fit, tau),)]
 
 
 def _other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float,
