@@ -142,9 +142,10 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         """Those that the recordings can show, the likeliest first."""
         return likeliest_first(sorted((c for c in found if shows(c) and not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
 
-    def is_half_explained(found):
-        """Whether a fit wins what matters, and leaves more than one that explains everything."""
-        return reference - total(found) >= NEAR_LEAST * max(least, LEAST_GAIN) and total(found) > min(QUIET * base.misfit.size, EXPLAINED * reference)
+    def leaves_much(found):
+        """Whether a fit leaves more than one that explains everything, or wins what matters and leaves a good part."""
+        left = total(found)
+        return left > QUIET * base.misfit.size or reference - left >= NEAR_LEAST * max(least, LEAST_GAIN) and left > EXPLAINED * reference
 
     def contending(labels, ends):
         """Those labels that may still be the explanation: all while none explains everything, then those with RIVAL of the best one's gain."""
@@ -216,8 +217,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         late = list(pool.map(onward, [(name, found) for name, found in glances if reference - total(found) >= SEEN * leading]))
         for name, found in pool.map(finish, [(name, found) for name, found in late if reference - total(found) >= AGAIN * leading]):
             best[name] = min(best.get(name, found), found, key=total)
-        if best and is_half_explained(min(best.values(), key=total)) and not (is_dear(base) or spent()):
-            for name, found in pool.map(held_taut, _more_starts(base.model, screened.promising(), starts)):
+        if best and leaves_much(min(best.values(), key=total)) and not (is_dear(base) or spent()):
+            for name, found in pool.map(held_taut, _more_starts(base.model, [name for name in BY_NAME if name not in exclude], screened.promising(), starts)):
                 best[name] = min(best.get(name, found), found, key=total)
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]
@@ -302,14 +303,14 @@ def _anew(finished: Mapping[str, Fit], traces: Sequence[Trace], tau: float) -> l
     return out
 
 
-def _more_starts(base: Model, names: Sequence[str], starts: Mapping[tuple[str, int], Sequence[Begin]]) -> list[tuple[str, Begin]]:
-    """More starts of what is simulated fast and lasts: those of the screening, and where they are few the effects' own as large as they are, since a
-    secant across forks of stick and slip may ask for a dent.
+def _more_starts(base: Model, names: Sequence[str], promising: Sequence[str], starts: Mapping[tuple[str, int], Sequence[Begin]]) -> list[tuple[str, Begin]]:
+    """More starts of what is simulated fast and lasts: those of the screening of what is ``promising``, and of all that have few their own as large as they are, since a
+    secant across forks of stick and slip may ask for a dent, or promise nothing of what acts.
     """
     out = []
     for effect in (BY_NAME[name] for name in names if not (BY_NAME[name].dear or BY_NAME[name].once)):
         own = effect.starts(base.scales)
-        begins = [*starts.get((effect.name, 0), ()), *(Begin(base.with_effect(effect.name, p), {}) for p in own if len(own) <= FEW_STARTS)]
+        begins = [*(starts.get((effect.name, 0), ()) if effect.name in promising else ()), *(Begin(base.with_effect(effect.name, p), {}) for p in own if len(own) <= FEW_STARTS)]
         out += [(effect.name, begin) for begin in begins if begin.model.has_tangents]
     return out
 
