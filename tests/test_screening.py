@@ -17,7 +17,7 @@ from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
 from ers_mj.race import LEAST_GAIN, Candidate, _more_starts, _other_forms, _wider, candidates, judged, likeliest_first, stands_alone
 from ers_mj.recording import from_arrays
 from ers_mj.screening import Begin, Screened, _between, _first_order, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
-from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _reconsidered, _reviewed, _swept, _taken
+from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _paired, _reconsidered, _reviewed, _swept, _taken
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -325,11 +325,47 @@ def test_a_sweep_finds_what_secants_miss(pushed):
 
 
 def test_a_start_that_a_secant_made_too_small_is_no_end(pushed):
-    """Of laws with few starts these count as they are as well, of what happens once or takes long none; what is found does not hang on the secant's size."""
-    small = pushed.fit.model.with_effect("bias_torque", np.array([1e-3]))
-    begun = _more_starts(pushed.fit.model, ["bias_torque", "position_dependent_friction", "load_disturbance", "presliding"], {("bias_torque", 0): [Begin(small, {})]})
-    own = BY_NAME["bias_torque"].starts(pushed.fit.model.scales)
-    assert [name for name, _ in begun] == ["bias_torque"] * 2 and [dict(b.model.effects)["bias_torque"][0] for _, b in begun] == [1e-3, own[0][0]]
+    """Of laws with few starts these count as they are as well, promised or not, of what happens once or takes long none; what is found does not hang on the secant's size."""
+    small = {(name, 0): [Begin(pushed.fit.model.with_effect(name, np.array([1e-3])), {})] for name in ("bias_torque", "quadratic_drag")}
+    names = ["bias_torque", "quadratic_drag", "position_dependent_friction", "load_disturbance", "presliding"]
+    begun = _more_starts(pushed.fit.model, names, ["bias_torque", "load_disturbance"], small)
+    own = {name: BY_NAME[name].starts(pushed.fit.model.scales)[0][0] for name in ("bias_torque", "quadratic_drag")}
+    assert [(name, dict(b.model.effects)[name][0]) for name, b in begun] == [("bias_torque", 1e-3), ("bias_torque", own["bias_torque"]), ("quadratic_drag", own["quadratic_drag"])]
+
+
+def test_the_kin_of_a_law_that_leads_is_refitted_though_its_secant_promises_nothing(monkeypatch):
+    """A limit does nothing until it is passed; what sags does much of what it does, and leads."""
+    traces = []
+    for k, name in enumerate(("multisine", "steps", "chirp")):
+        y = ReducedModel(lumped(TRUTH), [("current_limit", np.array([300.0, np.inf]))]).simulate(T, INPUTS[name](T)).measured
+        traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+    start, seen = baseline(traces, Datasheet(lumped=TRUTH), True, 1), screening.screen
+    monkeypatch.setattr(race, "screen", lambda places, traces, tau, exclude, *more, **settings: seen(places, traces, tau, [*exclude, "current_limit"], *more, **settings))
+    monkeypatch.setattr(race, "_more_starts", lambda *_: [])
+    others = [name for name in BY_NAME if name not in ("supply_sag", "current_limit")]
+    assert candidates(start.fit, start.traces, 1.0, 1, others)[0].name == "current_limit"
+
+
+def test_two_rivals_take_the_place_of_what_does_much_of_what_both_do():
+    """A friction along the travel beside a spring that hardens, told as a gear that varies and a bent scale."""
+    truth = {"position_dependent_friction": np.array([25.0, np.inf, np.inf, 0.5, 1.4]), "hinge_moment_cubic": np.array([400.0])}
+    traces = []
+    for k, name in enumerate(("multisine", "steps", "chirp")):
+        y = ReducedModel(lumped(TRUTH), list(truth.items())).simulate(T, INPUTS[name](T)).measured
+        traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+    start = baseline(traces, Datasheet(lumped=TRUTH), True, 1)
+
+    def alone(name, p):
+        return judged(name, fit(start.fit.model.with_effect(name, p), start.traces), start.fit, 1.0)
+
+    leader = alone("variable_ratio", np.array([0.01, -1.0, 0.5]))
+    wrong = fit(leader.fit.model.with_effect("quadratic_drag", np.array([1.0])), start.traces)
+    rivals = [alone(name, p) for name, p in truth.items()]
+    found, rounds = _paired(wrong, start.fit, [(leader, *rivals), ()], start.traces, 1.0, 1)
+    assert set(found.model.names) == set(truth) and [ranked[0].name for ranked in rounds] == list(truth)
+    for name, p in found.model.effects:
+        assert p[0] == pytest.approx(truth[name][0], rel=0.1)
+    assert _paired(found, start.fit, [(rivals[0], leader, rivals[1]), ()], start.traces, 1.0, 1) is None
 
 
 def test_an_effect_that_leaves_much_gives_way_to_what_a_sweep_finds(pushed):
