@@ -35,7 +35,7 @@ FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 s
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH)
 MOST_EFFORT, LAST_RACED, LAST_BEGUN = 60_000_000, 50_000_000, 160_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
 # for that does not show by itself, a round beside a bristle is left at its first refits, and none is begun; more by as much as the recordings last longer than a MINUTE together
-MINUTE = 60.0  # [s]
+MINUTE, LONGER = 60.0, 1.5  # [s]; times as late a round of one body, which takes less, may begin
 GOOD_PART = 0.35  # share of C that a round must take away for a third where the model stays wrong
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
@@ -62,13 +62,13 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle, is left out after MOST_EFFORT, and no round
-    begins after LAST_BEGUN; one beside a bristle that is under way at LAST_RACED goes no further than its first refits.
+    begins after LAST_BEGUN (LONGER than that, one of one body); one beside a bristle that is under way at LAST_RACED goes no further than its first refits.
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
     end, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN))
     current, rounds, mended, swept, reviewed, paired, took = base, [], 0, False, False, False, 0.0
     tau = tau_of(base.misfit)
-    while EFFORT.spent < last:
+    while EFFORT.spent < last or EFFORT.spent < LONGER * last and not current.model.plant().coupled:
         if _taken(current, rounds) >= _most_rounds(current, took):
             other = None if paired else _paired(current, base, rounds, traces, tau, jobs)
             if other is None:
@@ -279,7 +279,7 @@ def _paired(current: Fit, base: Fit, rounds: list[tuple[Candidate, ...]], traces
     """The model with two rivals of the first leader in the place of all that is named, and their rounds, if that is better: what leads may do much of what two
     others do together, neither of which does as much alone.
     """
-    if not rounds or not rounds[0] or len(current.model.names) < 2 and not _is_doubtful(current, tau) or current.model.plant().coupled:
+    if not rounds or not rounds[0] or len(current.model.names) < 2 and not _is_doubtful(current, tau) or is_dear(current):
         return None
     leader, *others = rounds[0]
     if leader.name not in current.model.names or is_clocked(leader.name):
@@ -368,9 +368,17 @@ def _asked_for(candidate: Candidate, least: float, least_z: float, outstanding: 
 def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
     """With earlier effects exchanged for rivals of their round that are likelier beside what came later, and the newest where one was; they lead their rounds
     then."""
-    def instead(candidate):
-        model = without.with_effect(candidate.name, dict(candidate.fit.model.effects)[candidate.name])
-        return replace(model, local={**model.local, candidate.name: candidate.fit.model.local[candidate.name]}) if BY_NAME[candidate.name].local else model
+    def joined(model, name, owner):
+        """A model with an effect of another's, as large as it is there."""
+        model = model.with_effect(name, dict(owner.effects)[name])
+        return replace(model, local={**model.local, name: owner.local[name]}) if BY_NAME[name].local else model
+
+    def beside(candidate):
+        """A rival beside the servo that it was fitted with, and what came later."""
+        model = candidate.fit.model
+        for name in current.model.names:
+            model = model if name in (leader, *model.names) else joined(model, name, current.model)
+        return model
 
     def refitted(item):
         found = fit(item[1], traces, tau=tau, steps=4, renewals=1)
@@ -386,7 +394,8 @@ def _exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequen
         rivals = [c for c in ranked[1:] if c.name in BY_NAME and c.name not in current.model.names and really(c.name, c.fit) != leader
                   and c.gain >= RIVAL * ranked[0].gain][:MOST_RIVALS]
         without = current.model.without_effect(leader)
-        begun = [(c.name, instead(c)) for c in rivals]
+        begun = [(c.name, joined(without, c.name, c.fit.model)) for c in rivals]
+        begun += [(c.name, beside(c)) for c in rivals if {*c.fit.model.names} <= {c.name, *without.names}]
         begun += [(name, model) for name in (leader, *(c.name for c in rivals)) for model in _begun_anew(name, without)]
         fits = {leader: current}
         with ThreadPoolExecutor(jobs) as pool:

@@ -239,6 +239,23 @@ def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(push
     assert _exchanged(ranked[0].fit, unlike, traces, 1.0, 1).model.names == ("gravity_imbalance",)
 
 
+def test_a_rival_is_exchanged_from_the_servo_that_it_was_fitted_with_as_well(pushed, monkeypatch):
+    """What leads may have bent the servo further from a rival's than a few steps lead back; a rival of a round whose earlier effect has gone has no such place."""
+    def one(name, b, *others):
+        model = replace(pushed.fit.model, values={**pushed.fit.model.values, "b": b})
+        for other in (*others, name):
+            model = model.with_effect(other, BY_NAME[other].starts(model.scales)[0])
+        return Candidate(name, replace(pushed.fit, model=model), 10.0, 3.0, 0.0, 1.0)
+
+    leader, rival, later = one("bias_torque", 70.0), one("quadratic_drag", 60.0), one("hinge_moment_cubic", 65.0, "bias_torque")
+    seen = []
+    monkeypatch.setattr(selection, "fit", lambda model, *_, **__: (seen.append(model), replace(pushed.fit, model=model, cost=1e6))[1])
+    stale = one("asymmetric_friction", 50.0, "end_stop")
+    rounds = [(leader, rival), (later, stale)]
+    assert _exchanged(later.fit, rounds, pushed.traces, 1.0, 1) is later.fit
+    assert [(set(model.names), model.values["b"]) for model in seen] == [({"hinge_moment_cubic", "quadratic_drag"}, b) for b in (65.0, 60.0)]
+
+
 def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
     u = np.where(T < 1.0, INPUTS["multisine"](T), 0.0)
     knock = np.array([-300.0, 2.24, 0.08, 0.0])
