@@ -65,10 +65,10 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     begins after LAST_BEGUN (LONGER than that, one of one body); one beside a bristle that is under way at LAST_RACED goes no further than its first refits.
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
-    end, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN))
+    end, raced, last, latest = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGER * LAST_BEGUN))
     current, rounds, mended, swept, reviewed, paired, took = base, [], 0, False, False, False, 0.0
     tau = tau_of(base.misfit)
-    while EFFORT.spent < last or EFFORT.spent < LONGER * last and not current.model.plant().coupled:
+    while EFFORT.spent < (last if current.model.plant().coupled else latest):
         if _taken(current, rounds) >= _most_rounds(current, took):
             other = None if paired else _paired(current, base, rounds, traces, tau, jobs)
             if other is None:
