@@ -26,6 +26,7 @@ BEHIND = 0.25  # of C per block, by which a kind is too far behind to be finishe
 SPRINGS = {"bare": (), "spring": ("a_1",), "preload": ("a_1", "c_1")}
 VALLEY = 10.0  # of C by which two fits differ that ended in different valleys
 FEWEST_COGS = 3  # a turn of a motor: the least common multiple of its poles and slots, of which the smallest motors have two and three
+OVER_INERTIA, INERTIAS = ("a_1", "a_2", "b", "c_1", "c_2", "ampere"), (0.6, 0.7, 0.8, 1.2, 1.4, 1.8)  # what the inertia divides, and how it is tried beside what was found
 SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
 
 Scaffolds = tuple[tuple[str, ...], ...]
@@ -82,13 +83,17 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
 
 def sharpened(start: Start, travel: float) -> Start:
     """The baseline refitted to what coarse converters tell (see converter.py), where some are coarse for the travel [output unit]: their thresholds
-    sharpen a fit that is near, and lead one astray that is not.
+    sharpen a fit that is near, and lead one astray that is not. The inertia, which divides all of Eq. (6)'s letters but the angle, is what they tell least,
+    so it is tried larger and smaller too.
     """
     traces = counted(start.traces, travel)
     if all(t.converter is None for t in traces):
         return start
     traces = with_starts(start.fit.model, traces)
     found = fit(start.fit.model, traces)
+    tau, values = tau_of(found.misfit), found.model.values
+    inert = [replace(found.model, values={**values, **{name: values[name] / ratio for name in OVER_INERTIA}}) for ratio in INERTIAS]
+    found = min(fit(found.model, traces, tau=tau), *(fit(model, traces, tau=tau, steps=20) for model in inert), key=lambda f: f.cost)
     traces = with_starts(found.model, traces)
     return replace(start, fit=fit(found.model, traces, tau=tau_of(found.misfit)), traces=traces)
 

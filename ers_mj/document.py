@@ -65,7 +65,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
 def _missing(case: Case) -> list[dict]:
     sensors = [_symptom(case, name, values) for name, values in case.sensors.items()]
     effects = [_effect(case, name) for name in case.told_effects]
-    effects.sort(key=lambda e: (BY_NAME[e["effect"]].once, -float(np.sum(score(case.confirmed.without[e["effect"]].misfit, 1.0)))))
+    effects.sort(key=lambda e: -float(np.sum(score(case.confirmed.without[e["effect"]].misfit, 1.0))))
     return effects + sensors
 
 

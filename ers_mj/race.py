@@ -155,7 +155,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     def overlooked(best):
         """The cheap laws, with models to refit, that explain less than CLOCKED of what leads with a clock of its own, or are one with a law that leads and were not refitted: on a
         borrowed Jacobian, or seen by its secant, what has a threshold (a stop, a limit) does nothing until that is passed. Beside what takes long to simulate, those alone
-        that were screened.
+        that were screened, and promise SEEN of what leads.
         """
         leader = min(best, key=lambda name: total(best[name]), default=None)
         if leader is None or reference - total(best[leader]) < max(least, LEAST_GAIN):
@@ -165,6 +165,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
                 and (is_clocked(leader) or any({leader, effect.name} <= group for group in EQUIVALENT))]
         own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)]
                for effect in laws if not (effect.sized or base.model.plant().coupled)}
+        if base.model.plant().coupled and is_clocked(leader):
+            own = {effect.name: screened.begins[effect.name][0][:1] for effect in laws if effect.name in screened.begins
+                   and screened.promises.get(effect.name, 0.0) >= SEEN * screened.promises.get(leader, math.inf)}
         twists = base.model.plant().has_motor_side  # a play or a shaft, which takes longest, is no knock
         return [(name, begin) for name in (effect.name for effect in laws) for begin in starts.get((name, 0), own.get(name, []))
                 if begin.model.plant().has_motor_side == twists]
@@ -237,7 +240,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         for name, found in (*known, *pool.map(finish, others)):
             if priced(found) < priced(finished[name]):
                 finished[name] = found
-        for name, found in pool.map(finish, wider):
+        for name, found in pool.map(finish, [*wider, *_other_waves(finished, exclude)]):
             kept = finished.get(name, best.get(name))
             if kept is None or priced(found) < priced(kept) - (max(TIE, NEAR_TIE * (reference - total(kept))) if BY_NAME[name].dear else 0.0):
                 finished[name] = found
@@ -296,7 +299,7 @@ def _anew(finished: Mapping[str, Fit], traces: Sequence[Trace], tau: float) -> l
     """
     out = []
     for name, found in finished.items():
-        if name in BY_NAME and BY_NAME[name].wave and not is_clocked(name) and found.cost > ANEW_FROM * found.misfit.size:
+        if _waves_along(name) and found.cost > ANEW_FROM * found.misfit.size:
             others = [other for other in BY_NAME if other != name]
             places = screen([found.model.without_effect(name)], traces, tau, others, True, False, tries=ANEW).begins.get(name, [])
             out += [(name, begin) for begins in places for begin in begins]
@@ -343,6 +346,38 @@ def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[st
             out += [(effect.name, Begin(without.with_effect(effect.name, start), {})) for effect in BY_NAME.values()
                     if effect.name not in exclude for start in effect.grown(name, p, found.model.scales)]
     return out
+
+
+def _other_waves(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:
+    """The other laws that wave along the travel, with models that begin at the period of one that leads: what acts has a sharp one, which starts of a law's own miss.
+
+    Those that are one with it (effects.EQUIVALENT) are left out: they are told apart by how long their periods are.
+    """
+    leader = min(finished, key=lambda name: priced(finished[name]))
+    model = finished[leader].model
+    if not _waves_along(leader) or model.plant().coupled:
+        return []
+    out, without = [], model.without_effect(leader)
+    period = dict(model.effects)[leader][_column_of_period(leader)]
+    for effect in (e for e in BY_NAME.values() if _waves_along(e.name) and e.name not in exclude
+                   and not any({leader, e.name} <= group for group in (*EQUIVALENT, {leader}))):
+        column = _column_of_period(effect.name)
+        waves = [p for p in effect.starts(model.scales) if np.isfinite(p[column])]
+        forms = {tuple(np.isfinite(p)): p for p in waves if period <= waves[0][column]}  # of which the first is the longest
+        for p in forms.values():
+            for phase in (0.0, 0.5 * math.pi):
+                begun = p.copy()
+                begun[column], begun[effect.wave[1]] = period, phase
+                out.append((effect.name, Begin(without.with_effect(effect.name, begun), {})))
+    return out
+
+
+def _waves_along(name: str) -> bool:
+    return name in BY_NAME and BY_NAME[name].wave is not None and not is_clocked(name)
+
+
+def _column_of_period(name: str) -> int:
+    return next(k for k, p in enumerate(BY_NAME[name].parameters) if p.name == "period")
 
 
 def _rivals(ranked: Sequence[Candidate]) -> list[Candidate]:
