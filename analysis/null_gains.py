@@ -1,7 +1,7 @@
 """How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
 
 Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits every effect whose secant
-promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of selection.py open. Prints the largest gain in C of each servo, whether
+promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of race.py open. Prints the largest gain in C of each servo, whether
 no other law is offered nearly as much (race.stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that evaluation.paired_p
 assumes.
 """
@@ -19,7 +19,7 @@ from ers_mj import screening, selection  # noqa: E402
 from ers_mj.baseline import baseline  # noqa: E402
 from ers_mj.datasheet import read_datasheet  # noqa: E402
 from ers_mj.effects import BY_NAME  # noqa: E402
-from ers_mj.race import stands_alone  # noqa: E402
+from ers_mj.ranking import stands_alone  # noqa: E402
 from ers_mj.recording import read_recording  # noqa: E402
 from ers_mj.traces import trace_of  # noqa: E402
 

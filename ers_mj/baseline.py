@@ -93,7 +93,7 @@ def sharpened(start: Start, travel: float) -> Start:
     found = fit(start.fit.model, traces)
     tau, values = tau_of(found.misfit), found.model.values
     inert = [replace(found.model, values={**values, **{name: values[name] / ratio for name in OVER_INERTIA}}) for ratio in INERTIAS]
-    found = min(fit(found.model, traces, tau=tau), *(fit(model, traces, tau=tau, steps=20) for model in inert), key=lambda f: f.cost)
+    found = min([fit(found.model, traces, tau=tau), *(fit(model, traces, tau=tau, steps=20) for model in inert)], key=lambda found: found.cost)
     traces = with_starts(found.model, traces)
     return replace(start, fit=fit(found.model, traces, tau=tau_of(found.misfit)), traces=traces)
 

@@ -21,7 +21,7 @@ from ers_mj.model import STATES, Model
 from ers_mj.multibody import Rig, run_in_mujoco
 from ers_mj.recording import Recording
 from ers_mj.remainder import left_by_sensor, left_elsewhere, more_is_missing
-from ers_mj.race import Candidate
+from ers_mj.ranking import Candidate
 from ers_mj.selection import Selection
 from ers_mj.starts import with_starts
 from ers_mj.traces import Blocks

@@ -14,7 +14,7 @@ from ers_mj.evaluation import Fold, Score, folds, halves, paired_p, pooled, reca
 from ers_mj.identification import Fit, fit, polished, residuals_in, score
 from ers_mj.intervals import half_widths
 from ers_mj.model import OBSERVER_RATE, Model
-from ers_mj.race import stands_alone
+from ers_mj.ranking import stands_alone
 from ers_mj.selection import Selection
 from ers_mj.traces import START, Blocks, Trace
 

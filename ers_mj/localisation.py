@@ -15,7 +15,7 @@ import numpy as np
 from ers_mj.evidence import ResidualMap
 from ers_mj.mismatch import Mismatch, mismatch
 from ers_mj.model import Model
-from ers_mj.race import Candidate
+from ers_mj.ranking import Candidate
 from ers_mj.effects import BY_NAME
 from ers_mj.traces import Trace
 

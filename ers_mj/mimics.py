@@ -10,10 +10,12 @@ from dataclasses import replace
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.identification import Fit, fit, is_at_observer, near_noise, polished
 from ers_mj.model import Model
-from ers_mj.race import LEAST_GAIN, LEAST_Z, Candidate, candidates, is_clocked, judged, priced
+from ers_mj.race import LEAST_GAIN, candidates
+from ers_mj.ranking import LEAST_Z, Candidate, is_clocked, judged, priced
 from ers_mj.remainder import left_by_sensor, more_is_missing
+from ers_mj.reviews import FORKED, pruned
 from ers_mj.screening import screen
-from ers_mj.selection import FORKED, Selection, pruned
+from ers_mj.selection import Selection
 from ers_mj.traces import Trace
 
 NAMELESS_PRICE = 2.0  # of C by which a law without a name must be better: it is less common than those that have one

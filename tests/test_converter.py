@@ -5,13 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ers_mj import baseline
 from ers_mj.baseline import Start, sharpened
 from ers_mj.converter import Converter
 from ers_mj.identification import fit, residuals, run_of, step_of
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.race import Candidate, _is_within_a_step
+from ers_mj.race import _is_within_a_step
+from ers_mj.ranking import Candidate
 from ers_mj.recording import from_arrays
 from ers_mj.selection import _is_rough_and_wrong
 from ers_mj.starts import with_starts
@@ -130,6 +132,20 @@ def test_a_baseline_that_is_far_is_not_led_astray():
     assert sharpened(start, 301 * trace.quantum) is start
     assert abs(sharp.fit.model.values["b"] / truth["b"] - 1.0) < 0.01 and abs(sharp.fit.model.values["c_2"] / truth["c_2"] - 1.0) < 0.02
     assert np.mean(sharp.fit.misfit) < 1.5
+
+
+def test_a_baseline_that_rests_in_a_dent_is_tried_with_other_inertias(monkeypatch):
+    trace, truth = recorded()
+    heavy = {**truth, **{name: 0.68 * truth[name] for name in FREE if name != "theta_0"}}
+
+    def rests(model, traces, **settings):
+        return fit(model, traces, **settings | ({"steps": 0} if model.values["b"] == pytest.approx(heavy["b"]) else {}))
+
+    monkeypatch.setattr(baseline, "fit", rests)
+    start = Start(rests(model(heavy), [trace]), [trace])
+    assert abs(sharpened(start, float(np.ptp(trace.y))).fit.model.values["b"] / truth["b"] - 1.0) < 0.01
+    monkeypatch.setattr(baseline, "INERTIAS", ())
+    assert sharpened(start, float(np.ptp(trace.y))).fit.model.values["b"] == pytest.approx(heavy["b"])
 
 
 def model(values):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj import race, screening, selection
+from ers_mj import race, reviews, screening, selection
 from ers_mj.baseline import baseline
 from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME
@@ -14,10 +14,12 @@ from ers_mj.identification import fit, residuals, residuals_in, run_of, score, t
 from ers_mj.isolability import probabilities
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
-from ers_mj.race import LEAST_GAIN, Candidate, _more_starts, _other_forms, _wider, candidates, judged, likeliest_first, stands_alone
+from ers_mj.race import LEAST_GAIN, _more_starts, _other_forms, _other_waves, _wider, candidates
+from ers_mj.ranking import Candidate, judged, likeliest_first, stands_alone
 from ers_mj.recording import from_arrays
+from ers_mj.reviews import _begun_anew, exchanged, of_one_body, other_way_round, paired, reviewed, swept
 from ers_mj.screening import Begin, Screened, _between, _first_order, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
-from ers_mj.selection import _begun_anew, _bending_and_twisting, _exchanged, _in_its_place, _of_one_body, _other_way_round, _paired, _reconsidered, _reviewed, _swept, _taken
+from ers_mj.selection import _bending_and_twisting, _in_its_place, _reconsidered, _taken
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -138,6 +140,21 @@ def test_a_shaft_may_harden_once_it_is_there(pushed):
     assert not _wider({"shaft_compliance": replace(shaft, model=grown[0])}, ("backlash",))
 
 
+def test_other_laws_wave_with_the_period_that_leads(pushed):
+    """Not those of its class, which are told apart by their periods, nor beside what does not wave."""
+    model = pushed.fit.model
+    period = 0.4 * (model.scales.high - model.scales.low)
+    wave, dent = (replace(pushed.fit, model=model.with_effect("position_dependent_friction", np.array(p)))
+                  for p in ([0.5, np.inf, np.inf, period, 0.3], [0.5, 0.1, 0.05, np.inf, np.inf]))
+    begun = _other_waves({"position_dependent_friction": wave}, ())
+    assert {name for name, _ in begun} >= {"sensor_nonlinearity", "transmission_ripple"} and not {name for name, _ in begun} & {"position_dependent_friction", "periodic_gust"}
+    assert all(period in dict(begin.model.effects)[name] and begin.model.names == (name,) for name, begin in begun)
+    assert "sensor_nonlinearity" not in {name for name, _ in _other_waves({"position_dependent_friction": wave}, ("sensor_nonlinearity",))}
+    assert not _other_waves({"position_dependent_friction": dent}, ()) and not _other_waves({"gain": pushed.fit}, ())
+    ripple = replace(pushed.fit, model=model.with_effect("transmission_ripple", np.array([0.05, period, 0.0, np.inf, np.inf, np.inf])))
+    assert "cogging" not in {name for name, _ in _other_waves({"transmission_ripple": ripple}, ())}
+
+
 def test_forms_are_compared_at_the_end(pushed):
     """Of a supply that sags, the law by duty beside that by current, whichever was ahead after a few steps; each form once."""
     model = pushed.fit.model
@@ -182,7 +199,7 @@ def test_two_effects_are_found_from_either(pushed):
         traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
     start = baseline(traces, Datasheet(lumped=values), True, 1)
     first, second = (judged(name, fit(start.fit.model.with_effect(name, p), start.traces), start.fit, 1.0) for name, p in (truth[1], truth[0]))
-    ranked = _other_way_round(first.fit, [first, second], [], start.traces, 1.0, 1)
+    ranked = other_way_round(first.fit, [first, second], [], start.traces, 1.0, 1)
     assert [c.name for c in ranked] == ["drive_dead_zone"] and set(ranked[0].fit.model.names) == {"drive_dead_zone", "input_delay"}
     found = dict(ranked[0].fit.model.effects)
     assert found["drive_dead_zone"][0] == pytest.approx(0.95, rel=0.02) and found["input_delay"][0] == pytest.approx(0.0157, rel=0.02)
@@ -233,10 +250,10 @@ def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(push
                    (("gravity_imbalance", [0.06, 0.0]), ("bias_torque", [0.06]), ("asymmetric_friction", [-0.06, 0.0])))
     newest = (replace(ranked[0], name="stribeck"),)
     rounds = [ranked, newest]
-    found = _exchanged(ranked[0].fit, rounds, traces, 1.0, 1)
+    found = exchanged(ranked[0].fit, rounds, traces, 1.0, 1)
     assert found.model.names == ("bias_torque",) and [c.name for c in rounds[0]][0] == "bias_torque" and len(rounds[0]) == 3
     unlike = [(ranked[0], replace(ranked[1], gain=0.0), replace(ranked[2], gain=0.0)), newest]
-    assert _exchanged(ranked[0].fit, unlike, traces, 1.0, 1).model.names == ("gravity_imbalance",)
+    assert exchanged(ranked[0].fit, unlike, traces, 1.0, 1).model.names == ("gravity_imbalance",)
 
 
 def test_a_rival_is_exchanged_from_the_servo_that_it_was_fitted_with_as_well(pushed, monkeypatch):
@@ -249,10 +266,10 @@ def test_a_rival_is_exchanged_from_the_servo_that_it_was_fitted_with_as_well(pus
 
     leader, rival, later = one("bias_torque", 70.0), one("quadratic_drag", 60.0), one("hinge_moment_cubic", 65.0, "bias_torque")
     seen = []
-    monkeypatch.setattr(selection, "fit", lambda model, *_, **__: (seen.append(model), replace(pushed.fit, model=model, cost=1e6))[1])
+    monkeypatch.setattr(reviews, "fit", lambda model, *_, **__: (seen.append(model), replace(pushed.fit, model=model, cost=1e6))[1])
     stale = one("asymmetric_friction", 50.0, "end_stop")
     rounds = [(leader, rival), (later, stale)]
-    assert _exchanged(later.fit, rounds, pushed.traces, 1.0, 1) is later.fit
+    assert exchanged(later.fit, rounds, pushed.traces, 1.0, 1) is later.fit
     assert [(set(model.names), model.values["b"]) for model in seen] == [({"hinge_moment_cubic", "quadratic_drag"}, b) for b in (65.0, 60.0)]
 
 
@@ -334,11 +351,11 @@ def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
 def test_a_sweep_finds_what_secants_miss(pushed):
     """From its own start, whatever that makes worse on the way; no more is returned than the screening found."""
     others = [name for name in BY_NAME if name not in ("bias_torque", "quadratic_drag", "hinge_moment_cubic")]
-    found = _swept(pushed.fit, [], pushed.traces, 1.0, others, 1)
+    found = swept(pushed.fit, [], pushed.traces, 1.0, others, 1)
     best = max(found, key=lambda c: c.gain)
     (size,) = dict(best.fit.model.effects)["bias_torque"]
     assert best.name == "bias_torque" and size == pytest.approx(0.06, rel=0.3) and best.gain > 2.0
-    assert not [c for c in _swept(pushed.fit, [best], pushed.traces, 1.0, others, 1) if c.name == "bias_torque" and c.gain > best.gain + 0.1]
+    assert not [c for c in swept(pushed.fit, [best], pushed.traces, 1.0, others, 1) if c.name == "bias_torque" and c.gain > best.gain + 0.1]
 
 
 def test_a_start_that_a_secant_made_too_small_is_no_end(pushed):
@@ -378,27 +395,27 @@ def test_two_rivals_take_the_place_of_what_does_much_of_what_both_do():
     leader = alone("variable_ratio", np.array([0.01, -1.0, 0.5]))
     wrong = fit(leader.fit.model.with_effect("quadratic_drag", np.array([1.0])), start.traces)
     rivals = [alone(name, p) for name, p in truth.items()]
-    found, rounds = _paired(wrong, start.fit, [(leader, *rivals), ()], start.traces, 1.0, 1)
+    found, rounds = paired(wrong, start.fit, [(leader, *rivals), ()], start.traces, 1.0, 1)
     assert set(found.model.names) == set(truth) and [ranked[0].name for ranked in rounds] == list(truth)
     for name, p in found.model.effects:
         assert p[0] == pytest.approx(truth[name][0], rel=0.1)
-    assert _paired(found, start.fit, [(rivals[0], leader, rivals[1]), ()], start.traces, 1.0, 1) is None
+    assert paired(found, start.fit, [(rivals[0], leader, rivals[1]), ()], start.traces, 1.0, 1) is None
 
 
 def test_an_effect_that_leaves_much_gives_way_to_what_a_sweep_finds(pushed):
     others = [name for name in BY_NAME if name not in ("bias_torque", "quadratic_drag", "hinge_moment_cubic")]
     model = pushed.fit.model.with_effect("quadratic_drag", BY_NAME["quadratic_drag"].starts(pushed.fit.model.scales)[0])
     drag = judged("quadratic_drag", fit(model, pushed.traces, tau=1.0), pushed.fit, 1.0)
-    found, rounds = _reviewed(drag.fit, [(drag,), ()], pushed.traces, 1.0, others, 1)
+    found, rounds = reviewed(drag.fit, [(drag,), ()], pushed.traces, 1.0, others, 1)
     assert found.model.names == ("bias_torque",) and [[c.name for c in ranked] for ranked in rounds] == [["bias_torque", "quadratic_drag"]]
-    assert _reviewed(found, rounds, pushed.traces, 1.0, others, 1) is None
+    assert reviewed(found, rounds, pushed.traces, 1.0, others, 1) is None
 
 
 def test_a_sweep_ends_when_enough_has_been_simulated(pushed):
     others = [name for name in BY_NAME if name not in ("bias_torque", "backlash")]
     before = EFFORT.spent
-    assert not _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, before) and EFFORT.spent == before
-    assert [c.name for c in _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, before + 1)] == ["bias_torque"]  # one body first
+    assert not swept(pushed.fit, [], pushed.traces, 1.0, others, 1, before) and EFFORT.spent == before
+    assert [c.name for c in swept(pushed.fit, [], pushed.traces, 1.0, others, 1, before + 1)] == ["bias_torque"]  # one body first
 
 
 def test_a_race_ends_when_enough_has_been_simulated():
@@ -424,11 +441,11 @@ def test_what_bends_and_twists_takes_longest(pushed):
 
 def test_a_second_sweep_leaves_two_bodies_out(pushed, monkeypatch):
     tried = []
-    monkeypatch.setattr(selection, "fit", lambda model, *_, **__: tried.append(model.names) or pushed.fit)
+    monkeypatch.setattr(reviews, "fit", lambda model, *_, **__: tried.append(model.names) or pushed.fit)
     others = [name for name in BY_NAME if name not in ("bias_torque", "backlash", "shaft_compliance")]
-    for kinds, names in (({}, {("bias_torque",), ("backlash",), ("shaft_compliance",)}), ({"kinds": _of_one_body}, {("bias_torque",)})):
+    for kinds, names in (({}, {("bias_torque",), ("backlash",), ("shaft_compliance",)}), ({"kinds": of_one_body}, {("bias_torque",)})):
         tried.clear()
-        _swept(pushed.fit, [], pushed.traces, 1.0, others, 1, **kinds)
+        swept(pushed.fit, [], pushed.traces, 1.0, others, 1, **kinds)
         assert set(tried) == names
 
 
