@@ -28,7 +28,7 @@ RENEWALS = 2  # Jacobians of their own with which the refits go on each lap, and
 LAPS, LATER_LAPS = 8, 3  # the most laps, in the first round and beside an effect
 PACE, PACE_SHARE = 0.1, 0.03  # of the gain that matters and of the best gain so far, which a refit must win in a lap to run another
 FINISHED = 3  # of those, how many at most are fitted to the end: those with half the best one's gain
-SEEN = 0.03  # share of the leader's gain that an overlooked law must show in its first steps to be refitted
+SEEN = 0.03  # share of the leader's gain that an overlooked law must show in its first steps to be refitted, and of its promise beside what takes long to simulate
 AGAIN = 0.1  # share of the best first refit's gain from which an effect is refitted from its other starts as well; what cannot be scaled is in any case
 FAILED = 0.05  # share of the best first refit's gain below which a promise was none
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
@@ -291,8 +291,8 @@ def _other_waves(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tu
         return []
     out, without = [], model.without_effect(leader)
     period = dict(model.effects)[leader][_column_of_period(leader)]
-    for effect in (e for e in BY_NAME.values() if _waves_along(e.name) and e.name not in exclude
-                   and not any({leader, e.name} <= group for group in (*EQUIVALENT, {leader}))):
+    kin = next((group for group in EQUIVALENT if leader in group), {leader})
+    for effect in (e for e in BY_NAME.values() if _waves_along(e.name) and e.name not in (*exclude, *kin)):
         column = _column_of_period(effect.name)
         waves = [p for p in effect.starts(model.scales) if np.isfinite(p[column])]
         forms = {tuple(np.isfinite(p)): p for p in waves if period <= waves[0][column]}  # of which the first is the longest

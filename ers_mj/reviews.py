@@ -15,6 +15,7 @@ from ers_mj.plants.reduced import EFFORT, ReducedModel
 from ers_mj.race import LEAST_GAIN
 from ers_mj.ranking import RIVAL, TIE, Candidate, is_clocked, is_dear, judged, likeliest, likeliest_first, priced, really, shows
 from ers_mj.traces import Trace
+
 MISSED = 100.0  # of C by which a model is worse without an effect that nothing else will stand for
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
