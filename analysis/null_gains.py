@@ -2,7 +2,7 @@
 
 Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits every effect whose secant
 promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of race.py open. Prints the largest gain in C of each servo, whether
-no other law is offered nearly as much (race.stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that evaluation.paired_p
+no other law is offered nearly as much (ranking.stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that evaluation.paired_p
 assumes.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from concealed_cases import main as make_cases  # noqa: E402
-from ers_mj import screening, selection  # noqa: E402
+from ers_mj import reviews, screening, selection  # noqa: E402
 from ers_mj.baseline import baseline  # noqa: E402
 from ers_mj.datasheet import read_datasheet  # noqa: E402
 from ers_mj.effects import BY_NAME  # noqa: E402
@@ -41,7 +41,7 @@ if __name__ == "__main__":
     parser.add_argument("--cases", type=int, default=24)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    screening.LEAST_PROMISE, selection.LEAST_GAIN, selection.MOST_ROUNDS = 0.0, 0.0, 1
+    screening.LEAST_PROMISE, selection.LEAST_GAIN, reviews.LEAST_GAIN, selection.MOST_ROUNDS = 0.0, 0.0, 0.0, 1
     gains, lone, worst = [], [], []
     with tempfile.TemporaryDirectory() as folder:
         make_cases(["--out", folder, "--seed", str(options.seed), "--cases", str(options.cases), "--kind", "none", "--coloured", "0.5", "--no-refit"])

@@ -207,7 +207,7 @@ def paired_p(better: np.ndarray, worse: np.ndarray, once: bool = False, alone: b
     physics in which as large a gain is offered, by an exponential tail (analysis/null_gains.py: of 48 the largest gain of a law is 1.8; stick
     and slip that fork offer what acts ``once`` 2.2 to 3.6 in four of them). A knock is also known by the block that it serves best: the
     worst one of 61 such servos is off by 3.7 to 5.8 sigma in three, by more than 2 in twelve. A law whose round offers no other nearly as much, ``alone``
-    (race.stands_alone), has what chance offers to one only, in a share NULL_ALONE of them.
+    (ranking.stands_alone), has what chance offers to one only, in a share NULL_ALONE of them.
     """
     d = score(worse, 1.0) - score(better, 1.0)
     losses = float(np.sum(np.minimum(d, 0.0) ** 2)) + d.size * LEAST_LOSS**2

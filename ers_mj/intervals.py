@@ -19,7 +19,7 @@ from ers_mj.identification import central_jacobian, residuals
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.traces import Blocks, Trace
 
-UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (selection.LEAST_GAIN is what it must)
+UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (race.LEAST_GAIN is what it must)
 UNSEEN = 1.0  # effects of that size that act, on average
 FEWEST_RECORDS = 3
 LOST = 1e6  # sigmas that a run leaves where it ran away
