@@ -23,6 +23,7 @@ SURE_P = 1e-3  # up to which it is beyond doubt
 CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
 WORSE = 1.3  # times the raw error that an effect which only recalibration confirms, or blocks beyond doubt, may make of it
 HALF = 0.5  # share of the squared error that must go
+MANY = 10  # periods that a wave's fit is begun from, from which on one of them fits what is left by chance
 EDGE = 0.1  # [s] at either end of a recording, in which few samples bear a knock
 
 
@@ -69,7 +70,7 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
         failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(*pairs[n], p[n]))
                   and not _halves(pooled(after), without[n], parts)
                   and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))
-                  or _may_be_none(n, model, start.traces, selection.tau) or _is_a_converters(n, model, start.traces)]
+                  or _may_be_none(n, model, start.traces, selection.tau) or _is_a_converters(n, model, start.traces) or _is_any_wave(n, model, *pairs[n])]
         if not failed:
             before = _scores(base_models, parts)
             shown = [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(before, after, parts) if fold.record not in by_halves]
@@ -98,6 +99,21 @@ def _no_closer(after: Sequence[Score], without: Sequence[Score], p: float) -> bo
     if p >= SURE_P or ratio < WORSE:
         return ratio >= (WORSE if p < SURE_P else 1.0)
     return float(np.mean([math.log(a.sure / b.sure) for a, b in zip(after, without, strict=True)])) >= 0.0
+
+
+def delta_bic(name: str, model: Model, after: Score, without: Score) -> float:
+    """What an effect wins of held-out C, as a difference of BIC: twice the gain, less the logarithm of the number of blocks for each of its numbers."""
+    gain = float(np.sum(score(without.misfit, 1.0)) - np.sum(score(after.misfit, 1.0)))
+    return 2.0 * gain - sum(np.isfinite(v) for v in dict(model.effects)[name]) * math.log(max(without.misfit.size, 2))
+
+
+def _is_any_wave(name: str, model: Model, after: Sequence[Score], without: Sequence[Score]) -> bool:
+    """Whether a wave whose period was looked for among MANY does not pay for its numbers: one of them fits any remainder a little, held out as well, since
+    the recordings are excited alike."""
+    effect = BY_NAME[name]
+    if effect.wave is None or sum(np.isfinite(start[effect.wave[1]]) for start in effect.starts(model.scales)) < MANY:
+        return False
+    return delta_bic(name, model, pooled(after), pooled(without)) < 0.0
 
 
 def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:

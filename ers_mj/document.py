@@ -11,6 +11,7 @@ import numpy as np
 from ers_mj import __version__
 from ers_mj.advice import next_recording
 from ers_mj.case import HALF, TIED, Case
+from ers_mj.confirmation import delta_bic
 from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.evaluation import free_run, pooled, recalibrated
@@ -80,13 +81,11 @@ def _effect(case: Case, name: str) -> dict:
     effect, c = BY_NAME[name], case.confirmed
     parameters = {p["name"]: p["entry"] for p in _effect_parameters(case, name)}
     without = c.without[name]
-    gain = float(np.sum(score(without.misfit, 1.0)) - np.sum(score(pooled(c.after).misfit, 1.0)))
-    size = sum(np.isfinite(v) for v in dict(case.model.effects)[name])
     with_and_without = (None, None) if effect.local else (pooled(c.after).rmse, without.rmse)
     shown = {k: _shown(e["value"], e["unit"]) for k, e in parameters.items()}
     return {"effect": name, "sentence": effect.describe(shown), "subsystem": effect.subsystem, "parameters": parameters,
             "evidence": {"heldout_rmse_without_rad": with_and_without[1], "heldout_rmse_with_rad": with_and_without[0],
-                         "delta_bic": 2 * gain - size * math.log(max(without.misfit.size, 2)), "p_value": c.p[name]},
+                         "delta_bic": delta_bic(name, case.model, pooled(c.after), without), "p_value": c.p[name]},
             "probability": case.found(name)[1].get(name), "alternatives": _alternatives(case, name)}
 
 

@@ -49,7 +49,7 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
 
     They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow and a
     mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near the ``least`` gain that
-    matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for. Once the EFFORT reaches ``last`` they are left
+    matters they are left at that, and where no explanation could buy LEAST_GAIN none is looked for. Once the EFFORT reaches ``last`` all but the best are left
     at their first refits, or where the last stage brought them: beside a bristle that stays wrong a race may take minutes.
     """
     if attainable(base.misfit, Blocks.of(traces).counts, tau) < min(LEAST_GAIN, least) and score(base.misfit, tau).max() < math.log(PEAK):
@@ -185,10 +185,11 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         gains = [reference - total(f) for _, f in rough]
         if not gains or gains[0] < NEAR_LEAST * least:
             return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
-        if spent():
-            return told(judged(*item, base, tau) for item in rough)
+        over = spent()
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
-        finished = dict(pool.map(finish, rough[:close]))
+        finished = dict(pool.map(finish, [item for item in rough[:close] if not (over and bends_and_twists(item[1]))]))
+        if over:
+            return told(judged(*item, base, tau) for item in {**dict(rough), **finished}.items())
         explained = min(map(total, finished.values())) <= QUIET * base.misfit.size
         for name, found in pool.map(finish, [] if explained or bends_and_twists(base) else _anew(finished, traces, tau)):
             finished[name] = min(finished[name], found, key=total)

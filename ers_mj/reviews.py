@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from ers_mj.effects import BY_NAME, EQUIVALENT
-from ers_mj.identification import Fit, fit, hopped, score
+from ers_mj.identification import Fit, fit, hopped, is_rough, score
 from ers_mj.model import Model
 from ers_mj.plants.reduced import EFFORT, ReducedModel
 from ers_mj.race import LEAST_GAIN
@@ -94,17 +94,16 @@ def reviewed(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence
     return best.fit, [*rounds[:k], (best, *(c for c in rounds[k] if c.name != best.name))]
 
 
-def paired(current: Fit, base: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float,
+def paired(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float,
             jobs: int) -> tuple[Fit, list[tuple[Candidate, ...]]] | None:
-    """The model with two rivals of the first leader in the place of all that is named, and their rounds, if that is better: what leads may do much of what two
-    others do together, neither of which does as much alone.
+    """The model with two rivals of the first leader without a clock of its own in the place of it and all that came later, and their rounds, if that is better: what
+    leads may do much of what two others do together, neither of which does as much alone.
     """
-    if not rounds or not rounds[0] or len(current.model.names) < 2 and not is_doubtful(current, tau) or is_dear(current):
+    k = next((k for k, ranked in enumerate(rounds) if ranked and ranked[0].name in current.model.names and not is_clocked(ranked[0].name)), None)
+    if k is None or is_dear(current) or len({ranked[0].name for ranked in rounds[k:] if ranked} & {*current.model.names}) < 2 and not is_doubtful(current, tau):
         return None
-    leader, *others = rounds[0]
-    if leader.name not in current.model.names or is_clocked(leader.name):
-        return None
-    won = float(score(base.misfit, tau).sum()) - current.cost
+    leader, *others = rounds[k]
+    won = leader.gain + float(score(leader.fit.misfit, tau).sum()) - current.cost
     rivals = [c for c in others if c.name in BY_NAME and not (is_clocked(c.name) or BY_NAME[c.name].dear or c.fit.model.plant().coupled)
               and c.gain >= RIVAL * leader.gain]
     pairs = [(a, b) for a, b in combinations(rivals, 2) if a.gain + b.gain >= PAIRED * won and not any({a.name, b.name} <= group for group in EQUIVALENT)]
@@ -119,7 +118,7 @@ def paired(current: Fit, base: Fit, rounds: list[tuple[Candidate, ...]], traces:
     found, (a, b) = min(ends, key=lambda end: priced(end[0]), default=(current, (leader, leader)))
     if priced(found) >= priced(current) - TIE:
         return None
-    return found, [(a, *(c for c in rounds[0] if c is not a)), (judged(b.name, found, a.fit, tau),)]
+    return found, [*rounds[:k], (a, *(c for c in rounds[k] if c is not a)), (judged(b.name, found, a.fit, tau),)]
 
 
 def other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequence[Candidate], traces: Sequence[Trace], tau: float,
@@ -148,8 +147,8 @@ def other_way_round(current: Fit, earlier: Sequence[Candidate], ranked: Sequence
 
 
 def exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
-    """With earlier effects exchanged for rivals of their round that are likelier beside what came later, and the newest where one was; they lead their rounds
-    then."""
+    """With earlier effects exchanged for rivals of their round that are likelier beside what came later, and the newest where one was, or where it has told a coarse
+    converter's recordings anew where they begin; they lead their rounds then."""
     def lent(model, name, owner):
         """A model with an effect of another's, as large as it is there."""
         model = model.with_effect(name, dict(owner.effects)[name])
@@ -168,7 +167,7 @@ def exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequenc
 
     before = current
     for k, ranked in enumerate(rounds):
-        if k == len(rounds) - 1 and current is before:
+        if k == len(rounds) - 1 and current is before and not is_rough(traces):
             break
         leader = ranked[0].name
         if leader not in current.model.names:

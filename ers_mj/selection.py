@@ -27,11 +27,11 @@ LATER_Z = 2.0  # and beside an effect
 PLAIN = 1.3  # noise levels of what a model leaves of a coarse converter's readings, rounding being noise, from which it is wrong
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
-MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH)
+MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH), one that takes a GOOD_PART aside
 MOST_EFFORT, LAST_RACED, LAST_BEGUN = 60_000_000, 50_000_000, 160_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
 # for that does not show by itself, a round beside a bristle is left at its first refits, and none is begun; more by as much as the recordings last longer than a MINUTE together
 MINUTE, LONGER = 60.0, 1.5  # [s]; times as late a round of one body, which takes less, may begin
-GOOD_PART = 0.35  # share of C that a round must take away for a third where the model stays wrong
+GOOD_PART = 0.35  # share of C that a third effect must take away where the model stays wrong, if the second did not
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (see _most_mended)
 
@@ -60,14 +60,14 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     current, rounds, mended, swept, reviewed, paired, took = base, [], 0, False, False, False, 0.0
     tau = tau_of(base.misfit)
     while EFFORT.spent < (last if current.model.plant().coupled else latest):
-        if _taken(current, rounds) >= _most_rounds(current, took):
-            other = None if paired else reviews.paired(current, base, rounds, traces, tau, jobs)
+        if (taken := _taken(current, rounds)) >= MOST_ROUNDS:
+            other = None if paired else reviews.paired(current, rounds, traces, tau, jobs)
             if other is None:
                 break
             (current, rounds), paired = other, True
             continue
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
-        least, faint = _gains_that_matter(current, tau)
+        least, faint = _gains_that_matter(current, tau, taken < FEWER_ROUNDS or near_noise(current) or took >= GOOD_PART)
         unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
         ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), faint, raced if is_dear(current) else math.inf)
         if ranked and faint <= ranked[0].gain <= MODEST and mended < _most_mended(current):
@@ -94,7 +94,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         if not asked:
             other = None if reviewed or EFFORT.spent >= end or not reviews.is_doubtful(current, tau) else reviews.reviewed(current, rounds, traces, tau, exclude, jobs, end)
             if other is None and not paired:
-                other, paired = reviews.paired(current, base, rounds, traces, tau, jobs), True
+                other, paired = reviews.paired(current, rounds, traces, tau, jobs), True
             if other is None:
                 break
             (current, rounds), reviewed = other, True
@@ -117,9 +117,9 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     return Selection(base, current, tuple(rounds), tau, traces)
 
 
-def _gains_that_matter(current: Fit, tau: float) -> tuple[float, float]:
-    """What an effect must buy beside this model, and what one that stands alone must."""
-    share = LEAST_SHARE * float(score(current.misfit, tau).sum())
+def _gains_that_matter(current: Fit, tau: float, in_order: bool) -> tuple[float, float]:
+    """What an effect must buy beside this model, and what one that stands alone must; a good part of all that is left where this is not ``in_order``."""
+    share = (LEAST_SHARE if in_order else GOOD_PART) * float(score(current.misfit, tau).sum())
     usual = LATER_GAIN if current.model.names else LEAST_GAIN
     return max(usual, share), max(FAINT_GAIN if current.model.names and not is_dear(current) else usual, share)
 
@@ -187,11 +187,6 @@ def _taken(current: Fit, rounds: Sequence[tuple[Candidate, ...]]) -> int:
     """Rounds that count: those for what differs between recordings do not, nor, once, one whose effect a later one made needless."""
     effects = len(rounds) - len(current.model.states or {})
     return effects - (effects > len(current.model.names))
-
-
-def _most_rounds(current: Fit, took: float) -> int:
-    """How many rounds there are at most: fewer where the model itself stays wrong, and the last one took away no good part of that."""
-    return MOST_ROUNDS if near_noise(current) or took >= GOOD_PART else FEWER_ROUNDS
 
 
 def _most_mended(current: Fit) -> int:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from ers_mj.baseline import baseline
-from ers_mj.confirmation import _halved, _is_a_converters, _may_be_none, _no_closer, _p_of, _scores
+from ers_mj.confirmation import _halved, _is_a_converters, _is_any_wave, _may_be_none, _no_closer, _p_of, _scores
 from ers_mj.datasheet import Datasheet
+from ers_mj.effects import BY_NAME
 from ers_mj.evaluation import Fold, Score, folds, halves, refits
 from ers_mj.identification import fit
 from ers_mj.intervals import half_widths, unseen_widths
@@ -131,6 +132,16 @@ def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks():
     assert _no_closer(score(1.4), score(1.0), 1e-6) and not _no_closer(score(0.9), score(1.0), 0.04)
     assert not _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 1e-6) and _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 0.04)
     assert _no_closer(score(0.9, 0.9, 9.0), score(1.0, 1.0, 5.0), 1e-6)
+
+
+def test_a_wave_of_many_that_does_not_pay_for_its_numbers_is_any_wave(plain):
+    """Three numbers among a hundred blocks cost 6.9 of C; a limit, or a bent sensor's wave of few periods, is judged by its p-value alone."""
+    model = plain.fit.model
+    for name in ("cogging", "transmission_ripple", "periodic_gust", "sensor_nonlinearity", "voltage_saturation"):
+        model = model.with_effect(name, BY_NAME[name].starts(model.scales)[-1])
+    left, little, much = (Score(1.0, 1, np.full(100, math.expm1(c / 100) + 0.5)) for c in (20.0, 14.0, 8.0))
+    any_wave = {name: [_is_any_wave(name, model, [after], [left]) for after in (little, much)] for name in model.names}
+    assert any_wave == {name: [name in ("cogging", "transmission_ripple", "periodic_gust"), False] for name in model.names}
 
 
 @pytest.mark.parametrize("training, most", [(None, HELD_SECONDS), ((), LEFT_OUT_SECONDS)])

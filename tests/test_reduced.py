@@ -120,6 +120,16 @@ def test_a_bent_bristle_holds_still():
     assert np.ptp(sprung.simulate(T, np.full(T.size, 0.9 * c.c_1 / c.b)).theta) == 0.0
 
 
+def test_a_rudder_that_bounces_in_the_corner_on_its_bristle_is_simulated_to_the_end():
+    """At 200 Hz, under a friction that hardly changes along the travel, it bounces there more than EVENT_BUDGET times a sample."""
+    c = lumped({"a_1": 36.0, "c_1": 188.0, "c_2": 112.0, "theta_0": 0.263, "a_2": 92.0, "b": 138.0, "tau_e": 0.00115})
+    t = np.arange(0.0, 7.5, 5e-3)
+    bristle = ("presliding", np.array([0.00096, 0.018, np.inf, 1.41]))
+    alone, wavy = (ReducedModel(c, [bristle, *more]).simulate(t, 0.3 * INPUTS["multisine"](t)).theta
+                   for more in ([], [("position_dependent_friction", np.array([0.2, np.inf, np.inf, 0.18, 0.0]))]))
+    assert np.all(np.isfinite(wavy)) and np.max(np.abs(wavy - alone)) < 0.05 * np.ptp(alone)
+
+
 def test_it_breaks_away_where_friction_and_preload_end():
     c = table_1().coefficients
     for factor, moves in ((0.999, False), (1.001, True)):

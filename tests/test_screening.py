@@ -19,7 +19,7 @@ from ers_mj.ranking import Candidate, judged, likeliest_first, stands_alone
 from ers_mj.recording import from_arrays
 from ers_mj.reviews import _begun_anew, exchanged, of_one_body, other_way_round, paired, reviewed, swept
 from ers_mj.screening import Begin, Screened, _between, _first_order, _hopeful, _hot, _promise, _Surroundings, _targets, screen, stands_out
-from ers_mj.selection import _bending_and_twisting, _in_its_place, _reconsidered, _taken
+from ers_mj.selection import GOOD_PART, _bending_and_twisting, _gains_that_matter, _in_its_place, _reconsidered, _taken
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -243,7 +243,7 @@ def test_one_block_stands_out_among_bad_ones():
     assert not stands_out(misfit, 1.0) and not stands_out(np.append(misfit, 500.0), 1.0) and stands_out(np.append(misfit, 1000.0), 1.0)
 
 
-def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(pushed):
+def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(pushed, monkeypatch):
     """A constant torque and its asymmetric form are one; gravity, a third that does as well, is beaten by the two together."""
     base, traces = pushed.fit, pushed.traces
     ranked = tuple(judged(name, fit(base.model.with_effect(name, np.array(p)), traces), base, 1.0) for name, p in
@@ -252,6 +252,11 @@ def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(push
     rounds = [ranked, newest]
     found = exchanged(ranked[0].fit, rounds, traces, 1.0, 1)
     assert found.model.names == ("bias_torque",) and [c.name for c in rounds[0]][0] == "bias_torque" and len(rounds[0]) == 3
+    alone = [ranked]
+    assert exchanged(ranked[0].fit, alone, traces, 1.0, 1).model.names == ("gravity_imbalance",)  # its round has compared it with its rivals just so
+    monkeypatch.setattr(reviews, "is_rough", lambda traces: True)  # but behind a coarse converter it has told anew where the recordings begin
+    assert exchanged(ranked[0].fit, alone, traces, 1.0, 1).model.names == ("bias_torque",)
+    monkeypatch.undo()
     unlike = [(ranked[0], replace(ranked[1], gain=0.0), replace(ranked[2], gain=0.0)), newest]
     assert exchanged(ranked[0].fit, unlike, traces, 1.0, 1).model.names == ("gravity_imbalance",)
 
@@ -395,11 +400,21 @@ def test_two_rivals_take_the_place_of_what_does_much_of_what_both_do():
     leader = alone("variable_ratio", np.array([0.01, -1.0, 0.5]))
     wrong = fit(leader.fit.model.with_effect("quadratic_drag", np.array([1.0])), start.traces)
     rivals = [alone(name, p) for name, p in truth.items()]
-    found, rounds = paired(wrong, start.fit, [(leader, *rivals), ()], start.traces, 1.0, 1)
+    found, rounds = paired(wrong, [(leader, *rivals), ()], start.traces, 1.0, 1)
     assert set(found.model.names) == set(truth) and [ranked[0].name for ranked in rounds] == list(truth)
     for name, p in found.model.effects:
         assert p[0] == pytest.approx(truth[name][0], rel=0.1)
-    assert paired(found, start.fit, [(rivals[0], leader, rivals[1]), ()], start.traces, 1.0, 1) is None
+    assert paired(found, [(rivals[0], leader, rivals[1]), ()], start.traces, 1.0, 1) is None
+
+    def blown(found):
+        """The fit beside a gust of a thousandth of its start."""
+        gust = BY_NAME["periodic_gust"].starts(found.model.scales)[0]
+        return replace(found, model=found.model.with_effect("periodic_gust", np.append(1e-3 * gust[:1], gust[1:])))
+
+    first = judged("periodic_gust", blown(start.fit), start.fit, 1.0)
+    later = tuple(replace(c, fit=blown(c.fit)) for c in (leader, *rivals))
+    found, rounds = paired(blown(wrong), [(first,), later, ()], start.traces, 1.0, 1)  # what has a clock of its own stays
+    assert set(found.model.names) == {"periodic_gust", *truth} and [ranked[0].name for ranked in rounds] == ["periodic_gust", *truth]
 
 
 def test_an_effect_that_leaves_much_gives_way_to_what_a_sweep_finds(pushed):
@@ -431,6 +446,14 @@ def test_a_race_ends_when_enough_has_been_simulated():
         efforts.append(EFFORT.spent - before)
     assert efforts[1] < 0.8 * efforts[0]
     assert told[1] and told[1][0].gain > 0.5 * told[0][0].gain > LEAST_GAIN  # what was begun is told
+
+
+def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed):
+    """Of 100 C that are left a tenth is enough in order, and a good part out of it; of hardly any what is more than chance."""
+    wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=pushed.fit.model.with_effect("quadratic_drag", np.array([1.0])))
+    left = float(score(wrong.misfit, 1.0).sum())
+    assert _gains_that_matter(wrong, 1.0, True) == (pytest.approx(0.1 * left), pytest.approx(0.1 * left))
+    assert _gains_that_matter(wrong, 1.0, False) == (pytest.approx(GOOD_PART * left), pytest.approx(GOOD_PART * left))
 
 
 def test_what_bends_and_twists_takes_longest(pushed):

@@ -37,7 +37,7 @@ CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h e
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
 CREPT = 1e-12  # share of its friction by which a motor that has crept to rest may be pulled further
 ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
-EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows
+EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows; a segment on a bristle, which bounces in the corner
 BRISTLE_CORNER = 0.03  # the same for a rudder that no friction slows: share of c_1 h below which it bounces out of sight
 STILL = 5e-5  # share of a bristle's friction within which its rudder rests
 LEAST_LEVEL = 0.2  # of the mean friction, which laws cannot lower a bristle's beyond
@@ -899,7 +899,7 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
     corner = CORNER * (c[C_1] + c[C_PLUS]) * h0
     if bristle:
         corner = max(corner, BRISTLE_CORNER * c[C_1] * last * refine)
-    budget = EVENT_BUDGET * n + 1000
+    budget = EVENT_BUDGET * n * (ends.size if bristle else 1) + 1000
     resting = -1  # the sample that begins in a rest which was checked already
     extra = np.nan  # what the laws add where a segment ended that holds no event
     x = (x0[0], x0[1], x0[2], x0[0], x0[1] if two and not bristle else 0.0)
