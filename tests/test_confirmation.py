@@ -6,34 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj.baseline import baseline
 from ers_mj.confirmation import _halved, _is_a_converters, _is_any_wave, _may_be_none, _no_closer, _p_of, _scores
-from ers_mj.datasheet import Datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.evaluation import Fold, Score, folds, halves, refits
 from ers_mj.identification import fit
 from ers_mj.intervals import half_widths, unseen_widths
 from ers_mj.multibody import HELD_SECONDS, LEFT_OUT_SECONDS, run_in_mujoco
-from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
 from ers_mj.race import candidates
+from ers_mj.recording import from_arrays
 from ers_mj.starts import without_spikes
 from ers_mj.traces import trace_of
-
-T = np.arange(0.0, 3.0, 1e-3)
-TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625}
-NOISE = 1.5e-4
-
-
-def trace(name, effects=(), sensor=lambda y: y, gain=1.0, seed=0):
-    u = gain * INPUTS[name](T)
-    y = ReducedModel(lumped(TRUTH), effects).simulate(T, u).measured + NOISE * np.random.default_rng(seed).standard_normal(T.size)
-    return trace_of(from_arrays(T, u, sensor(y), name=name), None)
-
-
-def started(traces):
-    return baseline(traces, Datasheet(lumped=TRUTH), True, 1)
+from servo import NOISE, TRUTH, started, trace
 
 
 @pytest.fixture(scope="module")

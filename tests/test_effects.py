@@ -1,17 +1,20 @@
 """What every member of the effects folder owes: a complete declaration, parameters within bounds, and nesting."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-from ers_mj.datasheet import read_datasheet
+from ers_mj.baseline import baseline
+from ers_mj.datasheet import Datasheet, read_datasheet
 from ers_mj.effects import BY_NAME, EFFECTS, EQUIVALENT
 from ers_mj.errors import InputError
-from ers_mj.simulation import simulate_recording, unit_of
-from test_reduced import SCALES, T, table_1
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.reduced import ReducedModel
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.simulation import simulate_recording, unit_of
+from servo import TRUTH
+from test_reduced import SCALES, T, table_1
 
 ids = {"ids": lambda e: e.name}
 
@@ -83,3 +86,46 @@ def test_an_open_circuit_feels_nothing_of_the_current(effect):
     with_it, without = (ReducedModel(c, chosen).simulate(T, np.zeros(T.size), (0.5, 8.0), enable=off).theta
                         for chosen in ([(effect.name, effect.starts(SCALES)[0])], []))
     assert np.degrees(np.max(np.abs(with_it - without))) < 1e-6
+
+
+def test_a_bristle_is_begun_with_damping_that_fades_where_it_was_lost(pushed):
+    scales, effect = pushed.fit.model.scales, BY_NAME["presliding"]
+    lasting, fading = (np.array([1e-3, 0.1, w_d, np.inf]) for w_d in (10.0 * scales.speed, 0.1 * scales.speed))
+    assert [p[0] == 1e-3 and p[2] < scales.speed for p in effect.grown("presliding", lasting, scales)] == [True, False, False]
+    assert not any(p[2] < np.inf for p in effect.grown("presliding", fading, scales))
+
+
+def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
+    """Behind a gear of 20 a motor that cogs thrice a turn has a period of 0.105 rad at the output; without a gear any period may be its own."""
+    scales = replace(pushed.fit.model.scales, low=-0.3, high=0.3, cog=2 * np.pi / 60.0)
+    cogs, gears = ([p for p in BY_NAME[name].starts(scales)] for name in ("cogging", "transmission_ripple"))
+    torques = [p for p in gears if np.isfinite(p[3])]
+    assert max(p[1] for p in cogs) <= scales.cog < min(p[1] for p in torques) and len(torques) < len(gears)
+    assert not any(np.isfinite(p[3]) for p in BY_NAME["transmission_ripple"].starts(replace(scales, cog=np.inf)))
+
+
+def test_a_torque_that_returns_must_be_seen_to_return(pushed):
+    """Less than a period of it is any smooth torque; with a second harmonic even a whole one is. A friction that changes along the travel may be slower."""
+    model, ripple = pushed.fit.model, BY_NAME["transmission_ripple"]
+    travel = 2.0 * model.scales.position
+    longest = {name: next(f.upper for f in model.with_effect(name, p).layout() if (f.owner, f.name) == (name, "period")) / travel for name, p in
+               (("cogging", [1.0, 0.1, 0.0, np.inf, np.inf]), ("transmission_ripple", [np.inf, 0.1, 0.0, 1.0, np.inf, np.inf]),
+                ("position_dependent_friction", [1.0, np.inf, np.inf, 0.1, 0.0]))}
+    assert longest["cogging"] == longest["transmission_ripple"] == pytest.approx(1 / 0.95) and longest["position_dependent_friction"] == pytest.approx(1.25)
+    assert [len(ripple.grown(ripple.name, np.array([np.inf, turns * travel, 0.0, 1.0, np.inf, np.inf]), model.scales)) for turns in (0.9, 1.03)] == [2, 0]
+
+
+def test_a_datasheets_gear_bounds_the_period_of_cogging(pushed):
+    sheet = Datasheet(parameters={"n": 20.0}, lumped=TRUTH)
+    assert baseline(pushed.traces, sheet, True, 1).fit.model.scales.cog == pytest.approx(2 * np.pi / 60.0)
+    assert pushed.fit.model.scales.cog == np.inf
+
+
+def test_an_uneven_gears_torque_is_the_one_of_a_cog():
+    u, c = INPUTS["multisine"](T), lumped(TRUTH)
+    wave = [5.0, 0.2, 0.4, 0.3, 1.0]
+    gear, cog = (ReducedModel(c, [(name, np.array(p))]).simulate(T, u).theta for name, p in
+                 (("transmission_ripple", [np.inf, 0.2, 0.4, 5.0, 0.3, 1.0]), ("cogging", wave)))
+    assert np.allclose(gear, cog, atol=1e-9)
+    with pytest.raises(InputError, match="ripple and A are both given"):
+        ReducedModel(c, [("transmission_ripple", np.array([0.1, 0.2, 0.4, 5.0, np.inf, np.inf]))]).simulate(T, u)

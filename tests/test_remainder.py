@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_confirmation import NOISE, TRUTH, started, trace
+from servo import NOISE, TRUTH, started, trace
 
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays

@@ -1,0 +1,55 @@
+"""Which effects a search asks for, round by round."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ers_mj.effects import BY_NAME
+from ers_mj.identification import score
+from ers_mj.ranking import Candidate, judged
+from ers_mj.selection import GOOD_PART, _bending_and_twisting, _gains_that_matter, _in_its_place, _reconsidered, _taken
+
+
+def test_a_round_whose_effect_became_needless_is_given_again_once(pushed):
+    one = replace(pushed.fit, model=pushed.fit.model.with_effect("bias_torque", np.array([0.06])))
+    assert _taken(pushed.fit, []) == 0 and [_taken(one, [()] * rounds) for rounds in (1, 2, 3)] == [1, 1, 2]
+    assert _taken(replace(one, model=one.model.with_state("friction_level", 3)), [(), ()]) == 1
+
+
+@pytest.mark.parametrize("newest, gain, kept", [("drive_dead_zone", 400.0, ("drive_dead_zone",)), ("drive_dead_zone", 50.0, ("load_disturbance", "drive_dead_zone")),
+                                                ("periodic_gust", 400.0, ("load_disturbance", "periodic_gust"))])
+def test_a_knock_that_a_later_law_outweighs_is_looked_for_again(pushed, newest, gain, kept):
+    """It was found in what the law had bent; beside another one with a clock of its own it stays."""
+    start, tau = pushed.fit, 1.0
+    model = start.model
+    for name in ("load_disturbance", newest):
+        model = model.with_effect(name, BY_NAME[name].starts(replace(model.scales, hot=((0, 1.0, 0.1),)))[0])
+    rounds = [(Candidate(name, start, won, 3.0, 0.0, 1.0),) for name, won in (("load_disturbance", 20.0), (newest, gain))]
+    found, left = _reconsidered(replace(start, model=model), rounds, pushed.traces, tau)
+    assert found.model.names == kept and tuple(ranked[0].name for ranked in left) == kept
+
+
+def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed):
+    """Of 100 C that are left a tenth is enough in order, and a good part out of it; of hardly any what is more than chance."""
+    wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=pushed.fit.model.with_effect("quadratic_drag", np.array([1.0])))
+    left = float(score(wrong.misfit, 1.0).sum())
+    assert _gains_that_matter(wrong, 1.0, True) == (pytest.approx(0.1 * left), pytest.approx(0.1 * left))
+    assert _gains_that_matter(wrong, 1.0, False) == (pytest.approx(GOOD_PART * left), pytest.approx(GOOD_PART * left))
+
+
+def test_what_bends_and_twists_takes_longest(pushed):
+    model = pushed.fit.model
+    beside = {name: _bending_and_twisting(model.with_effect(name, BY_NAME[name].starts(model.scales)[0])) for name in ("presliding", "backlash", "stribeck")}
+    assert beside == {"presliding": ["backlash", "shaft_compliance"], "backlash": ["presliding"], "stribeck": []}
+
+
+def test_what_a_refit_turns_into_another_effect_gives_way_to_it(pushed):
+    def found(name, p, gain):
+        return replace(judged(name, replace(pushed.fit, model=pushed.fit.model.with_effect(name, np.array(p))), pushed.fit, 1.0), gain=gain)
+
+    shaft, winding = found("shaft_compliance", [50.0, 0.7, 0.4, 0.0, np.inf], 21.0), found("inductance", [2e-3, np.inf], 0.0)
+    for rho, first in ((0.2, "inductance"), (0.4, None)):
+        now = pushed.fit.model.with_effect("shaft_compliance", np.array([50.0, 0.7, rho, 0.0, np.inf]))
+        other = _in_its_place(replace(pushed.fit, model=now), pushed.fit, (shaft, winding), 1.0)
+        assert other is None if first is None else other[0].name == first and len(other) == 2
