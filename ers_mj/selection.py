@@ -28,9 +28,9 @@ PLAIN = 1.3  # noise levels of what a model leaves of a coarse converter's readi
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH), one that takes a GOOD_PART aside
-MOST_EFFORT, LAST_RACED, LAST_BEGUN = 60_000_000, 50_000_000, 160_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
+MOST_EFFORT, LAST_RACED, LAST_BEGUN = 60_000_000, 50_000_000, 140_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
 # for that does not show by itself, a round beside a bristle is left at its first refits, and none is begun; more by as much as the recordings last longer than a MINUTE together
-MINUTE, LONGER = 60.0, 1.5  # [s]; times as late a round of one body, which takes less, may begin
+MINUTE = 60.0  # [s]
 GOOD_PART = 0.35  # share of C that a third effect must take away where the model stays wrong, if the second did not
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (see _most_mended)
@@ -53,13 +53,13 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle, is left out after MOST_EFFORT, and no round
-    begins after LAST_BEGUN (LONGER than that, one of one body); one beside a bristle that is under way at LAST_RACED goes no further than its first refits.
+    begins after LAST_BEGUN; one beside a bristle that is under way at LAST_RACED goes little further than its first refits.
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
-    end, raced, last, latest = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGER * LAST_BEGUN))
+    end, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN))
     current, rounds, mended, swept, reviewed, paired, took = base, [], 0, False, False, False, 0.0
     tau = tau_of(base.misfit)
-    while EFFORT.spent < (last if current.model.plant().coupled else latest):
+    while EFFORT.spent < last:
         if (taken := _taken(current, rounds)) >= MOST_ROUNDS:
             other = None if paired else reviews.paired(current, rounds, traces, tau, jobs)
             if other is None:
