@@ -11,9 +11,9 @@ from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.identification import Fit, fit, is_at_observer, near_noise, polished
 from ers_mj.model import Model
 from ers_mj.race import LEAST_GAIN, candidates
-from ers_mj.ranking import LEAST_Z, Candidate, is_clocked, judged, priced
+from ers_mj.ranking import FORKED, LEAST_Z, Candidate, is_clocked, judged, priced
 from ers_mj.remainder import left_by_sensor, more_is_missing
-from ers_mj.reviews import FORKED, pruned
+from ers_mj.reviews import pruned
 from ers_mj.screening import screen
 from ers_mj.selection import Selection
 from ers_mj.traces import Trace

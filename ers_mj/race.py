@@ -17,7 +17,7 @@ from ers_mj.identification import Fit, converged, fit, near_noise, residuals_in,
 from ers_mj.isolability import PARAMETER_PRICE
 from ers_mj.model import OBSERVER_RATE, STATES, Model
 from ers_mj.plants.reduced import EFFORT
-from ers_mj.ranking import (CLOCKED, NEAR_TIE, QUIET, RIVAL, TIE, Candidate, bends_and_twists, is_clocked, is_dear, is_quiet, judged, likeliest_first, priced,
+from ers_mj.ranking import (CLOCKED, FORKED, NEAR_TIE, QUIET, RIVAL, TIE, Candidate, bends_and_twists, is_clocked, is_dear, is_quiet, judged, likeliest_first, priced,
                             rivals_of, shows)
 from ers_mj.screening import PEAK, Begin, attainable, screen
 from ers_mj.traces import Blocks, Trace
@@ -34,6 +34,7 @@ FAILED = 0.05  # share of the best first refit's gain below which a promise was 
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
 # an effect that is not dear all that promise and are not: there a borrowed Jacobian has been bent by two)
 TAUT = 10.0  # times the observer's rate, at which C has few dents: a refit that begins so finds valleys that others miss
+LET_GO = 10  # of these refits, how many go on at the observer's own rate (on 70 rounds of tuning seeds each that mattered was among the first eight)
 FEW_STARTS = 4  # of an effect's own, up to which it is refitted from them as they are
 EXPLAINED = 0.25  # share of C that a leader which explains everything leaves at most
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
@@ -89,9 +90,11 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
 
     def held_taut(item):
-        """A fit begun with an observer that holds the motion to the reading, which hardly lets it stick where the rudder slipped: C has few dents then."""
-        near = fit(item[1].model, traces, rate=TAUT * OBSERVER_RATE, tau=tau, steps=QUICK, renewals=2).model
-        return item[0], fit(near, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=1)
+        """A fit under an observer that holds the motion to the reading, which hardly lets it stick where the rudder slipped: C has few dents then."""
+        return item[0], fit(item[1].model, traces, rate=TAUT * OBSERVER_RATE, tau=tau, steps=QUICK, renewals=2)
+
+    def let_go(item):
+        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=1)
 
     def spent():
         return EFFORT.spent >= last  # asked between stages only, so that the answer does not hang on the number of jobs
@@ -101,9 +104,9 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         return likeliest_first(sorted((c for c in found if shows(c) and not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
 
     def leaves_much(found):
-        """Whether a fit leaves more than one that explains everything, or wins what matters and leaves a good part."""
+        """Whether a fit leaves a good part, and more than forks of stick and slip do, or wins what matters."""
         left = total(found)
-        return left > QUIET * base.misfit.size or reference - left >= NEAR_LEAST * max(least, LEAST_GAIN) and left > EXPLAINED * reference
+        return left > EXPLAINED * reference and (left > FORKED or reference - left >= NEAR_LEAST * max(least, LEAST_GAIN))
 
     def contending(labels, ends):
         """Those labels that may still be the explanation: all while none explains everything, then those with RIVAL of the best one's gain."""
@@ -179,7 +182,8 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
         for name, found in pool.map(finish, [(name, found) for name, found in late if reference - total(found) >= AGAIN * leading]):
             best[name] = min(best.get(name, found), found, key=total)
         if best and leaves_much(min(best.values(), key=total)) and not (is_dear(base) or spent()):
-            for name, found in pool.map(held_taut, _more_starts(base.model, [name for name in BY_NAME if name not in exclude], screened.promising(), starts)):
+            taut = pool.map(held_taut, _more_starts(base.model, [name for name in BY_NAME if name not in exclude], screened.promising(), starts))
+            for name, found in pool.map(let_go, sorted(taut, key=lambda item: item[1].cost)[:LET_GO]):
                 best[name] = min(best.get(name, found), found, key=total)
         rough = sorted(best.items(), key=lambda item: total(item[1]))
         gains = [reference - total(f) for _, f in rough]

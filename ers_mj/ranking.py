@@ -21,6 +21,7 @@ ALONE = 1.5  # times what the best other explanation buys, that an effect buys w
 SAME = 0.5  # share of its gain by which the scores of all blocks differ at most, summed, of one that explains the same
 LEAST_Z = 1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
 QUIET = 0.04  # C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
+FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
 TIE, NEAR_TIE = 1.0, 0.02  # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
 RIVAL = 0.3  # share of the leader's gain from which a candidate may take its place later
 NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) that this other must win itself to be told in its place

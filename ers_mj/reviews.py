@@ -13,13 +13,12 @@ from ers_mj.identification import Fit, fit, hopped, is_rough, score
 from ers_mj.model import Model
 from ers_mj.plants.reduced import EFFORT, ReducedModel
 from ers_mj.race import LEAST_GAIN
-from ers_mj.ranking import RIVAL, TIE, Candidate, is_clocked, is_dear, judged, likeliest, likeliest_first, priced, really, shows
+from ers_mj.ranking import FORKED, RIVAL, TIE, Candidate, is_clocked, is_dear, judged, likeliest, likeliest_first, priced, really, shows
 from ers_mj.traces import Trace
 
 MISSED = 100.0  # of C by which a model is worse without an effect that nothing else will stand for
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
-FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing physics is in one
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
 PAIRED, FAR, MOST_PAIRS = 0.5, 0.2, 6  # share of what all chosen effects buy, that two rivals must buy one by one to be tried as a pair, and by which the first refit of one
