@@ -63,6 +63,13 @@ def margins(figure: Figure, top: float = 0.1) -> None:
         ax.yaxis.set_label_coords(-0.62 / (width - 0.92), 0.5)
 
 
+def rect(figure: Figure, left: float, bottom: float, right: float, top: float) -> tuple[float, float, float, float]:
+    """Where axes lie in a figure, from distances in inches to its left and lower edge; a negative ``right`` or ``top`` to the opposite one."""
+    width, height = figure.get_size_inches()
+    right, top = right if right > 0 else width + right, top if top > 0 else height + top
+    return left / width, bottom / height, (right - left) / width, (top - bottom) / height
+
+
 def decimate(t: np.ndarray, x: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """t and x (N,) thinned to the lowest and the highest value of each of points/2 spans; a span of NaN stays a hole."""
     bins = points // 2
@@ -190,8 +197,12 @@ def residual_map(residuals: ResidualMap, evidence: Evidence) -> str:
 
 def _map(residuals: ResidualMap, evidence: Evidence, width: float) -> Figure:
     wide = width == WIDE
-    figure = Figure(figsize=(width, 3.5 if wide else 6.2), layout="constrained")
-    axes = figure.subplots(1, 2, sharex=True, sharey=True) if wide else figure.subplots(2, 1, sharex=True, sharey=True)
+    figure = Figure(figsize=(width, 3.5 if wide else 6.2))
+    places = ((0.8, 0.55, 4.65, -0.3), (4.85, 0.55, 8.7, -0.3)) if wide else ((0.8, 3.85, -0.12, -0.3), (0.8, 1.35, -0.12, 3.5))
+    axes = [figure.add_axes(rect(figure, *place)) for place in places]
+    axes[1].sharex(axes[0])
+    axes[1].sharey(axes[0])
+    axes[1 if wide else 0].tick_params(labelleft=not wide, labelbottom=wide)
     angle, speed = shown(evidence.output_unit, _size(residuals.angle_edges)), shown(f"{evidence.output_unit}/s")
     if angle.label == "mm":
         speed = Unit("mm/s", 1e3)
@@ -205,9 +216,13 @@ def _map(residuals: ResidualMap, evidence: Evidence, width: float) -> Figure:
                              np.ma.masked_invalid(x.T), cmap=HEAT, vmin=0, vmax=top, edgecolors="white", linewidth=0.4)
         ax.axhline(0, color=FAINT, linewidth=0.6)
         ax.set_title(title, color=BEFORE if title == "before" else AFTER, fontweight="bold")
-    (figure.supxlabel if wide else axes[-1].set_xlabel)(f"{noun(evidence.output_unit)} [{angle.label}]", fontsize=9.5, color=INK)
-    figure.supylabel(f"speed [{speed.label}]", fontsize=9.5, color=INK)
-    bar = figure.colorbar(mesh, ax=axes, location="right" if wide else "bottom", fraction=0.05, aspect=22, extend="max")
+    for ax in axes if wide else axes[1:]:
+        ax.set_xlabel(f"{noun(evidence.output_unit)} [{angle.label}]")
+    for ax in axes[:1] if wide else axes:
+        ax.set_ylabel(f"speed [{speed.label}]")
+        ax.yaxis.set_label_coords(-0.62 / (ax.get_position().width * width), 0.5)
+    scale = figure.add_axes(rect(figure, *((8.85, 0.55, 8.99, -0.3) if wide else (0.8, 0.6, -0.12, 0.72))))
+    bar = figure.colorbar(mesh, cax=scale, orientation="vertical" if wide else "horizontal", extend="max")
     bar.set_label(f"rms residual [{size.label}]", color=INK)
     bar.outline.set_visible(False)
     return figure
@@ -223,9 +238,11 @@ def spectrum(found: Mismatch, evidence: Evidence) -> str:
 
 def _spectrum(found: Mismatch, evidence: Evidence, width: float) -> Figure:
     wide = width == WIDE
-    figure = Figure(figsize=(width, 3.5 if wide else 6.6), layout="constrained")
-    left, right = figure.subfigures(1, 2) if wide else figure.subfigures(2, 1)
-    levels, (size, phase) = left.subplots(), right.subplots(2, 1, sharex=True)
+    figure = Figure(figsize=(width, 3.5 if wide else 6.6))
+    places = ((0.8, 0.5, 4.75, -0.55), (5.75, 1.95, -0.12, -0.3), (5.75, 0.5, -0.12, 1.8)) if wide else (
+        (0.8, 4.05, -0.12, -0.55), (0.8, 1.95, -0.12, 3.2), (0.8, 0.5, -0.12, 1.8))
+    levels, size, phase = (figure.add_axes(rect(figure, *place)) for place in places)
+    size.sharex(phase)
     f, step = found.f_hz, found.f_hz[1] - found.f_hz[0]
     unit = shown(evidence.output_unit, float(np.sqrt(found.error.max() * step)))
     for x, colour, label, line in ((found.motion, MEASURED, "motion", 2.6), (found.error, BEFORE, "error", 1.6), (found.linear, AFTER, "linear in it", 1.2),
@@ -249,7 +266,9 @@ def _spectrum(found: Mismatch, evidence: Evidence, width: float) -> Figure:
         ax.set_xticks(ticks, [f"{x:g}" for x in ticks])
         ax.xaxis.minorticks_off()
         ax.axvspan(*found.region, color=SHADE, alpha=0.28, linewidth=0, zorder=0)
-    left.legend(*levels.get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.6, columnspacing=1.2)
+        ax.yaxis.set_label_coords(-0.62 / (ax.get_position().width * width), 0.5)
+    size.tick_params(labelbottom=False)
+    figure.legend(*levels.get_legend_handles_labels(), loc="upper left", ncols=3, handlelength=1.6, columnspacing=1.2)
     return figure
 
 
