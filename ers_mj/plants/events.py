@@ -663,19 +663,19 @@ def _fill_map(e, c, m, tau, a_emf, h, driven):
 
 
 @njit(nogil=True)
-def _maps(c, tau, a_emf, h, driven):
-    """Maps over h and over h/2 for every mode away from the stops: (2, 3, 3, 3, 5, 17), indices s + 1, s_m + 1, twist + 1."""
-    e = np.zeros((2, 3, 3, 3, 5, 17))
-    for half in range(2):
-        for s in range(-1, 2):
-            for s_m in range(-1, 2):
-                for twist in range(-1, 2):
-                    if _has_bristle(c) and (s < 0 or s_m == 0 or twist != 1):
-                        continue
-                    if c[TWO] > 0 or (s_m == 0 and twist == 0 and s != 0):
-                        _fill_map(e[half, s + 1, s_m + 1, twist + 1], c, (s, 0, 0, s_m, twist), tau, a_emf,
-                                  h / (1 + half), driven)
-    return e
+def _no_maps():
+    """Room for the maps over a step and over half of it in every mode away from the stops: (2, 3, 3, 3, 5, 17), indices s + 1, s_m + 1, twist + 1. NaN: not
+    made yet, since most modes are never met, and half steps only under laws.
+    """
+    return np.full((2, 3, 3, 3, 5, 17), np.nan)
+
+
+@inlined
+def _make(e, half, c, m, tau, a_emf, step, driven):
+    """The map over the step (half 0) or its half (half 1) in the mode m, where it was not made before."""
+    here = e[half, m[0] + 1, m[3] + 1, m[4] + 1]
+    if here[0, 0] != here[0, 0]:
+        _fill_map(here, c, (m[0], 0, 0, m[3], m[4]), tau, a_emf, step / (1 + half), driven)
 
 
 @inlined
@@ -742,8 +742,10 @@ def _beside(c, on, p, lawful, load, t, x, m):
 
 
 @inlined
-def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
-    """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they add now (NaN: unknown)."""
+def _segment(e, step, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
+    """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they add now (NaN: unknown). ``e`` holds maps
+    over a ``step`` (see _no_maps).
+    """
     two = c[TWO] > 0
     if _bends(c, m):
         bias = c[BIAS]
@@ -751,6 +753,10 @@ def _segment(e, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
         z = _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, h)
         c[BIAS] = bias
         return z, np.nan
+    driven = lawful and two and not _has_bristle(c)
+    _make(e, 0, c, m, tau, a_emf, step, driven)
+    if lawful or c[HARDEN] > 0:
+        _make(e, 1, c, m, tau, a_emf, step, driven)
     whole, half = e[0, m[0] + 1, m[3] + 1, m[4] + 1], e[1, m[0] + 1, m[3] + 1, m[4] + 1]
     if two and not _has_bristle(c) and (lawful or c[HARDEN] > 0):
         f0, q0, r0 = _beside(c, on, p, lawful, load, t, x, m)
@@ -922,7 +928,7 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
             drive = c[B] * u[max(k - skip, 0)]
             if tau <= 0:
                 x = (x[0], x[1], drive - a_emf * _drive_speed(c, x), x[3], x[4])
-            z, _ = _segment(whole, c, on, p, lawful, t[k], x, m, drive, tau, a_emf, load[k], h0, np.nan)
+            z, _ = _segment(whole, h0, c, on, p, lawful, t[k], x, m, drive, tau, a_emf, load[k], h0, np.nan)
             if tau <= 0:
                 z = (z[0], z[1], drive - a_emf * _drive_speed(c, z), z[3], z[4])
             if _calm(c, z, h0) and _steady(x, z) and _clean(c, on, p, lawful, t[k], x, z, m, tau, load[k], h0):
@@ -936,7 +942,7 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
             if c[FALL] > 0 and tau > 0:
                 drive = _fallen(c, on, p, lawful, now, x, m, drive, h)
             if uniform and enable[k] and m[2] == 0:
-                e = late if fresh[i] == 1 else early
+                e, step = (late, last) if fresh[i] == 1 else (early, ends[0])
                 if m[0] == 0 and not two:
                     j = drive + (x[2] - drive) * math.exp(-h / tau) if tau > 0 else drive
                     x = (x[0], 0.0, x[2] if tau > 0 else drive, x[3], x[4])
@@ -952,7 +958,7 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
                 elif not two:
                     if tau <= 0:
                         x = (x[0], x[1], drive - a_emf * x[1], x[3], x[4])
-                    z, extra = _segment(e, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, extra if tau > 0 else np.nan)
+                    z, extra = _segment(e, step, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, extra if tau > 0 else np.nan)
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * z[1], z[3], z[4])
                     if ((slips or z[1] * m[0] > 0) and (z[0] - c[THETA_0]) * m[1] >= 0 and z[0] <= c[UPPER] and z[0] >= c[LOWER]
@@ -972,7 +978,7 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
                         if still:
                             x = z
                             continue
-                    z, _ = _segment(e, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, np.nan)
+                    z, _ = _segment(e, step, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, np.nan)
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * _drive_speed(c, z), z[3], z[4])
                     if _clean(c, on, p, lawful, now, x, z, m, tau, load[k], h):
@@ -1003,11 +1009,11 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     lawful, h0 = is_lawful(on), t[1] - t[0]
     tau, a_emf = c[TAU], c[A_EMF]
     ends, fresh, skip = _cuts(c, h0, tau, a_emf, lawful, refine)
-    driven = lawful and c[TWO] > 0 and not _has_bristle(c)
-    late, early = _maps(c, tau, a_emf, _last(ends), driven), _maps(c, tau, a_emf, ends[0], driven)
+    late = _no_maps()
+    early = late if fresh[0] == 1 else _no_maps()
     leaps = c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0 and c[FALL] <= 0 and ends.size > 1 and fresh[0] == 1
     leaps = leaps and (not lawful or refine * h0 <= _law_step(c, a_emf))
-    whole = _maps(c, tau, a_emf, h0, driven) if leaps else early
+    whole = _no_maps() if leaps else late
     _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out)
 
 

@@ -25,7 +25,7 @@ from numba import njit, types
 
 from ers_mj.plants.compiled import compiled_cache, inlined
 from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, DAHL, D_BRISTLE, FADE, K_BRISTLE, READ, READ_BOOL, ROWS, LAWS, TAU,
-                                  THETA_0, VECTOR, _derivative, _extra, _has_bristle, _level, _maps)
+                                  THETA_0, VECTOR, _derivative, _extra, _fill_map, _has_bristle, _level)
 from ers_mj.plants.laws import remember
 
 NUDGE = 1e-6  # of the motion's largest angle, speed and drive: step of a law's slopes
@@ -59,9 +59,13 @@ def _prepare(t, load, path, c, on, p, maps, out):
     by theta, w and j along the motion."""
     h = t[1] - t[0]
     if not _has_bristle(c):
-        closed, opened = _maps(c, c[TAU], c[A_EMF], h, False)[0], _maps(c, 0.0, 0.0, h, False)[0]
-        for s in range(3):
-            maps[0, s], maps[1, s] = closed[s, 1, 1, :, :14], opened[s, 1, 1, :, :14]
+        made = np.empty((5, 17))
+        maps[:, 1] = 0.0
+        for s in (-1, 1):
+            _fill_map(made, c, (s, 0, 0, 0, 0), c[TAU], c[A_EMF], h, False)
+            maps[0, s + 1] = made[:, :14]
+            _fill_map(made, c, (s, 0, 0, 0, 0), 0.0, 0.0, h, False)
+            maps[1, s + 1] = made[:, :14]
     if on[0, 0] + on[1, 0] == 0:
         return
     size = np.zeros(3)
