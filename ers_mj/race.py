@@ -34,7 +34,7 @@ FAILED = 0.05  # share of the best first refit's gain below which a promise was 
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
 # an effect that is not dear all that promise and are not: there a borrowed Jacobian has been bent by two)
 TAUT = 10.0  # times the observer's rate, at which C has few dents: a refit that begins so finds valleys that others miss
-LET_GO = 10  # of these refits, how many go on at the observer's own rate (on 70 rounds of tuning seeds each that mattered was among the first eight)
+LET_GO = 10  # of these refits, how many go on at the observer's own rate (on 72 rounds of tuning seeds each that mattered was among the first eight)
 FEW_STARTS = 4  # of an effect's own, up to which it is refitted from them as they are
 EXPLAINED = 0.25  # share of C that a leader which explains everything leaves at most
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
