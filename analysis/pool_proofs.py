@@ -59,7 +59,7 @@ def told(proofs: Sequence[Mapping]) -> list[str]:
     for effects in (2, 3):
         some = [row["cpu_s"] for row in rows if row["kind"] == "several" and len(row["labels"]) == effects]
         lines += [_times(f"several: {effects} effects", some)] if some else []
-    return lines
+    return lines + ([f"memory of a case: at most {results['peak_MiB']:.0f} MiB"] if results["peak_MiB"] else [])
 
 
 def _times(what: str, some: Sequence[float]) -> str:

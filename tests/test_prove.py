@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ers_mj import proof_report
 from ers_mj.cli import main
 from ers_mj.commands.output import plain
 from ers_mj.datasheet import read_datasheet
@@ -297,7 +298,7 @@ def test_proofs_of_several_seeds_are_pooled(tmp_path, capsys):
     assert lines["single effects named right, by class"][:3] == ["1", "of", "2"]
     assert lines["effects found, of several at once"][:3] == ["1", "of", "2"]
     assert lines["null cases with a named effect"][:3] == ["0", "of", "1"]
-    assert "6 cases of seeds 41 (2 cases), 42 (4 cases)" in lines and "0 to 1                0 of 1" in lines
+    assert "6 cases of seeds 41 (2 cases), 42 (4 cases)" in lines and "0 to 1                0 of 1" in lines and "memory of a case: at most 100 MiB" in lines
     assert {"kinds with a suspect's law     1 of 1", "kinds without                  0 of 1"} <= set(lines)
     for bad, word in (([folders[0]] * 2, "twice"), ([str(tmp_path)], "results.json")):
         assert pooling.main(bad) == 2
@@ -355,6 +356,9 @@ def test_a_rig_as_it_is_raises_no_false_alarm():
     results = real.scored_real(rows)
     assert (results["found"], results["false_alarm_rate"], results["counts"]["null"], results["cases"]) == (0.5, None, 0, 3)
     assert results["own"] == {"throttle": ["end_stop"]} and results["concealed_in_real"][0]["others"] == []
+    told = proof_report.table_of(results)
+    assert not any("single effects" in what for what, _, _ in told)  # the rig's own come first
+    assert proof_report.headline(results).startswith("1 of 2 effects concealed in real recordings are found again")
 
 
 # -- the command -----------------------------------------------------------------------------------------------
@@ -368,7 +372,8 @@ def test_the_command_prints_the_contracts_keys(tmp_path, asked, monkeypatch, cap
     assert {"cases", "counts", "top1", "top1_class", "top1_class_visible", "false_alarm_rate", "pair_recall", "pair_spurious",
             "unexplained_recall", "false_flag_rate", "subsystem_recall", "confusion"} <= set(printed)
     assert main(["prove", "--cases", "8", "--jobs", "1", "--out", str(tmp_path / "p")]) == 0
-    assert "concealed -> named first" in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert {"concealed -> named first", "a pair of effects: median 1.0 s, at most 1.0 s", "memory of a case: at most 100 MiB"} <= set(lines)
     assert {"results.json", "report.html", "summary.txt"} <= {p.name for p in (tmp_path / "p").iterdir()}
 
 

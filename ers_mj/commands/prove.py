@@ -138,21 +138,31 @@ def _told(results: dict) -> list[str]:
     for b in results["accuracy"]:
         top = f"{b['to_sigma']:g}" if b["to_sigma"] else "more"
         lines.append(f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]")
-    lines += ["", bold("concealed -> named first")]
-    lines += [f"  {truth:58} {', '.join(f'{k} x {name}' if k > 1 else name for name, k in named.items())}" for truth, named in results["confusion"].items()]
-    lines += _told_real(results) if "concealed_in_real" in results else []
-    over, cpu, wall = results["error_over_floor"], results["cpu_s"], results["wall_s"]
+    lines += _told_real(results) if "concealed_in_real" in results else _told_confusion(results["confusion"])
+    over, cpu, pair, wall = (results[name] for name in ("error_over_floor", "cpu_s", "cpu_s_of_a_pair", "wall_s"))
     lines += ["", f"held-out error over noise floor: median {over['median']:.3g}, 90 % below {over['p90']:.3g}"] if over.get("median") else [""]
     if cpu:
         lines.append(f"time a case: median {cpu['median']:.1f} s of one processor, at most {cpu['max']:.1f} s (by the clock {wall['median']:.1f} and {wall['max']:.1f} s)")
+    if pair:
+        lines.append(f"a pair of effects: median {pair['median']:.1f} s, at most {pair['max']:.1f} s")
+    if results["peak_MiB"]:
+        lines.append(f"memory of a case: at most {results['peak_MiB']:.0f} MiB")
     return lines + [f"no answer: {failure}" for failure in results["failures"]]
+
+
+def _told_confusion(confusion: dict) -> list[str]:
+    """What was named first of each that was concealed."""
+    lines = ["", bold("concealed -> named first")]
+    return lines + [f"  {truth:58} {', '.join(f'{k} x {name}' if k > 1 else name for name, k in named.items())}" for truth, named in confusion.items()]
 
 
 def _told_real(results: dict) -> list[str]:
     """What was concealed in real records and found again beside what the rigs have of their own."""
+    from ers_mj.proof_report import again
+
     lines = ["", bold("the rigs as they are")]
     lines += [f"  {rig:12} {', '.join(names) or 'nothing'}" for rig, names in results["own"].items()]
     lines += ["", bold("concealed in them")]
     for x in results["concealed_in_real"]:
-        lines.append(f"  {x['rig']:12} {x['concealed']:22} {x['strength']:<10.3g} {'found' if x['found'] else '-':7} {', '.join(x['named']) or 'nothing'}")
+        lines.append(f"  {x['rig']:12} {x['concealed']:22} {x['strength']:<10.3g} {again(x):7} {', '.join(x['named']) or 'nothing'}")
     return lines

@@ -103,6 +103,7 @@ def scored(rows: Sequence[Mapping]) -> dict:
             "accuracy": accuracy(singles), "reliability": reliability(rows), "error_over_floor": _over_floor(rows),
             "parameters": _parameters(rows), "failures": [f"{r['case']}: {r['error']}" for r in rows if r["error"]],
             "cpu_s": _spread([r["cpu_s"] for r in rows]), "wall_s": _spread([r["wall_s"] for r in rows]),
+            "cpu_s_of_a_pair": _spread([r["cpu_s"] for r in by[SEVERAL] if len(r["labels"]) == 2]),
             "peak_MiB": max((r["peak_MiB"] for r in rows if r["peak_MiB"] is not None), default=None)}
 
 
