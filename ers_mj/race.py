@@ -6,8 +6,8 @@ A candidate's worth is the decrease of the block cost C (identification.py) afte
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -17,8 +17,9 @@ from ers_mj.identification import Fit, converged, fit, near_noise, residuals_in,
 from ers_mj.isolability import PARAMETER_PRICE
 from ers_mj.model import OBSERVER_RATE, STATES, Model
 from ers_mj.plants.reduced import EFFORT
-from ers_mj.ranking import (CLOCKED, FORKED, NEAR_TIE, QUIET, RIVAL, TIE, Candidate, bends_and_twists, is_clocked, is_dear, is_quiet, judged, likeliest_first, priced,
+from ers_mj.ranking import (CLOCKED, FORKED, NEAR_TIE, QUIET, RIVAL, TIE, Candidate, bends_and_twists, is_clocked, is_dear, is_quiet, judged, likeliest_first,
                             rivals_of, shows)
+from ers_mj.restarts import anew, more_starts, other_forms, other_waves, wider
 from ers_mj.screening import PEAK, Begin, attainable, screen
 from ers_mj.traces import Blocks, Trace
 
@@ -35,13 +36,11 @@ FOREMOST = 2  # effects of the largest promise: refitted from their other starts
 # an effect that is not dear all that promise and are not: there a borrowed Jacobian has been bent by two)
 TAUT = 10.0  # times the observer's rate, at which C has few dents: a refit that begins so finds valleys that others miss
 LET_GO = 10  # of these refits, how many go on at the observer's own rate (on 72 rounds of tuning seeds each that mattered was among the first eight)
-FEW_STARTS = 4  # of an effect's own, up to which it is refitted from them as they are
 EXPLAINED = 0.25  # share of C that a leader which explains everything leaves at most
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 HALF_STEP = 0.5  # of a coarse converter's, by which an effect moves the reading at least
 STEP_GAIN = 30.0  # of C, from which it is told even if that is less: many thresholds together tell what is much smaller than a step
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
-ANEW, ANEW_FROM = 8, 0.2  # starts from which a wave is fitted again that leaves so much C per block
 
 
 def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclude: Sequence[str],
@@ -55,164 +54,213 @@ def candidates(base: Fit, traces: Sequence[Trace], tau: float, jobs: int, exclud
     """
     if attainable(base.misfit, Blocks.of(traces).counts, tau) < min(LEAST_GAIN, least) and score(base.misfit, tau).max() < math.log(PEAK):
         return []
-    reference = float(score(base.misfit, tau).sum())
+    with ThreadPoolExecutor(jobs) as pool:
+        return _Race(base, traces, tau, exclude, least, last, pool).run([base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)])
 
-    def total(found):
-        return float(score(found.misfit, tau).sum())
 
-    def priced(found):
-        return total(found) + PARAMETER_PRICE * found.size
+Label = tuple[str, int]  # of a refit: the effect (or what differs between recordings), and which of the places it began from
 
-    def quick(begin):
-        return fit(begin.model, traces, tau=tau, steps=QUICK, ceiling=base.misfit, known=begin.known, renewals=0)
 
-    def refitted(starts):
-        """The best fit by label from pairs (label, Begin), those with the most parameters begun first since they take longest."""
+class _Race:
+    """The stages of one round, each of which leaves in ``best`` what every label has reached so far.
+
+    The effort that is spent is asked for between stages only, so that the answer does not hang on the number of jobs.
+    """
+
+    def __init__(self, base: Fit, traces: Sequence[Trace], tau: float, exclude: Sequence[str], least: float, last: float, pool: Executor):
+        self.base, self.traces, self.tau, self.exclude, self.least, self.last, self.pool = base, traces, tau, exclude, least, last, pool
+        self.reference = self.total(base)
+        self.quiet, self.bent = is_quiet(base, tau), not near_noise(base) or self.reference > BENT * base.misfit.size
+        self.starts: dict[Label, list[Begin]] = {}
+        self.best: dict[Label, Fit] = {}
+
+    def run(self, places: Sequence[Model]) -> list[Candidate]:
+        self.screened = screen(places, self.traces, self.tau, self.exclude, self.bent, self.quiet, least=min(LEAST_GAIN, self.least))
+        if self.quiet and not self.screened.promising():
+            return []
+        failed = self._refit_the_promising()
+        early = self._refit_from_other_starts(failed)
+        self._run_laps({label for label, _, _ in early})
+        best = _leaders(self.best, self.total)
+        self._refit_the_overlooked(best)
+        self._refit_held_taut(best)
+        rough = sorted(best.items(), key=lambda item: self.total(item[1]))
+        if not rough or self.won(rough[0][1]) < NEAR_LEAST * self.least:
+            return sorted(self._judged(rough), key=lambda c: -c.worth)
+        return self._told(self._finish(rough, early))
+
+    # -- what a fit is worth, and how it is made -------------------------------------------------------------------
+
+    def total(self, found: Fit) -> float:
+        return float(score(found.misfit, self.tau).sum())
+
+    def won(self, found: Fit) -> float:
+        return self.reference - self.total(found)
+
+    def priced(self, found: Fit) -> float:
+        return self.total(found) + PARAMETER_PRICE * found.size
+
+    def spent(self) -> bool:
+        return EFFORT.spent >= self.last
+
+    def most_won(self, ends: Mapping[object, Fit]) -> float:
+        return max(map(self.won, ends.values()), default=0.0)
+
+    def fitted(self, items: Iterable[tuple], steps: int, **settings) -> list[tuple]:
+        """The pairs (label, what has a model) fitted on, each given up that stands above the base after a stage."""
+        return self._mapped(items, lambda _: {"steps": steps, "ceiling": self.base.misfit, **settings})
+
+    def _mapped(self, items: Iterable[tuple], settings: Callable[..., Mapping]) -> list[tuple]:
+        return list(self.pool.map(lambda item: (item[0], fit(item[1].model, self.traces, tau=self.tau, **settings(item[1]))), items))
+
+    def finished(self, items: Iterable[tuple]) -> list[tuple]:
+        return self.fitted(items, 20)
+
+    def lap(self, items: Iterable[tuple]) -> list[tuple]:
+        def settings(found):
+            return {"steps": 6, "ceiling": self.base.misfit, "renewals": RENEWALS if found.model.has_tangents or not self.base.model.names else 1}
+
+        return self._mapped(items, settings)
+
+    def refitted(self, starts: Sequence[tuple[Label, Begin]]) -> dict[Label, Fit]:
+        """The best of quick fits on a borrowed Jacobian, by label; those with the most parameters are begun first since they take longest."""
         order = sorted(starts, key=lambda start: -len(start[1].model.layout()))
-        ends = list(zip((label for label, _ in order), pool.map(quick, (begin for _, begin in order))))
-        return {label: min((found for other, found in ends if other == label), key=total) for label, _ in starts}
+        ends = self._mapped(order, lambda begin: {"steps": QUICK, "ceiling": self.base.misfit, "known": begin.known, "renewals": 0})
+        return {label: min((found for other, found in ends if other == label), key=self.total) for label, _ in starts}
 
-    def leaders(ends):
-        """The best fit by name of those by (name, place)."""
-        return {name: min((found for (other, _), found in ends.items() if other == name), key=total) for name, _ in ends}
-
-    def glanced(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=3, renewals=1)
-
-    def onward(item):
-        renewals = RENEWALS if item[1].model.has_tangents or not base.model.names else 1
-        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=renewals)
-
-    def descended(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit, renewals=20)
-
-    def finish(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=20, ceiling=base.misfit)
-
-    def held_taut(item):
-        """A fit under an observer that holds the motion to the reading, which hardly lets it stick where the rudder slipped: C has few dents then."""
-        return item[0], fit(item[1].model, traces, rate=TAUT * OBSERVER_RATE, tau=tau, steps=QUICK, renewals=2)
-
-    def let_go(item):
-        return item[0], fit(item[1].model, traces, tau=tau, steps=6, ceiling=base.misfit, renewals=1)
-
-    def spent():
-        return EFFORT.spent >= last  # asked between stages only, so that the answer does not hang on the number of jobs
-
-    def told(found):
-        """Those that the recordings can show, the likeliest first."""
-        return likeliest_first(sorted((c for c in found if shows(c) and not _is_within_a_step(c, traces)), key=lambda c: -c.worth))
-
-    def leaves_much(found):
-        """Whether a fit leaves a good part, and more than forks of stick and slip do, or wins what matters."""
-        left = total(found)
-        return left > EXPLAINED * reference and (left > FORKED or reference - left >= NEAR_LEAST * max(least, LEAST_GAIN))
-
-    def contending(labels, ends):
+    def contending(self, labels: Iterable, ends: Mapping[object, Fit]) -> list:
         """Those labels that may still be the explanation: all while none explains everything, then those with RIVAL of the best one's gain."""
-        least = reference - min(map(total, ends.values()), default=reference)
-        return [label for label in labels if reference - least > QUIET * base.misfit.size or reference - total(ends[label]) >= RIVAL * least]
+        most = self.reference - min(map(self.total, ends.values()), default=self.reference)
+        return [label for label in labels if self.reference - most > QUIET * self.base.misfit.size or self.won(ends[label]) >= RIVAL * most]
 
-    def overlooked(best):
+    # -- the stages ------------------------------------------------------------------------------------------------
+
+    def _refit_the_promising(self) -> set[str]:
+        """First refits, of further effects as long as a promise was none; the names of those."""
+        model = self.base.model
+        self.starts = {(s, 0): [Begin(model.with_state(s, len(self.traces)), {})] for s in STATES if len(self.traces) > 1 and s not in (model.states or {})}
+        self.best = self.refitted([(label, begins[0]) for label, begins in self.starts.items()])
+        failed: set[str] = set()
+        while new := [name for name in self.screened.promising(failed) if (name, 0) not in self.starts]:
+            added = {(name, place): begins for name in new for place, begins in enumerate(self.screened.begins[name])}
+            self.starts |= added
+            self.best |= self.refitted([(label, begins[0]) for label, begins in added.items()])
+            most = max(self.most_won(self.best), 0.0)
+            failed = {name for name, found in _leaders(self.best, self.total).items() if self.won(found) <= FAILED * most}
+        return failed
+
+    def _refit_from_other_starts(self, failed: set[str]) -> list[tuple[Label, Begin, Fit]]:
+        """What may lead is refitted from its other starts: the foremost to the end and on Jacobians of their own where the base is bent, as told (label, begin, fit)."""
+        base, most = self.base, self.most_won(self.best)
+        foremost = [name for name in self.screened.promising(failed) if name not in failed][:FOREMOST]
+        own = {*foremost, *(name for name in self.screened.promising() if base.model.names and not is_dear(base) and not BY_NAME[name].dear)}  # where bent
+        ahead = [label for label in self.starts if label[1] == 0 and label[0] in own] if self.bent and not self.spent() else []
+        begun = [(label, begin) for label in ahead for begin in self.starts[label]]
+        early = [(label, begin, found) for (label, begin), (_, found) in zip(begun, self.fitted(begun, 20, renewals=20))]
+        for label, _, found in early:
+            self.best[label] = min(self.best[label], found, key=self.total)
+        worth = {name for name, found in _leaders(self.best, self.total).items() if self.bent or self.won(found) >= AGAIN * most}
+        worth = {*self.contending(worth, _leaders(self.best, self.total)), *foremost, *(name for name in self.screened.promising(failed) if not BY_NAME[name].sized)}
+        more = self.starts.items() if not self.spent() else ()
+        again = self.refitted([(label, begin) for label, begins in more if label[0] in worth and label not in ahead for begin in begins[1:]])
+        self.best |= {label: min(self.best[label], found, key=self.total) for label, found in again.items()}
+        if not self.bent:
+            self.best = {(name, 0): found for name, found in _leaders(self.best, self.total).items()}
+        return early
+
+    def _run_laps(self, ahead: set[Label]) -> None:
+        """All but what ran ahead go on, lap by lap, while they win something."""
+        running = self.contending([label for label in self.best if label not in ahead], self.best)
+        for _ in range(LATER_LAPS if self.base.model.names else LAPS):
+            if self.spent():
+                break
+            pace = max(PACE * self.least, PACE_SHARE * max(self.most_won(self.best), 0.0))
+            ends = dict(self.lap((label, self.best[label]) for label in running))
+            running = [label for label in running if self.total(self.best[label]) - self.total(ends[label]) > pace
+                       and not (label[0] in BY_NAME and BY_NAME[label[0]].dear or bends_and_twists(ends[label]))]
+            self.best |= {label: found for label, found in ends.items() if self.total(found) < self.total(self.best[label])}
+            running = self.contending(running, self.best)
+
+    def _refit_the_overlooked(self, best: dict[str, Fit]) -> None:
+        leading = self.reference - min(map(self.total, best.values()), default=self.reference)
+        glances = self._mapped(self._overlooked(best) if not self.spent() else [], lambda _: {"steps": 3, "renewals": 1})
+        late = self.lap([(name, found) for name, found in glances if self.won(found) >= SEEN * leading])
+        for name, found in self.finished([(name, found) for name, found in late if self.won(found) >= AGAIN * leading]):
+            best[name] = min(best.get(name, found), found, key=self.total)
+
+    def _overlooked(self, best: Mapping[str, Fit]) -> list[tuple[str, Begin]]:
         """The cheap laws, with models to refit, that explain less than CLOCKED of what leads with a clock of its own, or are one with a law that leads and were not refitted: on a
         borrowed Jacobian, or seen by its secant, what has a threshold (a stop, a limit) does nothing until that is passed. Beside what takes long to simulate, those alone
         that were screened, and promise SEEN of what leads.
         """
-        leader = min(best, key=lambda name: total(best[name]), default=None)
-        if leader is None or reference - total(best[leader]) < max(least, LEAST_GAIN):
+        leader, model, screened = min(best, key=lambda name: self.total(best[name]), default=None), self.base.model, self.screened
+        if leader is None or self.won(best[leader]) < max(self.least, LEAST_GAIN):
             return []
-        laws = [effect for effect in BY_NAME.values() if not (is_clocked(effect.name) or effect.dear or effect.name in exclude)
-                and (effect.name not in best or is_clocked(leader) and reference - total(best[effect.name]) < CLOCKED * (reference - total(best[leader])))
+        laws = [effect for effect in BY_NAME.values() if not (is_clocked(effect.name) or effect.dear or effect.name in self.exclude)
+                and (effect.name not in best or is_clocked(leader) and self.won(best[effect.name]) < CLOCKED * self.won(best[leader]))
                 and (is_clocked(leader) or any({leader, effect.name} <= group for group in EQUIVALENT))]
-        own = {effect.name: [Begin(base.model.with_effect(effect.name, start), {}) for start in effect.starts(base.model.scales)]
-               for effect in laws if not (effect.sized or base.model.plant().coupled)}
-        if base.model.plant().coupled and is_clocked(leader):
+        own = {effect.name: [Begin(model.with_effect(effect.name, start), {}) for start in effect.starts(model.scales)]
+               for effect in laws if not (effect.sized or model.plant().coupled)}
+        if model.plant().coupled and is_clocked(leader):
             own = {effect.name: screened.begins[effect.name][0][:1] for effect in laws if effect.name in screened.begins
                    and screened.promises.get(effect.name, 0.0) >= SEEN * screened.promises.get(leader, math.inf)}
-        twists = base.model.plant().has_motor_side  # a play or a shaft, which takes longest, is no knock
-        return [(name, begin) for name in (effect.name for effect in laws) for begin in starts.get((name, 0), own.get(name, []))
+        twists = model.plant().has_motor_side  # a play or a shaft, which takes longest, is no knock
+        return [(name, begin) for name in (effect.name for effect in laws) for begin in self.starts.get((name, 0), own.get(name, []))
                 if begin.model.plant().has_motor_side == twists]
 
-    states = [((s, 0), [Begin(base.model.with_state(s, len(traces)), {})]) for s in STATES if len(traces) > 1 and s not in (base.model.states or {})]
-    places = [base.model, *(replace(base.model, values={**base.model.values, **values}) for values in anchors)]
-    with ThreadPoolExecutor(jobs) as pool:
-        quiet, bent = is_quiet(base, tau), not near_noise(base) or reference > BENT * base.misfit.size
-        screened = screen(places, traces, tau, exclude, bent, quiet, least=min(LEAST_GAIN, least))
-        if quiet and not screened.promising():
-            return []
-        starts = dict(states)
-        first = refitted([(label, begins[0]) for label, begins in starts.items()])
-        failed: set[str] = set()
-        while new := [name for name in screened.promising(failed) if (name, 0) not in starts]:
-            added = {(name, place): begins for name in new for place, begins in enumerate(screened.begins[name])}
-            starts |= added
-            first |= refitted([(label, begins[0]) for label, begins in added.items()])
-            most = max((reference - total(f) for f in first.values()), default=0.0)
-            failed = {name for name, found in leaders(first).items() if reference - total(found) <= FAILED * max(most, 0.0)}
-        most = max((reference - total(f) for f in first.values()), default=0.0)
-        foremost = [name for name in screened.promising(failed) if name not in failed][:FOREMOST]
-        own = {*foremost, *(name for name in screened.promising() if base.model.names and not is_dear(base) and not BY_NAME[name].dear)}  # where bent
-        best, ahead = dict(first), [label for label in starts if label[1] == 0 and label[0] in own] if bent and not spent() else []
-        early = [(label, begin) for label in ahead for begin in starts[label]]
-        ended = list(pool.map(descended, early))
-        for label, found in ended:
-            best[label] = min(best[label], found, key=total)
-        worth = {name for name, found in leaders(best).items() if bent or reference - total(found) >= AGAIN * most}
-        worth = {*contending(worth, leaders(best)), *foremost, *(name for name in screened.promising(failed) if not BY_NAME[name].sized)}
-        more = starts.items() if not spent() else ()
-        again = refitted([(label, begin) for label, begins in more if label[0] in worth and label not in ahead for begin in begins[1:]])
-        best |= {label: min(best[label], found, key=total) for label, found in again.items()}
-        if not bent:
-            best = {(name, 0): found for name, found in leaders(best).items()}
-        running = contending([label for label in best if label not in ahead], best)
-        for _ in range(LATER_LAPS if base.model.names else LAPS):
-            if spent():
-                break
-            leading = max(reference - min(map(total, best.values())), 0.0) if best else 0.0
-            pace = max(PACE * least, PACE_SHARE * leading)
-            ends = dict(pool.map(onward, ((label, best[label]) for label in running)))
-            running = [label for label in running if total(best[label]) - total(ends[label]) > pace
-                       and not (label[0] in BY_NAME and BY_NAME[label[0]].dear or bends_and_twists(ends[label]))]
-            best |= {label: found for label, found in ends.items() if total(found) < total(best[label])}
-            running = contending(running, best)
-        best = leaders(best)
-        leading = reference - min(map(total, best.values()), default=reference)
-        glances = pool.map(glanced, overlooked(best) if not spent() else [])
-        late = list(pool.map(onward, [(name, found) for name, found in glances if reference - total(found) >= SEEN * leading]))
-        for name, found in pool.map(finish, [(name, found) for name, found in late if reference - total(found) >= AGAIN * leading]):
-            best[name] = min(best.get(name, found), found, key=total)
-        if best and leaves_much(min(best.values(), key=total)) and not (is_dear(base) or spent()):
-            taut = pool.map(held_taut, _more_starts(base.model, [name for name in BY_NAME if name not in exclude], screened.promising(), starts))
-            for name, found in pool.map(let_go, sorted(taut, key=lambda item: item[1].cost)[:LET_GO]):
-                best[name] = min(best.get(name, found), found, key=total)
-        rough = sorted(best.items(), key=lambda item: total(item[1]))
-        gains = [reference - total(f) for _, f in rough]
-        if not gains or gains[0] < NEAR_LEAST * least:
-            return sorted((judged(*item, base, tau) for item in rough), key=lambda c: -c.worth)
-        over = spent()
+    def _refit_held_taut(self, best: dict[str, Fit]) -> None:
+        """Where the leader leaves much, fits under an observer that holds the motion to the reading, which hardly lets it stick where the rudder slipped: C has few dents then."""
+        if not best or not self._leaves_much(min(best.values(), key=self.total)) or is_dear(self.base) or self.spent():
+            return
+        begun = more_starts(self.base.model, [name for name in BY_NAME if name not in self.exclude], self.screened.promising(), self.starts)
+        taut = self._mapped(begun, lambda _: {"rate": TAUT * OBSERVER_RATE, "steps": QUICK, "renewals": 2})
+        for name, found in self.fitted(sorted(taut, key=lambda item: item[1].cost)[:LET_GO], 6, renewals=1):
+            best[name] = min(best.get(name, found), found, key=self.total)
+
+    def _leaves_much(self, found: Fit) -> bool:
+        """Whether a fit leaves a good part, and more than forks of stick and slip do, or wins what matters."""
+        left = self.total(found)
+        return left > EXPLAINED * self.reference and (left > FORKED or self.won(found) >= NEAR_LEAST * max(self.least, LEAST_GAIN))
+
+    def _finish(self, rough: Sequence[tuple[str, Fit]], early: Sequence[tuple[Label, Begin, Fit]]) -> list[Candidate]:
+        """What leads is fitted to the end, in each of its forms, with what has it as a limit and what waves like it; rivals until they have converged."""
+        gains, over = [self.won(found) for _, found in rough], self.spent()
         close = sum(g >= 0.5 * gains[0] for g in gains[:FINISHED])
-        finished = dict(pool.map(finish, [item for item in rough[:close] if not (over and bends_and_twists(item[1]))]))
+        ends = dict(self.finished([item for item in rough[:close] if not (over and bends_and_twists(item[1]))]))
         if over:
-            return told(judged(*item, base, tau) for item in {**dict(rough), **finished}.items())
-        explained = min(map(total, finished.values())) <= QUIET * base.misfit.size
-        for name, found in pool.map(finish, [] if explained or bends_and_twists(base) else _anew(finished, traces, tau)):
-            finished[name] = min(finished[name], found, key=total)
-        others = _other_forms(finished, {name: begins for (name, place), begins in starts.items() if place == 0})
-        others = [(name, begin) for name, begin in others if not any(begin is known for _, known in early)]
-        known, wider = [(label[0], found) for label, found in ended if label[0] in finished], _wider(finished, exclude)
-        for name, found in (*known, *pool.map(finish, others)):
-            if priced(found) < priced(finished[name]):
-                finished[name] = found
-        for name, found in pool.map(finish, [*wider, *_other_waves(finished, exclude)]):
-            kept = finished.get(name, best.get(name))
-            if kept is None or priced(found) < priced(kept) - (max(TIE, NEAR_TIE * (reference - total(kept))) if BY_NAME[name].dear else 0.0):
-                finished[name] = found
-        ranked = sorted((judged(*item, base, tau) for item in {**dict(rough), **finished}.items()), key=lambda c: -c.worth)
+            return self._judged({**dict(rough), **ends}.items())
+        explained = min(map(self.total, ends.values())) <= QUIET * self.base.misfit.size
+        for name, found in self.finished([] if explained or bends_and_twists(self.base) else anew(ends, self.traces, self.tau)):
+            ends[name] = min(ends[name], found, key=self.total)
+        others = other_forms(ends, {name: begins for (name, place), begins in self.starts.items() if place == 0})
+        others = [(name, begin) for name, begin in others if not any(begin is known for _, known, _ in early)]
+        known, broader = [(label[0], found) for label, _, found in early if label[0] in ends], wider(ends, self.exclude)
+        for name, found in (*known, *self.finished(others)):
+            if self.priced(found) < self.priced(ends[name]):
+                ends[name] = found
+        best = dict(rough)
+        for name, found in self.finished([*broader, *other_waves(ends, self.exclude)]):
+            kept = ends.get(name, best.get(name))
+            if kept is None or self.priced(found) < self.priced(kept) - (max(TIE, NEAR_TIE * self.won(kept)) if BY_NAME[name].dear else 0.0):
+                ends[name] = found
+        ranked = sorted(self._judged({**best, **ends}.items()), key=lambda c: -c.worth)
         rivals = len(rivals_of(ranked))
         if rivals > 1:
             lead, second = ranked[0].fit, ranked[1].fit
-            ranked[:rivals] = pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, traces, tau), base, tau), ranked[:rivals])
-    return told(ranked)
+            ranked[:rivals] = self.pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, self.traces, self.tau), self.base, self.tau), ranked[:rivals])
+        return ranked
+
+    def _judged(self, ends: Iterable[tuple[str, Fit]]) -> list[Candidate]:
+        return [judged(name, found, self.base, self.tau) for name, found in ends]
+
+    def _told(self, found: Iterable[Candidate]) -> list[Candidate]:
+        """Those that the recordings can show, the likeliest first."""
+        return likeliest_first(sorted((c for c in found if shows(c) and not _is_within_a_step(c, self.traces)), key=lambda c: -c.worth))
+
+
+def _leaders(ends: Mapping[Label, Fit], total: Callable[[Fit], float]) -> dict[str, Fit]:
+    """The best fit by name of those by (name, place)."""
+    return {name: min((found for (other, _), found in ends.items() if other == name), key=total) for name, _ in ends}
 
 
 def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
@@ -228,90 +276,3 @@ def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
     moved = [(np.subtract(*(trace.plain(residuals_in(m, trace, k, OBSERVER_RATE)) for m in models)), trace) for k, trace in enumerate(traces)]
     return all(trace.converter is not None and float(np.max(np.abs(d[:trace.t.size]))) * trace.sigma < share * trace.converter.step
                for d, trace in moved if np.any(d))
-
-
-def _anew(finished: Mapping[str, Fit], traces: Sequence[Trace], tau: float) -> list[tuple[str, Begin]]:
-    """More starts of the finished waves along the travel that leave much, from where they have brought the baseline: which of many periods is the true one
-    shows badly beside parameters that stand for all of it.
-    """
-    out = []
-    for name, found in finished.items():
-        if _waves_along(name) and found.cost > ANEW_FROM * found.misfit.size:
-            others = [other for other in BY_NAME if other != name]
-            places = screen([found.model.without_effect(name)], traces, tau, others, True, False, tries=ANEW).begins.get(name, [])
-            out += [(name, begin) for begins in places for begin in begins]
-    return out
-
-
-def _more_starts(base: Model, names: Sequence[str], promising: Sequence[str], starts: Mapping[tuple[str, int], Sequence[Begin]]) -> list[tuple[str, Begin]]:
-    """More starts of what is simulated fast and lasts: those of the screening of what is ``promising``, and of all that have few their own as large as they are, since a
-    secant across forks of stick and slip may ask for a dent, or promise nothing of what acts.
-    """
-    out = []
-    for effect in (BY_NAME[name] for name in names if not (BY_NAME[name].dear or BY_NAME[name].once)):
-        own = effect.starts(base.scales)
-        begins = [*(starts.get((effect.name, 0), ()) if effect.name in promising else ()), *(Begin(base.with_effect(effect.name, p), {}) for p in own if len(own) <= FEW_STARTS)]
-        out += [(effect.name, begin) for begin in begins if begin.model.has_tangents]
-    return out
-
-
-def _other_forms(finished: Mapping[str, Fit], starts: Mapping[str, Sequence[Begin]]) -> list[tuple[str, Begin]]:
-    """The best start of each other form (which of its numbers are absent) of the finished effects: after a few steps forms are no more alike than effects."""
-    out = []
-    for name in (n for n in finished if n in BY_NAME):
-        known = [_form(finished[name].model, name)]
-        for begin in starts.get(name, ()):
-            if (form := _form(begin.model, name)) not in known:
-                known.append(form)
-                out.append((name, begin))
-    return out
-
-
-def _form(model: Model, name: str) -> tuple[bool, ...]:
-    return tuple(np.isfinite(dict(model.effects)[name]).tolist())
-
-
-def _wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:
-    """Effects that have a finished one as their limit, with the models that begin there: what is wider is no worse, if its fit finds it.
-
-    What is dear gives way to its own wider form only beyond a tie: that takes several times as long to simulate, and one dent may decide.
-    """
-    out = []
-    for name, found in finished.items():
-        if name in BY_NAME:
-            without, p = found.model.without_effect(name), dict(found.model.effects)[name]
-            out += [(effect.name, Begin(without.with_effect(effect.name, start), {})) for effect in BY_NAME.values()
-                    if effect.name not in exclude for start in effect.grown(name, p, found.model.scales)]
-    return out
-
-
-def _other_waves(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str, Begin]]:
-    """The other laws that wave along the travel, with models that begin at the period of one that leads: what acts has a sharp one, which starts of a law's own miss.
-
-    Those that are one with it (effects.EQUIVALENT) are left out: they are told apart by how long their periods are.
-    """
-    leader = min(finished, key=lambda name: priced(finished[name]))
-    model = finished[leader].model
-    if not _waves_along(leader) or model.plant().coupled:
-        return []
-    out, without = [], model.without_effect(leader)
-    period = dict(model.effects)[leader][_column_of_period(leader)]
-    kin = next((group for group in EQUIVALENT if leader in group), {leader})
-    for effect in (e for e in BY_NAME.values() if _waves_along(e.name) and e.name not in (*exclude, *kin)):
-        column = _column_of_period(effect.name)
-        waves = [p for p in effect.starts(model.scales) if np.isfinite(p[column])]
-        forms = {tuple(np.isfinite(p)): p for p in waves if period <= waves[0][column]}  # of which the first is the longest
-        for p in forms.values():
-            for phase in (0.0, 0.5 * math.pi):
-                begun = p.copy()
-                begun[column], begun[effect.wave[1]] = period, phase
-                out.append((effect.name, Begin(without.with_effect(effect.name, begun), {})))
-    return out
-
-
-def _waves_along(name: str) -> bool:
-    return name in BY_NAME and BY_NAME[name].wave is not None and not is_clocked(name)
-
-
-def _column_of_period(name: str) -> int:
-    return next(k for k, p in enumerate(BY_NAME[name].parameters) if p.name == "period")

@@ -10,8 +10,9 @@ from ers_mj.effects import BY_NAME
 from ers_mj.identification import fit, residuals, score, tau_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
-from ers_mj.race import LEAST_GAIN, _more_starts, _other_forms, _other_waves, _wider, candidates
+from ers_mj.race import LEAST_GAIN, candidates
 from ers_mj.recording import from_arrays
+from ers_mj.restarts import more_starts, other_forms, other_waves, wider
 from ers_mj.screening import Begin, screen
 from ers_mj.traces import trace_of
 from servo import T, TRUTH, recorded, started
@@ -29,9 +30,9 @@ def test_a_wider_effect_begins_where_its_limit_ended(pushed):
 
 def test_a_shaft_may_harden_once_it_is_there(pushed):
     shaft = replace(pushed.fit, model=pushed.fit.model.with_effect("shaft_compliance", np.array([80.0, 0.2, 0.6, 0.2, np.inf])))
-    grown = [begin.model for name, begin in _wider({"shaft_compliance": shaft}, ("backlash",)) if name == "shaft_compliance"]
+    grown = [begin.model for name, begin in wider({"shaft_compliance": shaft}, ("backlash",)) if name == "shaft_compliance"]
     assert len(grown) == 1 and 0.0 < dict(grown[0].effects)["shaft_compliance"][4] < np.inf
-    assert not _wider({"shaft_compliance": replace(shaft, model=grown[0])}, ("backlash",))
+    assert not wider({"shaft_compliance": replace(shaft, model=grown[0])}, ("backlash",))
 
 
 def test_other_laws_wave_with_the_period_that_leads(pushed):
@@ -40,13 +41,13 @@ def test_other_laws_wave_with_the_period_that_leads(pushed):
     period = 0.4 * (model.scales.high - model.scales.low)
     wave, dent = (replace(pushed.fit, model=model.with_effect("position_dependent_friction", np.array(p)))
                   for p in ([0.5, np.inf, np.inf, period, 0.3], [0.5, 0.1, 0.05, np.inf, np.inf]))
-    begun = _other_waves({"position_dependent_friction": wave}, ())
+    begun = other_waves({"position_dependent_friction": wave}, ())
     assert {name for name, _ in begun} >= {"sensor_nonlinearity", "transmission_ripple"} and not {name for name, _ in begun} & {"position_dependent_friction", "periodic_gust"}
     assert all(period in dict(begin.model.effects)[name] and begin.model.names == (name,) for name, begin in begun)
-    assert "sensor_nonlinearity" not in {name for name, _ in _other_waves({"position_dependent_friction": wave}, ("sensor_nonlinearity",))}
-    assert not _other_waves({"position_dependent_friction": dent}, ()) and not _other_waves({"gain": pushed.fit}, ())
+    assert "sensor_nonlinearity" not in {name for name, _ in other_waves({"position_dependent_friction": wave}, ("sensor_nonlinearity",))}
+    assert not other_waves({"position_dependent_friction": dent}, ()) and not other_waves({"gain": pushed.fit}, ())
     ripple = replace(pushed.fit, model=model.with_effect("transmission_ripple", np.array([0.05, period, 0.0, np.inf, np.inf, np.inf])))
-    assert "cogging" not in {name for name, _ in _other_waves({"transmission_ripple": ripple}, ())}
+    assert "cogging" not in {name for name, _ in other_waves({"transmission_ripple": ripple}, ())}
 
 
 def test_forms_are_compared_at_the_end(pushed):
@@ -56,14 +57,14 @@ def test_forms_are_compared_at_the_end(pushed):
             ((np.inf, 0.2, 0.1), (0.2, np.inf, 0.1), (0.3, np.inf, 0.1), (0.2, np.inf, np.inf))]
     begins = [Begin(model.with_effect("supply_sag", p), {}) for p in ways]
     found = replace(pushed.fit, model=begins[0].model)
-    assert [begin for _, begin in _other_forms({"supply_sag": found, "gain": pushed.fit}, {"supply_sag": begins})] == [begins[1], begins[3]]
+    assert [begin for _, begin in other_forms({"supply_sag": found, "gain": pushed.fit}, {"supply_sag": begins})] == [begins[1], begins[3]]
 
 
 def test_a_start_that_a_secant_made_too_small_is_no_end(pushed):
     """Of laws with few starts these count as they are as well, promised or not, of what happens once or takes long none; what is found does not hang on the secant's size."""
     small = {(name, 0): [Begin(pushed.fit.model.with_effect(name, np.array([1e-3])), {})] for name in ("bias_torque", "quadratic_drag")}
     names = ["bias_torque", "quadratic_drag", "position_dependent_friction", "load_disturbance", "presliding"]
-    begun = _more_starts(pushed.fit.model, names, ["bias_torque", "load_disturbance"], small)
+    begun = more_starts(pushed.fit.model, names, ["bias_torque", "load_disturbance"], small)
     own = {name: BY_NAME[name].starts(pushed.fit.model.scales)[0][0] for name in ("bias_torque", "quadratic_drag")}
     assert [(name, dict(b.model.effects)[name][0]) for name, b in begun] == [("bias_torque", 1e-3), ("bias_torque", own["bias_torque"]), ("quadratic_drag", own["quadratic_drag"])]
 
@@ -73,7 +74,7 @@ def test_the_kin_of_a_law_that_leads_is_refitted_though_its_secant_promises_noth
     traces = recorded([("current_limit", np.array([300.0, np.inf]))])
     start, seen = started(traces), screening.screen
     monkeypatch.setattr(race, "screen", lambda places, traces, tau, exclude, *more, **settings: seen(places, traces, tau, [*exclude, "current_limit"], *more, **settings))
-    monkeypatch.setattr(race, "_more_starts", lambda *_: [])
+    monkeypatch.setattr(race, "more_starts", lambda *_: [])
     others = [name for name in BY_NAME if name not in ("supply_sag", "current_limit")]
     assert candidates(start.fit, start.traces, 1.0, 1, others)[0].name == "current_limit"
 
