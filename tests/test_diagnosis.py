@@ -193,6 +193,13 @@ def test_where_all_free_runs_fork_the_observer_tells_what_is_explained():
     assert Case._explained_each(case) == pytest.approx(0.875)
 
 
+@pytest.mark.parametrize("before, after, named", [((90.0, 60.0), (4.0, 6.0), True), ((90.0, 60.0), (40.0, 20.0), False), ((3.0, 2.0), (0.1, 0.1), False)])
+def test_what_nearly_all_of_a_large_misfit_asks_for_is_named_though_its_free_runs_fork(before, after, named):
+    scores = ([Score(1.0, 1, np.exp(np.full(20, c / 20.0)) - 1.0) for c in costs] for costs in (before, after))
+    case = SimpleNamespace(confirmed=SimpleNamespace(**dict(zip(("before", "after"), scores))))
+    assert Case._goes_in_blocks(case) is named
+
+
 @pytest.mark.parametrize("before, explained", [(0.2, 0.75), (0.05, 0.0)])
 def test_where_no_error_is_above_the_noise_memory_tells_what_is_explained(before, explained):
     errors = [(SimpleNamespace(sure=0.99), SimpleNamespace(sure=0.9), 1.0)]
