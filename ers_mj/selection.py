@@ -26,6 +26,7 @@ LEAST_SHARE = 0.1  # and the share of what is left to explain
 LATER_Z = 2.0  # and beside an effect
 PLAIN = 1.3  # noise levels of what a model leaves of a coarse converter's readings, rounding being noise, from which it is wrong
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
+AMPLE, LOST_OF_AMPLE = 2.0, 0.3  # times the gain that matters from which it may be more: of 275 servos without missing physics none offers a lasting law as much
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH), one that takes a GOOD_PART aside
 MOST_EFFORT, LAST_RACED, LAST_BEGUN = 60_000_000, 50_000_000, 140_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
@@ -213,4 +214,5 @@ def _asked_for(candidate: Candidate, least: float, least_z: float, outstanding: 
             return candidate.gain >= max(least, ONCE)
         least = min(least, ONCE) if outstanding else least
         return candidate.gain >= (least if least > LEAST_GAIN else NEAR_LEAST * least)
-    return candidate.gain >= least and (candidate.z >= least_z or candidate.lost <= LOST * candidate.gain)
+    lost = LOST_OF_AMPLE if candidate.gain >= AMPLE * least else LOST
+    return candidate.gain >= least and (candidate.z >= least_z or candidate.lost <= lost * candidate.gain)

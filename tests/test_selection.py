@@ -8,7 +8,7 @@ import pytest
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import score
 from ers_mj.ranking import Candidate, judged
-from ers_mj.selection import GOOD_PART, _bending_and_twisting, _gains_that_matter, _in_its_place, _reconsidered, _taken
+from ers_mj.selection import GOOD_PART, _asked_for, _bending_and_twisting, _gains_that_matter, _in_its_place, _reconsidered, _taken
 
 
 def test_a_round_whose_effect_became_needless_is_given_again_once(pushed):
@@ -28,6 +28,12 @@ def test_a_knock_that_a_later_law_outweighs_is_looked_for_again(pushed, newest, 
     rounds = [(Candidate(name, start, won, 3.0, 0.0, 1.0),) for name, won in (("load_disturbance", 20.0), (newest, gain))]
     found, left = _reconsidered(replace(start, model=model), rounds, pushed.traces, tau)
     assert found.model.names == kept and tuple(ranked[0].name for ranked in left) == kept
+
+
+@pytest.mark.parametrize("gain, z, lost, asked", [(8.8, 1.6, 2.0, True), (8.8, 1.6, 3.0, False), (5.0, 1.6, 1.2, False), (5.0, 1.8, 1.2, True), (2.9, 4.0, 0.0, False)])
+def test_what_acts_in_few_blocks_may_lose_more_where_it_wins_much(pushed, gain, z, lost, asked):
+    """As a stop that one recording reaches does, whose z-score cannot be large."""
+    assert _asked_for(Candidate("end_stop", pushed.fit, gain, z, lost, 4.0), 3.0, 1.7, False) is asked
 
 
 def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed):
