@@ -146,7 +146,7 @@ class Case:
 
     def _goes_in_blocks(self) -> bool:
         """Whether nearly all of a large held-out C goes with the named effects: stick and slip that fork have lost the free runs then. Of what has no name a mimic takes away
-        half (of 25 outsiders of 4157 to 4168 with one 0.55 at most, by what was fitted)."""
+        half (of 20 outsiders of 4157 to 4168 with one 0.55 at most, by what was fitted)."""
         before, after = (float(np.sum(score(pooled(scores).misfit, 1.0))) for scores in (self.confirmed.before, self.confirmed.after))
         return before > MUCH and after < (1.0 - NEARLY_GONE) * before
 
