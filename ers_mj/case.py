@@ -35,7 +35,8 @@ HALF = 0.5  # share of the squared held-out error that the named effects must ex
 NEARLY_ALL = 0.98  # that another form of the right law explains
 LEFT = 0.115  # of what is left in the output (see remainder.py), 0.35 noise levels, from which it counts beside that share
 FAINT = 0.05  # of the same in the recordings but the worst, 0.23 noise levels, from which a model without effects misses something: none of 65 nulls (4133 to 4135) leaves it
-MUCH, NEARLY_GONE = 30.0, 0.75  # held-out C that shows a mismatch beyond any doubt, and the share of it that goes with what acts
+MUCH, NEARLY_GONE = 30.0, 0.75  # held-out C that shows a mismatch beyond any doubt, and the share of it, or of what memory tells, that goes with what acts
+FAIR = 0.4  # share of the squared held-out error that is enough beside memory of which NEARLY_GONE goes
 LOST = 6.0  # noise levels of free-run error after, from which stick and slip that fork are what a free run misses
 
 
@@ -150,6 +151,12 @@ class Case:
         before, after = (float(np.sum(score(pooled(scores).misfit, 1.0))) for scores in (self.confirmed.before, self.confirmed.after))
         return before > MUCH and after < (1.0 - NEARLY_GONE) * before
 
+    def _goes_from_memory(self) -> bool:
+        """Whether nearly all that the output remembers of a mismatch goes with the named effects, and a FAIR share of the free-run error: one free run that stick and slip
+        lose weighs as much as one that is met."""
+        before, after = (max(left["output"], 0.0) for left in (self.left_before, self.left))
+        return self.explained >= FAIR and more_is_missing(self.left_before, None) and after < (1.0 - NEARLY_GONE) * before
+
     @cached_property
     def more_is_missing(self) -> bool:
         """Whether the model leaves more than noise (see remainder.py): of the output nothing where free runs leave none, whatever forks in the observer."""
@@ -161,8 +168,8 @@ class Case:
 
     @property
     def told_effects(self) -> tuple[str, ...]:
-        """The effects that are named: those of the model, if they account for half of what the baseline leaves, in free run or, beyond doubt, in blocks."""
-        return self.model.names if self.explained >= HALF or self._goes_in_blocks() else ()
+        """The effects that are named: those of the model, if they account for half of what the baseline leaves, in free run or, beyond doubt, in blocks or memory."""
+        return self.model.names if self.explained >= HALF or self._goes_in_blocks() or self._goes_from_memory() else ()
 
     @cached_property
     def verdict(self) -> str:

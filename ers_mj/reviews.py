@@ -23,6 +23,7 @@ REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gai
 MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
 PAIRED, FAR, MOST_PAIRS = 0.5, 0.2, 6  # share of what all chosen effects buy, that two rivals must buy one by one to be tried as a pair, and by which the first refit of one
 # that is carried on may be behind; how many are tried
+SIZED = tuple(name for name, effect in BY_NAME.items() if effect.sized)  # in proportion to a number, which a secant shows; what has a threshold it may miss
 
 
 def any_body(plant: ReducedModel) -> bool:

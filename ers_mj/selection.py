@@ -82,11 +82,14 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         least_z = LATER_Z if current.model.names else LEAST_Z
         outstanding = stands_out(current.misfit, tau)
         rough = not swept and EFFORT.spent < end and _is_rough_and_wrong(current, traces)
-        if rough or not (ranked and _asked_for(ranked[0], least, least_z, outstanding)) and EFFORT.spent < end and _is_cheap_and_wrong(current, base, traces):
+        nothing = not (ranked and _asked_for(ranked[0], least, least_z, outstanding))
+        if rough or nothing and EFFORT.spent < end and _is_cheap_and_wrong(current, base, traces):
             kinds = reviews.of_one_body if swept else reviews.any_body  # the second body, which takes most of the time, once a case
             ranked, swept = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, kinds, rough)), True
         elif ranked and EFFORT.spent < end and _may_twist(current) and not ranked[0].fit.model.plant().has_motor_side:
             ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, reviews.of_two_bodies))
+        elif nothing and reviews.is_doubtful(current, tau):  # what has a threshold no secant shows
+            ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names, *reviews.SIZED), jobs, last, reviews.of_one_body))
         if rounds and ranked and EFFORT.spent < end and attainable(current.misfit, Blocks.of(traces).counts, tau) >= least:
             ranked = reviews.other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
         asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)

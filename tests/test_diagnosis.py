@@ -200,6 +200,12 @@ def test_what_nearly_all_of_a_large_misfit_asks_for_is_named_though_its_free_run
     assert Case._goes_in_blocks(case) is named
 
 
+@pytest.mark.parametrize("explained, before, after, named", [(0.45, 0.12, 0.01, True), (0.45, 0.12, 0.06, False), (0.3, 0.12, 0.01, False), (0.45, 0.02, 0.0, False)])
+def test_what_memory_loses_is_named_though_one_free_run_forks(explained, before, after, named):
+    case = SimpleNamespace(explained=explained, left_before={"output": before, "current": 0.0}, left={"output": after, "current": 0.0})
+    assert Case._goes_from_memory(case) is named
+
+
 @pytest.mark.parametrize("before, explained", [(0.2, 0.75), (0.05, 0.0)])
 def test_where_no_error_is_above_the_noise_memory_tells_what_is_explained(before, explained):
     errors = [(SimpleNamespace(sure=0.99), SimpleNamespace(sure=0.9), 1.0)]

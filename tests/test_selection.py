@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ers_mj import reviews, selection
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import score
 from ers_mj.ranking import Candidate, judged
@@ -42,6 +43,19 @@ def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed
     left = float(score(wrong.misfit, 1.0).sum())
     assert _gains_that_matter(wrong, 1.0, True) == (pytest.approx(0.1 * left), pytest.approx(0.1 * left))
     assert _gains_that_matter(wrong, 1.0, False) == (pytest.approx(GOOD_PART * left), pytest.approx(GOOD_PART * left))
+
+
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_where_forks_do_not_account_for_what_is_left_thresholds_are_tried_as_they_are(pushed, monkeypatch, doubtful):
+    """No secant shows them; laws in proportion to a number are seen by theirs."""
+    tried = []
+    monkeypatch.setattr(selection, "candidates", lambda *_: [])
+    monkeypatch.setattr(selection, "_is_cheap_and_wrong", lambda *_: False)
+    monkeypatch.setattr(reviews, "is_doubtful", lambda *_: doubtful)
+    monkeypatch.setattr(reviews, "swept", lambda current, ranked, traces, tau, exclude, *_: tried.extend({*BY_NAME} - {*exclude}) or [])
+    selection.select(pushed.fit, pushed.traces, exclude=["end_stop"])
+    assert {"drive_dead_zone", "voltage_saturation"} <= {*tried} if doubtful else not tried
+    assert not {*tried} & {"end_stop", "bias_torque", "supply_sag"}
 
 
 def test_what_bends_and_twists_takes_longest(pushed):

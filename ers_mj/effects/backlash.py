@@ -5,7 +5,7 @@ import numpy as np
 from ers_mj.effects.base import Parameter, Transmission, coupled
 
 SPRINGY = 0.5  # damping ratio up to which a shaft is a spring, and a play as wide as nothing
-SEEN = 0.45  # of what the contact gives way under the friction, from which a play is seen as one: concealed shafts look like up to 0.3 of it, plays like 0.66 and more
+SEEN = 0.38  # of what the contact gives way under the friction, from which a play is seen as one: concealed shafts look like up to 0.36 of it, plays like 0.40 and more
 
 
 class Backlash(Transmission):
