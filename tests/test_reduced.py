@@ -237,3 +237,11 @@ def test_a_shaft_that_hardens_obeys_its_equations():
     exact = solve_ivp(slope, (0.0, T[-1]), np.zeros(4), t_eval=T, rtol=1e-9, atol=1e-10).y
     assert np.max(np.abs(exact[2] - exact[0])) > 0.02
     assert np.degrees(np.max(np.abs(model.simulate(T, u).theta - c.theta_0 - exact[0]))) < 1e-3
+
+
+def test_a_shaft_that_hardens_without_bound_ends_the_motion():
+    """Each step makes it stiffer, and the next one needs more Runge-Kutta steps than a lifetime has; up to there the motion is told."""
+    shaft = ("shaft_compliance", np.array([9.5, 0.7, 0.39, 0.48, 7.8e-5]))
+    plant, t = ReducedModel(table_1().coefficients, [shaft]), np.arange(100) / 200.0
+    calm, thrown = (plant.theta(t, np.full(t.size, 4.0), (plant.coefficients.theta_0, speed)) for speed in (0.0, 1e5))
+    assert np.isfinite(calm).all() and np.isfinite(thrown[0]) and np.isnan(thrown[-1])

@@ -45,6 +45,7 @@ LEAST_LEFT = 0.2  # of its level that a bristle is taken to have left to bend be
 FULL = 1.0 - 1e-4  # share of its friction's level at which a bristle counts as bent to the full
 CALM = 0.2  # share of a speed, or of a twist's distance to the ends of the play, that a leap over a whole sample must leave
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
+MOST_STEPS = 1e5  # Runge-Kutta steps of a segment, beyond which it is given up as well
 FALL_STEP = 0.1  # length of a segment over the electrical time constant where the inductance falls with the current
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
@@ -472,12 +473,15 @@ def _driven(c, on, p, t, x, m, drive, tau, a_emf, dt):
 
 @part
 def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
-    """The state dt later within the mode."""
+    """The state dt later within the mode; NaN of a motion that runs away, since a shaft that hardens gets the stiffer the further it is twisted."""
     if not _bends(c, m) and c[HARDEN] <= 0 and (not lawful or (m[0] == 0 and c[TWO] <= 0)):
         return _linear(c, x, m, drive, tau, a_emf, dt, 1.0, 0.0, 0.0)
     if c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0:
         return _driven(c, on, p, t, x, m, drive, tau, a_emf, dt)
-    n = int(_rate(c, m, x, tau, a_emf) * dt / RATE_STEP) + 1
+    steps = _rate(c, m, x, tau, a_emf) * dt / RATE_STEP
+    if not steps < MOST_STEPS:
+        return np.nan, np.nan, np.nan, np.nan, np.nan
+    n = int(steps) + 1
     for k in range(n):
         x = _runge_kutta(c, on, p, lawful, t + k * dt / n, x, m, drive, tau, a_emf, dt / n)
     return x
