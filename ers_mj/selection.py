@@ -29,8 +29,9 @@ LOST = 0.2  # share of the gain that the blocks which lose may lose, where it fa
 AMPLE, LOST_OF_AMPLE = 2.0, 0.3  # times the gain that matters from which it may be more: of 275 servos without missing physics one offers a lasting law as much, and its z-score asks for that as well
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH), one that takes a GOOD_PART aside
-MOST_EFFORT, LAST_RACED, LAST_BEGUN = 60_000_000, 50_000_000, 140_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
-# for that does not show by itself, a round beside a bristle is left at its first refits, and none is begun; more by as much as the recordings last longer than a MINUTE together
+MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGEST = 60_000_000, 50_000_000, 140_000_000, 220_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
+# for that does not show by itself, a round beside a bristle is left at its first refits, none is begun, and none where one body leaves more than forks do; more by as much as the
+# recordings last longer than a MINUTE together
 MINUTE = 60.0  # [s]
 GOOD_PART = 0.35  # share of C that a third effect must take away where the model stays wrong, if the second did not
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
@@ -54,13 +55,14 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle, is left out after MOST_EFFORT, and no round
-    begins after LAST_BEGUN; one beside a bristle that is under way at LAST_RACED goes little further than its first refits.
+    begins after LAST_BEGUN; where effects of one body leave more than forks of stick and slip do, one for what takes a good part of that may until LONGEST. One beside a
+    bristle that is under way at LAST_RACED goes little further than its first refits.
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
-    end, raced, last = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN))
+    end, raced, last, longest = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGEST))
     current, rounds, mended, swept, reviewed, paired, took = base, [], 0, False, False, False, 0.0
     tau = tau_of(base.misfit)
-    while EFFORT.spent < last:
+    while EFFORT.spent < (longest if reviews.is_doubtful(current, tau) else last):
         if (taken := _taken(current, rounds)) >= MOST_ROUNDS:
             other = None if paired else reviews.paired(current, rounds, traces, tau, jobs)
             if other is None:
@@ -68,7 +70,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             (current, rounds), paired = other, True
             continue
         progress(f"round {len(rounds) + 1}: comparing effects", 0.15 + 0.12 * len(rounds))
-        least, faint = _gains_that_matter(current, tau, taken < FEWER_ROUNDS or near_noise(current) or took >= GOOD_PART)
+        in_order = EFFORT.spent < last and (taken < FEWER_ROUNDS or near_noise(current) or took >= GOOD_PART)
+        least, faint = _gains_that_matter(current, tau, in_order)
         unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
         ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), faint, raced if is_dear(current) else math.inf)
         if ranked and faint <= ranked[0].gain <= MODEST and mended < _most_mended(current):
@@ -89,7 +92,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         elif ranked and EFFORT.spent < end and _may_twist(current) and not ranked[0].fit.model.plant().has_motor_side:
             ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, reviews.of_two_bodies))
         elif nothing and reviews.is_doubtful(current, tau):  # what has a threshold no secant shows
-            ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names, *reviews.SIZED), jobs, last, reviews.of_one_body))
+            ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names, *reviews.SIZED), jobs, longest, reviews.of_one_body))
         if rounds and ranked and EFFORT.spent < end and attainable(current.misfit, Blocks.of(traces).counts, tau) >= least:
             ranked = reviews.other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
         asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)

@@ -58,6 +58,18 @@ def test_where_forks_do_not_account_for_what_is_left_thresholds_are_tried_as_the
     assert not {*tried} & {"end_stop", "bias_torque", "supply_sag"}
 
 
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_what_forks_do_not_account_for_is_looked_at_longer(pushed, monkeypatch, doubtful):
+    tried = []
+    monkeypatch.setattr(selection, "LAST_BEGUN", 0)
+    monkeypatch.setattr(selection, "candidates", lambda *_: tried.append(True) or [])
+    monkeypatch.setattr(selection, "_is_cheap_and_wrong", lambda *_: False)
+    monkeypatch.setattr(reviews, "is_doubtful", lambda *_: doubtful)
+    monkeypatch.setattr(reviews, "swept", lambda *_: [])
+    selection.select(pushed.fit, pushed.traces)
+    assert bool(tried) is doubtful
+
+
 def test_what_bends_and_twists_takes_longest(pushed):
     model = pushed.fit.model
     beside = {name: _bending_and_twisting(model.with_effect(name, BY_NAME[name].starts(model.scales)[0])) for name in ("presliding", "backlash", "stribeck")}
