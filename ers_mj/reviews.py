@@ -190,6 +190,23 @@ def exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequenc
     return current
 
 
+def widened(current: Fit, newest: str, traces: Sequence[Trace], tau: float, jobs: int) -> Fit:
+    """With earlier effects in wider forms of their own (Effect.grown) that pay beside the newest: the damping of a bristle or a second harmonic may
+    show only when what hid it is gone."""
+    def refitted(model):
+        found = fit(model, traces, tau=tau, steps=4, renewals=2)
+        return found if found.cost - current.cost > MISSED else fit(found.model, traces, tau=tau, steps=SWEEP)
+
+    for name in (n for n in current.model.names if n != newest):
+        without, p = current.model.without_effect(name), dict(current.model.effects)[name]
+        begun = [without.with_effect(name, start) for start in BY_NAME[name].grown(name, p, current.model.scales)]
+        with ThreadPoolExecutor(jobs) as pool:
+            best = min(pool.map(refitted, begun), key=priced, default=current)
+        if priced(best) < priced(current) - TIE:
+            current = best
+    return current
+
+
 def _begun_anew(name: str, without: Model) -> list[Model]:
     """A play or a shaft from its own starts beside all that has been found since: the numbers that it took alone may lie in a dent of C, from which the
     descent does not lead out."""

@@ -14,7 +14,7 @@ from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residu
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.reduced import EFFORT
 from ers_mj.race import LEAST_GAIN, NEAR_LEAST, candidates
-from ers_mj.ranking import LEAST_Z, Candidate, bends_and_twists, is_clocked, is_dear, judged, likeliest_first, really, stands_alone
+from ers_mj.ranking import FORKED, LEAST_Z, Candidate, bends_and_twists, is_clocked, is_dear, judged, likeliest_first, really, stands_alone
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, attainable, stands_out
 from ers_mj.starts import with_starts
@@ -22,7 +22,7 @@ from ers_mj.traces import Blocks, Trace
 
 LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the one that acts
 FAINT_GAIN = 1.5  # there too, where it stands alone (see ranking.stands_alone)
-LEAST_SHARE = 0.1  # and the share of what is left to explain
+LEAST_SHARE, THIRD_SHARE = 0.1, 1 / 6  # and the share of what is left to explain, and that of a third effect: of 65 sets of several, those that took less were false (three of three)
 LATER_Z = 2.0  # and beside an effect
 PLAIN = 1.3  # noise levels of what a model leaves of a coarse converter's readings, rounding being noise, from which it is wrong
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
@@ -119,6 +119,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             current = fit(other[0].fit.model, traces, tau=tau, steps=20)
         if not is_dear(current):
             current, _ = hopped(current, traces, tau, jobs)
+        if float(score(current.misfit, tau).sum()) > FORKED:
+            current = reviews.widened(current, ranked[0].name, traces, tau, jobs)
         if near_noise(current):
             current = reviews.exchanged(current, rounds, traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau, traces)
@@ -126,7 +128,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
 
 def _gains_that_matter(current: Fit, tau: float, in_order: bool) -> tuple[float, float]:
     """What an effect must buy beside this model, and what one that stands alone must; a good part of all that is left where this is not ``in_order``."""
-    share = (LEAST_SHARE if in_order else GOOD_PART) * float(score(current.misfit, tau).sum())
+    usual_share = THIRD_SHARE if len(current.model.names) >= FEWER_ROUNDS else LEAST_SHARE
+    share = (usual_share if in_order else GOOD_PART) * float(score(current.misfit, tau).sum())
     usual = LATER_GAIN if current.model.names else LEAST_GAIN
     return max(usual, share), max(FAINT_GAIN if current.model.names and not is_dear(current) else usual, share)
 

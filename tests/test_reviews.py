@@ -10,7 +10,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.identification import fit
 from ers_mj.plants.reduced import EFFORT
 from ers_mj.ranking import Candidate, judged
-from ers_mj.reviews import _begun_anew, exchanged, of_one_body, other_way_round, paired, reviewed, swept
+from ers_mj.reviews import _begun_anew, exchanged, of_one_body, other_way_round, paired, reviewed, swept, widened
 from servo import TRUTH, recorded, started
 
 
@@ -33,6 +33,19 @@ def test_two_effects_are_found_from_either(pushed):
     assert [c.name for c in ranked] == ["drive_dead_zone"] and set(ranked[0].fit.model.names) == {"drive_dead_zone", "input_delay"}
     found = dict(ranked[0].fit.model.effects)
     assert found["drive_dead_zone"][0] == pytest.approx(0.95, rel=0.02) and found["input_delay"][0] == pytest.approx(0.0157, rel=0.02)
+
+
+def test_a_form_that_another_effect_hid_is_found_beside_it():
+    """A current that builds up late hides that the cog has a second harmonic, until it has a name itself."""
+    truth = [("cogging", np.array([1.5, 0.12, 0.4, 0.5, 1.0])), ("inductance", np.array([0.004, np.inf]))]
+    start = started(recorded(truth))
+    plain = start.fit.model.with_effect("cogging", np.array([1.5, 0.12, 0.4, np.inf, np.inf])).with_effect("inductance", truth[1][1])
+    current = fit(plain, start.traces)
+    found = widened(current, "inductance", start.traces, 1.0, 1)
+    assert found.cost < current.cost - 10 and dict(found.model.effects)["cogging"][3] == pytest.approx(0.5, rel=0.1)
+    assert set(found.model.names) == {"cogging", "inductance"}
+    assert widened(found, "inductance", start.traces, 1.0, 1) is found  # nothing wider is left
+    assert widened(current, "cogging", start.traces, 1.0, 1).cost > found.cost + 10  # the newest was tried in all its forms when it was found
 
 
 def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(pushed, monkeypatch):

@@ -25,7 +25,7 @@ class DriveDeadZone(Drive):
 
     def starts(self, scales):
         widths = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32]) * scales.input
-        return [np.array([0.02 * scales.input, np.inf]), *(np.array([d, 0.05 * d]) for d in widths)]
+        return [*(np.array([d * scales.input, np.inf]) for d in (0.02, 0.002)), *(np.array([d, 0.05 * d]) for d in widths)]
 
     def command(self, p, u):
         size, lost = np.abs(u), min(p[-1], p[0])
