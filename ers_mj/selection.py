@@ -22,7 +22,7 @@ from ers_mj.traces import Blocks, Trace
 
 LATER_GAIN = 4.0  # and beside an effect, whose law is hardly ever exactly the one that acts
 FAINT_GAIN = 1.5  # there too, where it stands alone (see ranking.stands_alone)
-LEAST_SHARE, THIRD_SHARE = 0.1, 1 / 6  # and the share of what is left to explain, and that of a third effect: of 65 sets of several, those that took less were false (three of three)
+LEAST_SHARE, THIRD_SHARE = 0.1, 1 / 6  # and the share of what is left to explain, and that of a third effect: of 59 sets of several and three later seeds, three took less, none of them true
 LATER_Z = 2.0  # and beside an effect
 PLAIN = 1.3  # noise levels of what a model leaves of a coarse converter's readings, rounding being noise, from which it is wrong
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
