@@ -74,14 +74,14 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         least, faint = _gains_that_matter(current, tau, in_order)
         unsought = (*exclude, *current.model.names, *(_bending_and_twisting(current.model) if EFFORT.spent >= end else ()))
         ranked = candidates(current, traces, tau, jobs, unsought, anchors if not rounds else (), faint, raced if is_dear(current) else math.inf)
-        if ranked and faint <= ranked[0].gain <= MODEST and mended < _most_mended(current):
-            again = _less(ranked[0], traces, tau)
+        leader, may_mend = ranked[0] if ranked else None, mended < _most_mended(current)
+        if may_mend and (again := _way_back(ranked, current, traces, tau, faint)) is not None:
             won = float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum())
-            if won > DENT:
-                base, current, mended = base if current.model.names else again, again, mended + 1
-                if ranked[0].gain - won < faint or any(c.worth >= ranked[0].worth - won for c in ranked[1:]):
-                    continue
-                ranked = [judged(c.name, c.fit, current, tau) for c in ranked]
+            base, current, mended = base if current.model.names else again, again, mended + 1
+            if leader.gain - won < faint or any(c.worth >= leader.worth - won for c in ranked[1:]):
+                continue
+            ranked, may_mend = [judged(c.name, c.fit, current, tau) for c in ranked], False
+            leader = ranked[0]
         least_z = LATER_Z if current.model.names else LEAST_Z
         outstanding = stands_out(current.misfit, tau)
         rough = not swept and EFFORT.spent < end and _is_rough_and_wrong(current, traces)
@@ -93,6 +93,9 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, reviews.of_two_bodies))
         elif nothing and reviews.is_doubtful(current, tau):  # what has a threshold no secant shows
             ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names, *reviews.SIZED), jobs, longest, reviews.of_one_body))
+        if may_mend and ranked and ranked[0] is not leader and (again := _way_back(ranked, current, traces, tau, faint)) is not None:
+            base, current, mended = base if current.model.names else again, again, mended + 1
+            continue
         if rounds and ranked and EFFORT.spent < end and attainable(current.misfit, Blocks.of(traces).counts, tau) >= least:
             ranked = reviews.other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
         asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)
@@ -204,12 +207,14 @@ def _most_mended(current: Fit) -> int:
     return 0 if bends_and_twists(current) else 1 if is_dear(current) else MOST_MENDED
 
 
-def _less(candidate: Candidate, traces: Sequence[Trace], tau: float) -> Fit:
-    """The model that a candidate extends, refitted from where the candidate stands: the way out of a dent is no gain of an effect's."""
-    model = candidate.fit.model
-    if candidate.name in BY_NAME:
-        return fit(model.without_effect(candidate.name), traces, tau=tau, steps=12)
-    return fit(replace(model, states={k: v for k, v in model.states.items() if k != candidate.name} or None), traces, tau=tau, steps=12)
+def _way_back(ranked: Sequence[Candidate], current: Fit, traces: Sequence[Trace], tau: float, faint: float) -> Fit | None:
+    """The model itself, refitted from where a leader of MODEST gain stands, if that wins more than a DENT: the way out of one is no gain of an effect's."""
+    if not ranked or not faint <= ranked[0].gain <= MODEST:
+        return None
+    model, name = ranked[0].fit.model, ranked[0].name
+    without = model.without_effect(name) if name in BY_NAME else replace(model, states={k: v for k, v in model.states.items() if k != name} or None)
+    again = fit(without, traces, tau=tau, steps=12)
+    return again if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT else None
 
 
 def _asked_for(candidate: Candidate, least: float, least_z: float, outstanding: bool) -> bool:

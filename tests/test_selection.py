@@ -7,7 +7,7 @@ import pytest
 
 from ers_mj import reviews, selection
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import score
+from ers_mj.identification import fit, score
 from ers_mj.ranking import Candidate, judged
 from ers_mj.selection import GOOD_PART, _asked_for, _bending_and_twisting, _gains_that_matter, _in_its_place, _reconsidered, _taken
 
@@ -43,6 +43,26 @@ def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed
     left = float(score(wrong.misfit, 1.0).sum())
     assert _gains_that_matter(wrong, 1.0, True) == (pytest.approx(0.1 * left), pytest.approx(0.1 * left))
     assert _gains_that_matter(wrong, 1.0, False) == (pytest.approx(GOOD_PART * left), pytest.approx(GOOD_PART * left))
+
+
+def test_the_way_out_of_a_dent_is_no_effects_gain_wherever_it_was_found(pushed, monkeypatch):
+    """A sweep finds a drag that stands for nothing: its servo has left a place where another rested."""
+    name, good = "quadratic_drag", fit(pushed.fit.model.with_effect("bias_torque", np.array([0.06])), pushed.traces)
+    aside = replace(good.model, values={**good.model.values, "c_2": 1.002 * good.model.values["c_2"]})
+    rested = fit(aside, pushed.traces, steps=0)
+    found = [judged(name, fit(good.model.with_effect(name, np.array([1e-3])), pushed.traces), rested, 1.0)]
+    assert selection.LATER_GAIN < found[0].gain < selection.MODEST
+    monkeypatch.setattr(selection, "candidates", lambda *_: [])
+    monkeypatch.setattr(selection, "_is_cheap_and_wrong", lambda *_: True)
+    monkeypatch.setattr(reviews, "swept", lambda *_: found[:1] and [found.pop()])
+    chosen = selection.select(rested, pushed.traces).chosen
+    assert not found and chosen.model.names == ("bias_torque",) and chosen.cost == pytest.approx(good.cost, abs=0.1)
+
+
+def test_a_third_effect_must_take_a_sixth(pushed):
+    two = pushed.fit.model.with_effect("quadratic_drag", np.array([1.0])).with_effect("bias_torque", np.array([0.06]))
+    wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=two)
+    assert _gains_that_matter(wrong, 1.0, True)[0] == pytest.approx(float(score(wrong.misfit, 1.0).sum()) / 6)
 
 
 @pytest.mark.parametrize("doubtful", [True, False])
