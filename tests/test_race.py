@@ -15,7 +15,7 @@ from ers_mj.recording import from_arrays
 from ers_mj.restarts import more_starts, other_forms, other_waves, wider
 from ers_mj.screening import Begin, screen
 from ers_mj.traces import trace_of
-from servo import T, TRUTH, recorded, started
+from servo import NAMES, T, TRUTH, recorded, started
 
 
 def test_a_wider_effect_begins_where_its_limit_ended(pushed):
@@ -116,3 +116,13 @@ def test_a_search_that_is_given_up_still_tells_the_cost_that_was_asked_for(pushe
     left = fit(far, pushed.traces, tau=1.0, steps=1, ceiling=pushed.fit.misfit)
     assert float(np.exp(np.mean(np.log(left.misfit + 1.0)))) > 10.0  # it ended at a stage far above
     assert left.cost == pytest.approx(float(score(left.misfit, 1.0).sum()))
+
+
+def test_a_soft_knee_is_found_that_a_plain_clip_does_little_of(monkeypatch):
+    """A drive that gives in long before its supply is told from the first as what it is: a clip does too little of it to be carried on."""
+    knee = max(float(np.max(np.abs(INPUTS[name](T)))) for name in NAMES)
+    traces = recorded([("voltage_saturation", np.array([knee, 6.0]))])
+    start = started(traces)
+    monkeypatch.setattr(race, "wider", lambda *_: [])
+    found = candidates(start.fit, start.traces, 1.0, 1, [name for name in BY_NAME if name != "voltage_saturation"])[0]
+    assert dict(found.fit.model.effects)["voltage_saturation"] == pytest.approx([knee, 6.0], rel=0.1)

@@ -5,6 +5,7 @@ import numpy as np
 from ers_mj.effects.base import Drive, Parameter
 
 SOFT = 10.0  # sharpness from which a soft knee is begun
+LEAST_SHARP = 4.0  # at which half of u_max is given to 1.5 % still: what bends more is a supply that sags, no knee
 
 
 class VoltageSaturation(Drive):
@@ -15,13 +16,13 @@ class VoltageSaturation(Drive):
     mjcf = "the ctrlrange of the motor; a soft knee is put into the command before it reaches ctrl"
     parameters = (
         Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),
-        Parameter("sharpness", "ratio", "exponent of a soft knee; a plain clip where there is none", lower=2.0, upper=100.0, absent=np.inf),
+        Parameter("sharpness", "ratio", "exponent of a soft knee; a plain clip where there is none", lower=LEAST_SHARP, upper=100.0, absent=np.inf),
     )
     needs = (("u_max",),)
-    tries = 2
+    tries = 3
 
     def starts(self, scales):
-        return [np.array([part * scales.input, np.inf]) for part in (0.95, 0.8)]
+        return [*(np.array([part * scales.input, np.inf]) for part in (0.95, 0.8)), np.array([scales.input, SOFT])]
 
     def grown(self, name, p, scales):
         """From a plain clip: with a soft knee."""
