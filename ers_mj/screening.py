@@ -14,7 +14,7 @@ from ers_mj.identification import Run, central_jacobian, residuals, residuals_in
 from ers_mj.model import OBSERVER_RATE, Columns, Model
 from ers_mj.traces import BLOCK, Blocks, Trace
 
-MOST_SENT, MOST_BENT, LATER = 10, 14, 5  # candidates of the screening that are refitted at most, in the first round, there if bent, and beside an effect
+MOST_SENT, MOST_BENT, LATER = 10, 14, 8  # candidates of the screening that are refitted at most, in the first round, there if bent, and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
 LESS = 0.1  # share of the best one's promise from which an effect is screened from further places where the first is bent
 UNLIKELY = 0.05  # share of the promise from which a law is refitted, below which what it promises to first order is not followed up

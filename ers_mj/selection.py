@@ -14,7 +14,7 @@ from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residu
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.reduced import EFFORT
 from ers_mj.race import LEAST_GAIN, NEAR_LEAST, candidates
-from ers_mj.ranking import FORKED, LEAST_Z, Candidate, bends_and_twists, is_clocked, is_dear, judged, likeliest_first, really, stands_alone
+from ers_mj.ranking import FORKED, LEAST_Z, TIE, Candidate, bends_and_twists, is_clocked, is_dear, judged, likeliest_first, really, stands_alone
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, attainable, stands_out
 from ers_mj.starts import with_starts
@@ -91,17 +91,16 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             ranked, swept = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, kinds, rough)), True
         elif ranked and EFFORT.spent < end and _may_twist(current) and not ranked[0].fit.model.plant().has_motor_side:
             ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names), jobs, end, reviews.of_two_bodies))
-        elif nothing and reviews.is_doubtful(current, tau):  # what has a threshold no secant shows
+        elif nothing and reviews.is_doubtful(current, tau) or _knocks_beside(current, ranked):  # what has a threshold no secant shows
             ranked = reviews.joined(ranked, reviews.swept(current, ranked, traces, tau, (*exclude, *current.model.names, *reviews.SIZED), jobs, longest, reviews.of_one_body))
         if may_mend and ranked and ranked[0] is not leader and (again := _way_back(ranked, current, traces, tau, faint)) is not None:
             base, current, mended = base if current.model.names else again, again, mended + 1
             continue
         if rounds and ranked and EFFORT.spent < end and attainable(current.misfit, Blocks.of(traces).counts, tau) >= least:
             ranked = reviews.other_way_round(current, rounds[-1], ranked, traces, tau, jobs)
-        asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)
-                 and _asked_for(c, faint if c.gain < least and stands_alone(c, ranked) else least, least_z, outstanding)]
-        rounds.append(tuple(sorted(ranked, key=lambda c: c not in asked[:1])))
-        if not asked:
+        asked = _asked(ranked, current, (least, faint), least_z, outstanding)
+        rounds.append(tuple(sorted(ranked, key=lambda c: c is not asked)))
+        if asked is None:
             other = None if reviewed or EFFORT.spent >= end or not reviews.is_doubtful(current, tau) else reviews.reviewed(current, rounds, traces, tau, exclude, jobs, end)
             if other is None and not paired:
                 other, paired = reviews.paired(current, rounds, traces, tau, jobs), True
@@ -191,6 +190,11 @@ def _bending_and_twisting(model: Model) -> list[str]:
     return [name for name, plant in plants if plant.bends and plant.has_motor_side]
 
 
+def _knocks_beside(current: Fit, ranked: Sequence[Candidate]) -> bool:
+    """Whether a knock leads beside effects of one body: in the blocks where a law is missed most it may do what that would do in all."""
+    return bool(ranked and current.model.names and ranked[0].name in BY_NAME and BY_NAME[ranked[0].name].once) and not current.model.plant().coupled
+
+
 def _may_twist(current: Fit) -> bool:
     """Whether a rudder whose friction bends a bristle is explained so badly that a play or a shaft may be there, which beside it no secant shows."""
     return current.model.plant().bends and not bends_and_twists(current) and not near_noise(current)
@@ -215,6 +219,19 @@ def _way_back(ranked: Sequence[Candidate], current: Fit, traces: Sequence[Trace]
     without = model.without_effect(name) if name in BY_NAME else replace(model, states={k: v for k, v in model.states.items() if k != name} or None)
     again = fit(without, traces, tau=tau, steps=12)
     return again if float(score(current.misfit, tau).sum() - score(again.misfit, tau).sum()) > DENT else None
+
+
+def _asked(ranked: Sequence[Candidate], current: Fit, gains: tuple[float, float], least_z: float, outstanding: bool) -> Candidate | None:
+    """What is named in this round: the first that is asked for at the ``gains`` that matter, and that one alone which leads where nothing is named yet.
+
+    A knock shows that something is missing; where the law that leads explains more of it by a TIE, that is named.
+    """
+    least, faint = gains
+    asked = next((c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)
+                  and _asked_for(c, faint if c.gain < least and stands_alone(c, ranked) else least, least_z, outstanding)), None)
+    if asked is None or asked is ranked[0] or not BY_NAME[asked.name].once:
+        return asked
+    return ranked[0] if ranked[0].name in BY_NAME and ranked[0].worth > asked.worth + TIE else asked
 
 
 def _asked_for(candidate: Candidate, least: float, least_z: float, outstanding: bool) -> bool:

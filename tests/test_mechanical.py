@@ -142,6 +142,6 @@ def test_a_plant_survives_the_way_to_another_process():
 
 
 def test_a_motion_that_runs_away_is_not_a_number():
-    softening = [("hinge_moment_cubic", np.array([-400.0]))]
+    softening = [("hinge_moment_cubic", np.array([-400.0, np.inf]))]
     theta = rudder(effects=softening).simulate(T, INPUTS["steps"](T) + 4.0).theta
     assert np.isnan(theta[-1]) and np.isfinite(theta[0])

@@ -126,3 +126,12 @@ def test_a_soft_knee_is_found_that_a_plain_clip_does_little_of(monkeypatch):
     monkeypatch.setattr(race, "wider", lambda *_: [])
     found = candidates(start.fit, start.traces, 1.0, 1, [name for name in BY_NAME if name != "voltage_saturation"])[0]
     assert dict(found.fit.model.effects)["voltage_saturation"] == pytest.approx([knee, 6.0], rel=0.1)
+
+
+
+def test_a_hinge_moment_that_grows_more_slowly_is_told_as_one():
+    """Begun as a plain cubic; one that stays one gets no second number."""
+    for truth in ([300.0, 0.5], [300.0, np.inf]):
+        start = started(recorded([("hinge_moment_cubic", np.array(truth))]))
+        found = candidates(start.fit, start.traces, 1.0, 1, [name for name in BY_NAME if name != "hinge_moment_cubic"])[0]
+        assert dict(found.fit.model.effects)["hinge_moment_cubic"] == pytest.approx(truth, rel=0.1)

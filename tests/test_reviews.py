@@ -95,7 +95,7 @@ def test_a_sweep_finds_what_secants_miss(pushed):
 
 def test_two_rivals_take_the_place_of_what_does_much_of_what_both_do():
     """A friction along the travel beside a spring that hardens, told as a gear that varies and a bent scale."""
-    truth = {"position_dependent_friction": np.array([25.0, np.inf, np.inf, 0.5, 1.4]), "hinge_moment_cubic": np.array([400.0])}
+    truth = {"position_dependent_friction": np.array([25.0, np.inf, np.inf, 0.5, 1.4]), "hinge_moment_cubic": np.array([400.0, np.inf])}
     start = started(recorded(list(truth.items())))
 
     def alone(name, p):

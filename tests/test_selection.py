@@ -9,7 +9,7 @@ from ers_mj import reviews, selection
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import fit, score
 from ers_mj.ranking import Candidate, judged
-from ers_mj.selection import GOOD_PART, _asked_for, _bending_and_twisting, _gains_that_matter, _in_its_place, _reconsidered, _taken
+from ers_mj.selection import GOOD_PART, _asked, _asked_for, _bending_and_twisting, _gains_that_matter, _in_its_place, _reconsidered, _taken
 
 
 def test_a_round_whose_effect_became_needless_is_given_again_once(pushed):
@@ -35,6 +35,18 @@ def test_a_knock_that_a_later_law_outweighs_is_looked_for_again(pushed, newest, 
 def test_what_acts_in_few_blocks_may_lose_more_where_it_wins_much(pushed, gain, z, lost, asked):
     """As a stop that one recording reaches does, whose z-score cannot be large."""
     assert _asked_for(Candidate("end_stop", pushed.fit, gain, z, lost, 4.0), 3.0, 1.7, False) is asked
+
+
+@pytest.mark.parametrize("gain, named", [(9.9, "drive_dead_zone"), (4.9, "load_disturbance")])
+def test_a_knock_gives_way_to_a_law_that_explains_more(pushed, gain, named):
+    """The law loses too much elsewhere to be asked for by itself; that something is missing the knock has shown."""
+    model = pushed.fit.model
+    knocked = replace(pushed.fit, model=model.with_effect("load_disturbance", BY_NAME["load_disturbance"].starts(replace(model.scales, hot=((0, 1.0, 0.1),)))[0]))
+    dead = replace(pushed.fit, model=model.with_effect("drive_dead_zone", BY_NAME["drive_dead_zone"].starts(model.scales)[0]))
+    ranked = [Candidate("drive_dead_zone", dead, gain, 1.7, 0.4 * gain, 3.0), Candidate("load_disturbance", knocked, 4.4, 1.0, 0.1, 4.0)]
+    assert selection._knocks_beside(dead, ranked[::-1]) and not selection._knocks_beside(dead, ranked) and not selection._knocks_beside(pushed.fit, ranked[::-1])
+    assert _asked(ranked, dead, (4.0, 1.5), 2.0, False).name == named
+    assert _asked(ranked[:1], dead, (4.0, 1.5), 2.0, False) is None
 
 
 def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed):
