@@ -208,6 +208,8 @@ class Case:
         for ranked in self.selection.rounds:
             named = [c for c in ranked if c.name in BY_NAME and c.gain > 0]
             if named and named[0].name == name:
+                if named[0].beside is not None:  # it took another's place: as they were compared then
+                    named = [replace(c, fit=c.beside) for c in named if c.beside is not None]
                 return named, probabilities({c.name: c.fit for c in named})
         return [], {}
 

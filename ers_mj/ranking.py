@@ -32,7 +32,8 @@ CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of
 class Candidate:
     """A model that adds one effect to another: the fit, its gain in C over the reference, the paired z of that gain.
 
-    ``lost`` is the C that the blocks which the effect makes worse lose together, ``best`` what it wins in the block that it serves best.
+    ``lost`` is the C that the blocks which the effect makes worse lose together, ``best`` what it wins in the block that it serves best, ``beside`` its fit beside
+    what later rounds added, where the leader was exchanged for a rival there.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Candidate:
     z: float
     lost: float
     best: float
+    beside: Fit | None = None
 
     @property
     def worth(self) -> float:

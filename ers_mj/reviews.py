@@ -186,7 +186,7 @@ def exchanged(current: Fit, rounds: list[tuple[Candidate, ...]], traces: Sequenc
         name = likeliest({n: found for n, found in fits.items() if priced(found) < least})
         current = fits[name]
         if name != leader:
-            rounds[k] = tuple(sorted(ranked, key=lambda c: c.name != name))
+            rounds[k] = tuple(sorted((replace(c, beside=fits.get(c.name)) for c in ranked), key=lambda c: c.name != name))
     return current
 
 

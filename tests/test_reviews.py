@@ -57,6 +57,7 @@ def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(push
     rounds = [ranked, newest]
     found = exchanged(ranked[0].fit, rounds, traces, 1.0, 1)
     assert found.model.names == ("bias_torque",) and [c.name for c in rounds[0]][0] == "bias_torque" and len(rounds[0]) == 3
+    assert rounds[0][0].beside is found and all(c.beside is not None for c in rounds[0])  # by which its probability is told, in case.py
     alone = [ranked]
     assert exchanged(ranked[0].fit, alone, traces, 1.0, 1).model.names == ("gravity_imbalance",)  # its round has compared it with its rivals just so
     monkeypatch.setattr(reviews, "is_rough", lambda traces: True)  # but behind a coarse converter it has told anew where the recordings begin
