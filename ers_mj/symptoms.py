@@ -13,7 +13,7 @@ COARSE = 200  # levels of travel below which even a decimal grid acts as a conve
 JUMP, CALM_CHANGES, LONGEST_EXCURSION = 8.0, 6, 50  # noise levels of a jump; changes on either side that are usual; samples
 ON_LATTICE = 0.18  # of a step by which a gap may miss a multiple of it: a coarse converter behind a fine one of a seventh of its step misses by that
 ONE_STEP = 0.3  # of a step by which gaps of one step, seen through a finer converter, may differ
-LEAP = 3.5, 6.0, 1.5  # grid steps, noise levels and usual changes that the catching up after a held span must exceed at least
+LEAP = 3.5, 6.0, 1.5  # grid steps, noise levels beyond the usual change, and usual changes that the catching up after a held span must exceed at least
 LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
 DITHER, COLOURED = 0.35, 3.0  # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may let it stay
 FEWEST_TURNS = 5  # of the reading within NEIGHBOURS, as noise makes them and motion does not
@@ -66,7 +66,8 @@ def leapt_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
             continue
         leap, before, after = y[s.stop] - y[s.stop - 1], (y[s.start] - y[first]) / LEAP_SIDES, (y[last] - y[s.stop]) / LEAP_SIDES
         way = (s.stop - s.start) * 0.5 * (before + after)
-        least = max(LEAP[0] * grid, LEAP[1] * sigma, LEAP[2] * max(abs(before), abs(after)))
+        usual = max(abs(before), abs(after))
+        least = max(LEAP[0] * grid, LEAP[1] * sigma + usual, LEAP[2] * usual)
         if abs(leap) > least and before * after > 0 and LEAP_WAY[0] < leap / way < LEAP_WAY[1]:
             out.append(slice(s.start + 1, s.stop))
     return out

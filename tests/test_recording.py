@@ -476,13 +476,14 @@ def test_a_sensor_that_hangs_at_rest_is_told_by_the_noise_that_no_longer_moves_i
     assert [(s.start, round(s.stop, -1)) for s in unmoved_spans(y, grid, 2.9e-4)] == found
 
 
-def test_a_leap_of_three_counts_is_chance():
-    """A rudder on its way, read with noise of half a count: three alike and three counts at once come about within some ten thousand samples."""
+@pytest.mark.parametrize("counts, hold, noise, more", [([0, 1, 1, 2, 3, 4, 4, 4, 7, 7, 8, 9, 10, 10], 6, 0.49, 1), ([0, 0, 4, 4, 7, 7, 7, 11, 12, 13, 14, 15], 5, 0.663, 2)])
+def test_a_leap_of_few_counts_is_chance(counts, hold, noise, more):
+    """A rudder on its way: three alike, and at once some counts that noise and the way since make up, come about within some ten thousand samples."""
     grid = 5.1133e-4
-    y = grid * np.array([0, 1, 1, 2, 3, 4, 4, 4, 7, 7, 8, 9, 10, 10])
-    assert leapt_spans(y, grid, 0.49 * grid) == []
-    y[8:] += grid
-    assert leapt_spans(y, grid, 0.49 * grid) == [slice(6, 8)]
+    y = grid * np.array(counts)
+    assert leapt_spans(y, grid, noise * grid) == []
+    y[hold + 2:] += more * grid
+    assert leapt_spans(y, grid, noise * grid) == [slice(hold, hold + 2)]
 
 
 def test_decimal_steps_in_degrees_are_told_apart_by_their_size(tmp_path, columns):
