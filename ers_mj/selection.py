@@ -14,7 +14,7 @@ from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residu
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.reduced import EFFORT
 from ers_mj.race import LEAST_GAIN, NEAR_LEAST, candidates
-from ers_mj.ranking import FORKED, LEAST_Z, TIE, Candidate, bends_and_twists, is_clocked, is_dear, judged, likeliest_first, really, stands_alone
+from ers_mj.ranking import LEAST_Z, TIE, Candidate, bends_and_twists, is_clocked, is_dear, judged, likeliest_first, really, stands_alone
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, attainable, stands_out
 from ers_mj.starts import with_starts
@@ -121,7 +121,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             current = fit(other[0].fit.model, traces, tau=tau, steps=20)
         if not is_dear(current):
             current, _ = hopped(current, traces, tau, jobs)
-        if float(score(current.misfit, tau).sum()) > FORKED:
+        if float(score(current.misfit, tau).sum()) > LATER_GAIN:
             current = reviews.widened(current, ranked[0].name, traces, tau, jobs)
         if near_noise(current):
             current = reviews.exchanged(current, rounds, traces, tau, jobs)

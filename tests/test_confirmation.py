@@ -91,7 +91,7 @@ def test_an_effect_that_one_recording_shows_is_judged_within_it():
 
 
 def test_what_is_too_small_to_be_found_widens_the_intervals(plain):
-    faint = started([trace(name, [("quadratic_drag", np.array([0.02]))], seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
+    faint = started([trace(name, [("quadratic_drag", np.array([0.02, np.inf]))], seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
     model, layout = faint.fit.model, faint.fit.model.layout()
     noise, unseen = half_widths(model, faint.traces, (), 1.0), unseen_widths(model, faint.traces, 1.0)
     off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))

@@ -135,3 +135,9 @@ def test_a_hinge_moment_that_grows_more_slowly_is_told_as_one():
         start = started(recorded([("hinge_moment_cubic", np.array(truth))]))
         found = candidates(start.fit, start.traces, 1.0, 1, [name for name in BY_NAME if name != "hinge_moment_cubic"])[0]
         assert dict(found.fit.model.effects)["hinge_moment_cubic"] == pytest.approx(truth, rel=0.1)
+
+
+def test_a_drag_may_have_an_exponent_of_its_own():
+    start = started(recorded([("quadratic_drag", np.array([1.0, 2.4]))]))
+    found = candidates(start.fit, start.traces, 1.0, 1, [name for name in BY_NAME if name != "quadratic_drag"])[0]
+    assert dict(found.fit.model.effects)["quadratic_drag"] == pytest.approx([1.0, 2.4], rel=0.1)

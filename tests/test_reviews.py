@@ -16,7 +16,7 @@ from servo import TRUTH, recorded, started
 
 def test_a_play_begins_anew_beside_what_was_found_since(pushed):
     model = pushed.fit.model
-    anew = _begun_anew("backlash", model.with_effect("quadratic_drag", np.array([0.5])))
+    anew = _begun_anew("backlash", model.with_effect("quadratic_drag", np.array([0.5, np.inf])))
     assert [m.names for m in anew] == [("quadratic_drag", "backlash")] * len(BY_NAME["backlash"].starts(model.scales))
     assert not _begun_anew("quadratic_drag", model)
     assert not _begun_anew("backlash", model.with_effect("shaft_compliance", np.array([80.0, 0.2, 0.6, 0.2, np.inf])))
@@ -103,7 +103,7 @@ def test_two_rivals_take_the_place_of_what_does_much_of_what_both_do():
         return judged(name, fit(start.fit.model.with_effect(name, p), start.traces), start.fit, 1.0)
 
     leader = alone("variable_ratio", np.array([0.01, -1.0, 0.5]))
-    wrong = fit(leader.fit.model.with_effect("quadratic_drag", np.array([1.0])), start.traces)
+    wrong = fit(leader.fit.model.with_effect("quadratic_drag", np.array([1.0, np.inf])), start.traces)
     rivals = [alone(name, p) for name, p in truth.items()]
     found, rounds = paired(wrong, [(leader, *rivals), ()], start.traces, 1.0, 1)
     assert set(found.model.names) == set(truth) and [ranked[0].name for ranked in rounds] == list(truth)

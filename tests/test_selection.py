@@ -51,7 +51,7 @@ def test_a_knock_gives_way_to_a_law_that_explains_more(pushed, gain, named):
 
 def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed):
     """Of 100 C that are left a tenth is enough in order, and a good part out of it; of hardly any what is more than chance."""
-    wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=pushed.fit.model.with_effect("quadratic_drag", np.array([1.0])))
+    wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=pushed.fit.model.with_effect("quadratic_drag", np.array([1.0, np.inf])))
     left = float(score(wrong.misfit, 1.0).sum())
     assert _gains_that_matter(wrong, 1.0, True) == (pytest.approx(0.1 * left), pytest.approx(0.1 * left))
     assert _gains_that_matter(wrong, 1.0, False) == (pytest.approx(GOOD_PART * left), pytest.approx(GOOD_PART * left))
@@ -62,7 +62,7 @@ def test_the_way_out_of_a_dent_is_no_effects_gain_wherever_it_was_found(pushed, 
     name, good = "quadratic_drag", fit(pushed.fit.model.with_effect("bias_torque", np.array([0.06])), pushed.traces)
     aside = replace(good.model, values={**good.model.values, "c_2": 1.002 * good.model.values["c_2"]})
     rested = fit(aside, pushed.traces, steps=0)
-    found = [judged(name, fit(good.model.with_effect(name, np.array([1e-3])), pushed.traces), rested, 1.0)]
+    found = [judged(name, fit(good.model.with_effect(name, np.array([1e-3, np.inf])), pushed.traces), rested, 1.0)]
     assert selection.LATER_GAIN < found[0].gain < selection.MODEST
     monkeypatch.setattr(selection, "candidates", lambda *_: [])
     monkeypatch.setattr(selection, "_is_cheap_and_wrong", lambda *_: True)
@@ -72,7 +72,7 @@ def test_the_way_out_of_a_dent_is_no_effects_gain_wherever_it_was_found(pushed, 
 
 
 def test_a_third_effect_must_take_a_sixth(pushed):
-    two = pushed.fit.model.with_effect("quadratic_drag", np.array([1.0])).with_effect("bias_torque", np.array([0.06]))
+    two = pushed.fit.model.with_effect("quadratic_drag", np.array([1.0, np.inf])).with_effect("bias_torque", np.array([0.06]))
     wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=two)
     assert _gains_that_matter(wrong, 1.0, True)[0] == pytest.approx(float(score(wrong.misfit, 1.0).sum()) / 6)
 

@@ -72,7 +72,7 @@ def test_both_plants_read_the_recordings_own_clock():
 
 
 @pytest.mark.parametrize(("name", "p"), [("presliding", [0.005, 0.1, np.inf, 1.5]), ("presliding", [0.005, 0.1, np.inf, 2.0]), ("presliding", [0.02, 0.1, np.inf, 0.7]),
-                                         ("current_limit", [80.0, 0.3]), ("inductance", [0.008, 60.0]), ("hinge_moment_cubic", [300.0, 0.2])])
+                                         ("current_limit", [80.0, 0.3]), ("inductance", [0.008, 60.0]), ("hinge_moment_cubic", [300.0, 0.2]), ("quadratic_drag", [1.0, 2.6])])
 def test_another_form_agrees(name, p):
     """What the last number, absent in the plain form, makes of an effect, is in the twin as well: a bristle's exponent, what flows beyond a limit."""
     u = INPUTS["multisine"](T)
