@@ -30,7 +30,7 @@ T = np.arange(0.0, 5.0, 1e-3)
 CLASSES = {  # members with the parameters that their fits begin at; the truth is one of these, of a size between half and once this
     "late": {"input_delay": [1e-3], "sensor_lag": [1e-3], "inductance": [1e-3, np.inf]},
     "weak drive": {"voltage_saturation": [5.9], "current_limit": [400.0], "supply_sag": [40.0]},
-    "torque": {"bias_torque": [2.0], "gravity_imbalance": [5.0, 0.3], "asymmetric_friction": [2.0, 0.05]},
+    "torque": {"bias_torque": [2.0], "gravity_imbalance": [5.0, 0.3], "asymmetric_friction": [2.0, 0.05, np.inf, np.inf]},
 }
 
 

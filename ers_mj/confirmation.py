@@ -125,8 +125,8 @@ def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -
     if not BY_NAME[name].once:
         return False
     columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
-    begun, width = (model.local[name][:, columns.index(column)] for column in ("t_0", "width"))
-    knocks = [(b - t.t[0], w, t.t[-1] - b) for b, w, t in zip(begun, width, traces, strict=True) if np.isfinite(b)]
+    begun, width, fade = (model.local[name][:, columns.index(column)] for column in ("t_0", "width", "fade"))
+    knocks = [(b - t.t[0], w, t.t[-1] - b) for b, w, t in zip(begun, np.fmin(width, fade), traces, strict=True) if np.isfinite(b)]
     if any(before < START or left < START for before, _, left in knocks):
         return True
     if not any(before < EDGE or left - w < EDGE for before, w, left in knocks):

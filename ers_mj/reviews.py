@@ -225,9 +225,14 @@ def pruned(current: Fit, newest: str, traces: Sequence[Trace], tau: float) -> Fi
     return current
 
 
+def leaves_more_than_forks(current: Fit, tau: float) -> bool:
+    """Whether effects leave more than forks of stick and slip in two blocks do."""
+    return bool(current.model.names) and float(score(current.misfit, tau).sum()) > FORKED
+
+
 def is_doubtful(current: Fit, tau: float) -> bool:
-    """Whether the effects of a model of one body leave more than forks of stick and slip in two blocks do."""
-    return bool(current.model.names) and not current.model.plant().coupled and float(score(current.misfit, tau).sum()) > FORKED
+    """Whether a model of one body does, beside which a sweep takes little time."""
+    return not current.model.plant().coupled and leaves_more_than_forks(current, tau)
 
 
 def joined(ranked: Sequence[Candidate], others: Sequence[Candidate]) -> list[Candidate]:

@@ -25,6 +25,7 @@ LEAST_KNOCK = 3.0  # of C that a recording must leave for a knock to be looked f
 PEAK = 30.0  # factor by which a block's tau + misfit must fall, more than a fork of stick and slip makes (see evaluation.NULL_PEAK)
 USUAL = 0.95  # share of the blocks that are no worse than a bad one
 HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
+OUTWEIGHED = 5.0  # how far the mean misfit of blocks may lie above their geometric mean before one of them hides what a knock does to the others
 LEAD, TAIL = 0.1, 2.0  # [s] before a knock begins and after, in which it is tried
 RUNAWAY = 1e12  # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
 IDLE, HALVINGS = 0.1, 6  # of C that a push which moves little changes; of the way from it to the next that throws the rudder
@@ -186,33 +187,44 @@ def _targets(place: Model, e: np.ndarray, traces: Sequence[Trace], tau: float):
 def _knocks(run: Run, effect: Effect, starts: Sequence[np.ndarray], target: np.ndarray, traces: Sequence[Trace], tau: float) -> list[tuple[float, Model]]:
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all for a small one, so that no secant
     may be scaled. The best starts of different side, length or recording, brought nearer, with what they gain in C as a share of the residual. They are
-    compared and brought nearer at a tau that the recording's part around them gives (see fit): at the last one C has a dent wherever one block is met. What a coarse
-    converter's thresholds tell counts as rounding here: a knock bends to when one of them was passed.
+    compared and brought nearer at a tau that the recording's part around them gives (see fit): at the last one C has a dent wherever one block is met. Where one block
+    is so bad that it outweighs all others they are brought nearer at that one's own level first: any push that throws the rudder about as far as it was thrown leaves much in the
+    next blocks until it is met. What a coarse converter's thresholds tell counts as rounding here: a knock bends to when one of them was passed.
     """
-    place, best = run.model, {}
+    place = run.model
     column = [p.name for p in effect.parameters].index("record")
     near = _Surroundings(run, traces, tau)
 
     def gains(start):
-        """What a start gains at the level of its surroundings, and at tau."""
+        """What a start gains at tau, at the level of its surroundings, and at that of the worst of them."""
         k = int(start[column])
         trace, *levels = near.of(k, start[1])
         misfit = near.misfit(trace, residuals_in(place.with_effect(effect.name, start), trace, k, OBSERVER_RATE))
         won = [without - float(np.sum(score(misfit, level))) for level, without in levels]
-        return won if np.all(np.isfinite(won)) else [-math.inf, -math.inf]
+        return won if np.all(np.isfinite(won)) else [-math.inf] * len(won)
 
-    def gain(start):
-        return gains(start)[0]
-
-    tried: dict[tuple, list[tuple[float, np.ndarray]]] = {}
+    tried: dict[tuple, list[tuple[list[float], np.ndarray]]] = {}
     for start in starts:
-        tried.setdefault((start[0] > 0, *start[1:]), []).append((gain(start), start))
-    for pushes in tried.values():
-        for won, start in (*pushes, *_between(gain, pushes)):
-            kind = int(start[column]), start[0] > 0, start[2]
-            best[kind] = max(best.get(kind, (0.0, start)), (won, start), key=lambda found: found[0])
-    nearer = [_nearer(gain, start) for won, start in sorted(best.values(), key=lambda found: -found[0])[:effect.tries] if won > 0]
-    return [(2.0 * won / float(target @ target), place.with_effect(effect.name, start)) for _, start in nearer if (won := gains(start)[1]) > 0]
+        tried.setdefault((start[0] > 0, *start[1:]), []).append((gains(start), start))
+    nearer = []
+    for levels, most in (((1,), effect.tries), ((2, 1), 1)):
+        def gain(start):
+            return gains(start)[levels[0]]
+
+        best: dict[tuple, tuple[float, np.ndarray]] = {}
+        for pushes in tried.values():
+            if levels[0] == 2 and not near.is_outweighed(pushes[0][1][column], pushes[0][1][1]):
+                continue
+            pushes = [(won[levels[0]], start) for won, start in pushes]
+            for won, start in (*pushes, *_between(gain, pushes)):
+                kind = int(start[column]), start[0] > 0, start[2]
+                best[kind] = max(best.get(kind, (0.0, start)), (won, start), key=lambda found: found[0])
+        likely = [start for won, start in sorted(best.values(), key=lambda found: -found[0])[:most] if won > 0]
+        for start in (form for start in likely for form in (start, *effect.grown(effect.name, start, place.scales))):
+            for level in levels:
+                start = _nearer(lambda p: gains(p)[level], effect, start)
+            nearer.append(start)
+    return [(2.0 * won / float(target @ target), place.with_effect(effect.name, start)) for start in nearer if (won := gains(start)[0]) > 0]
 
 
 class _Surroundings:
@@ -229,8 +241,8 @@ class _Surroundings:
         """Misfits (B,) of the residuals (rows,) of a trace, its converter's thresholds aside."""
         return Blocks.of([trace]).misfit(trace.plain(e))
 
-    def of(self, record: int, moment: float) -> tuple[Trace, tuple[float, float], tuple[float, float]]:
-        """The part around a moment [s], and (level, C of the run there at it) for the geometric mean of its misfits and for tau."""
+    def of(self, record: int, moment: float) -> tuple[Trace, tuple[float, float], tuple[float, float], tuple[float, float]]:
+        """The part around a moment [s], and (level, C of the run there at it) for tau, for the geometric mean of its misfits and for their plain mean."""
         trace = self.traces[record]
         begin, end = 0, trace.t.size
         if not self.whole and trace.converter is None:
@@ -241,9 +253,14 @@ class _Surroundings:
             start = (theta + self.run.model.offset(record), omega) if begin else trace.start
             part = trace if (begin, end) == (0, trace.t.size) else replace(trace.part(begin, end), start=start)
             misfit = self.misfit(part, residuals_in(self.run.model, part, record, OBSERVER_RATE))
-            levels = float(np.exp(np.mean(np.log(misfit + self.tau)))), self.tau
+            levels = self.tau, float(np.exp(np.mean(np.log(misfit + self.tau)))), float(np.mean(misfit)) + self.tau
             self.known[record, begin, end] = part, *((level, float(np.sum(score(misfit, level)))) for level in levels)
         return self.known[record, begin, end]
+
+    def is_outweighed(self, record: int, moment: float) -> bool:
+        """Whether the worst blocks around a moment are OUTWEIGHED times as bad as most."""
+        _, _, (usual, _), (worst, _) = self.of(int(record), moment)
+        return worst > OUTWEIGHED * usual
 
 
 def _between(gain: Callable[[np.ndarray], float], pushes: Sequence[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:
@@ -263,11 +280,19 @@ def _between(gain: Callable[[np.ndarray], float], pushes: Sequence[tuple[float, 
     return found
 
 
-def _nearer(gain: Callable[[np.ndarray], float], start: np.ndarray) -> tuple[float, np.ndarray]:
-    """A knock's size, beginning and length (the first three of ``start``) brought nearer: a time has no slope before the knock overlaps the mismatch."""
-    first = start[:3] + np.vstack([np.zeros(3), np.diag([0.3 * start[0], 0.03, 0.3 * start[2]])])
-    found = minimize(lambda p: -gain(np.append(p, start[3:])), start[:3], method="Nelder-Mead", options={"initial_simplex": first, "maxfev": NEARER})
-    return -float(found.fun), np.append(found.x, start[3:])
+def _nearer(gain: Callable[[np.ndarray], float], effect: Effect, start: np.ndarray) -> np.ndarray:
+    """A knock's size, beginning and length, or how it fades, brought nearer: a time has no slope before the knock overlaps the mismatch."""
+    free = [k for k, parameter in enumerate(effect.parameters) if parameter.fitted and np.isfinite(start[k])]
+
+    def whole(p):
+        out = start.copy()
+        out[free] = p
+        return out
+
+    step = [0.03 if effect.parameters[k].name == "t_0" else 0.3 * start[k] for k in free]
+    first = start[free] + np.vstack([np.zeros(len(free)), np.diag(step)])
+    found = minimize(lambda p: -gain(whole(p)), start[free], method="Nelder-Mead", options={"initial_simplex": first, "maxfev": NEARER})
+    return whole(found.x)
 
 
 def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:

@@ -62,7 +62,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     end, raced, last, longest = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGEST))
     current, rounds, mended, swept, reviewed, paired, took = base, [], 0, False, False, False, 0.0
     tau = tau_of(base.misfit)
-    while EFFORT.spent < (longest if reviews.is_doubtful(current, tau) else last):
+    while EFFORT.spent < (longest if not is_dear(current) and reviews.leaves_more_than_forks(current, tau) else last):
         if (taken := _taken(current, rounds)) >= MOST_ROUNDS:
             other = None if paired else reviews.paired(current, rounds, traces, tau, jobs)
             if other is None:

@@ -55,7 +55,7 @@ def late():
 
 @pytest.fixture(scope="module")
 def pushed():
-    return explained(traces_of([("bias_torque", np.array([8.0]))], ("multisine", "steps", "chirp")), ("bias_torque", 6.0), ("asymmetric_friction", -6.0, 0.01))
+    return explained(traces_of([("bias_torque", np.array([8.0]))], ("multisine", "steps", "chirp")), ("bias_torque", 6.0), ("asymmetric_friction", -6.0, 0.01, np.inf, np.inf))
 
 
 def advised(case, leader, *rivals):

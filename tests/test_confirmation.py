@@ -102,7 +102,7 @@ def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out():
     """Of a recording where few samples bear it, or while its start is read; within one the interval of what moves a rudder that sticks tells little."""
     quiet = [trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))]
     for begun, knocked, none in ((2.9, False, True), (-0.28, True, True), (0.03, True, True), (1.0, False, False), (1.0, True, False), (2.6, True, False)):
-        knock = np.array([40.0, begun, 0.3, 1.0])
+        knock = np.array([40.0, begun, 0.3, 1.0, np.inf])
         traces = [quiet[0], trace("steps", [("load_disturbance", knock)], seed=1) if knocked else quiet[1], quiet[2]]
         start = started(traces)
         found = fit(start.fit.model.with_effect("load_disturbance", knock), start.traces)

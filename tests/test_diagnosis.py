@@ -149,7 +149,7 @@ def test_a_gust_has_a_phase_of_its_own_in_every_recording():
 
 
 def test_a_knock_in_one_recording_is_found_there():
-    knock = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0]))]
+    knock = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0, np.inf]))]
     document = diagnose(acting([], knock, []), read_datasheet("table1")).document
     first = document["missing"][0]
     assert first["effect"] == "load_disturbance" and first["parameters"]["record"]["value"] == 1

@@ -42,7 +42,7 @@ def test_an_absent_effect_leaves_the_motion_alone(effect):
     u = INPUTS["multisine"](T)
     values = np.where(effect.absent() == 0, 1e-12, effect.absent())
     if effect.name == "stribeck":
-        values = np.array([1e-12, 0.1, 1.0])
+        values = np.array([1e-12, 0.1, 1.0, np.inf])
     motion = ReducedModel(table_1().coefficients, [(effect.name, values)]).simulate(T, u).theta
     assert np.degrees(np.max(np.abs(motion - table_1().simulate(T, u).theta))) < 2e-4
 
@@ -93,6 +93,23 @@ def test_a_bristle_is_begun_with_damping_that_fades_where_it_was_lost(pushed):
     lasting, fading = (np.array([1e-3, 0.1, w_d, np.inf]) for w_d in (10.0 * scales.speed, 0.1 * scales.speed))
     assert [p[0] == 1e-3 and p[2] < scales.speed for p in effect.grown("presliding", lasting, scales)] == [True, False, False]
     assert not any(p[2] < np.inf for p in effect.grown("presliding", fading, scales))
+
+
+def test_wider_forms_begin_near_the_plain_one(pushed):
+    """Half of a Stribeck friction is left at the same speed, a difference of friction in motion stays, a push is as strong over its time; what is wide already is not widened."""
+    scales = pushed.fit.model.scales
+    plain = {"stribeck": [40.0, 0.6, 1.4, np.inf], "asymmetric_friction": [30.0, 1.0, np.inf, np.inf], "load_disturbance": [100.0, 1.0, 0.3, 0.0, np.inf]}
+    wide = {name: BY_NAME[name].grown(name, np.array(p), scales) for name, p in plain.items()}
+    level = [law.friction(tuple(law.constants(np.array(p), None)), 0.0, 0.0, 0.6 * np.log(2.0) ** (1.0 / 1.4), 0.0, 1.0)
+             for law in [BY_NAME["stribeck"]] for p in (plain["stribeck"], wide["stribeck"][0])]
+    assert level == pytest.approx([20.0, 20.0])
+    fast, slow = (BY_NAME["asymmetric_friction"].friction(tuple(BY_NAME["asymmetric_friction"].constants(wide["asymmetric_friction"][0], None)), 50.0, 0.0, w, 0.0, 1.0)
+                  for w in (10.0 * scales.speed, 0.0))
+    assert fast == pytest.approx(50.0) and slow == pytest.approx(35.0)
+    push = wide["load_disturbance"][0]
+    assert push[0] * push[4] == pytest.approx(100.0 * 0.3) and np.isinf(push[2])
+    assert BY_NAME["load_disturbance"].grown("load_disturbance", push, scales)[0] == pytest.approx(plain["load_disturbance"])
+    assert not any(BY_NAME[name].grown(name, some[0], scales) for name, some in wide.items() if name != "load_disturbance")
 
 
 def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):

@@ -25,7 +25,7 @@ def test_one_law_without_a_name_takes_the_place_of_all_names(monkeypatch):
         traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
     start = baseline(traces, Datasheet(lumped=TRUTH), True, 1)
     model = start.fit.model
-    for name, p in (("quadratic_drag", [0.5, np.inf]), ("sensor_nonlinearity", [0.05, 0.05, np.inf, np.inf, np.inf]), ("asymmetric_friction", [1.0, 0.5])):
+    for name, p in (("quadratic_drag", [0.5, np.inf]), ("sensor_nonlinearity", [0.05, 0.05, np.inf, np.inf, np.inf]), ("asymmetric_friction", [1.0, 0.5, np.inf, np.inf])):
         model = model.with_effect(name, np.array(p))
     told = Selection(start.fit, fit(model, start.traces), (), 1.0, start.traces)
     monkeypatch.setattr(mimics, "_in_its_place", lambda *_: [])

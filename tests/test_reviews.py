@@ -52,7 +52,7 @@ def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(push
     """A constant torque and its asymmetric form are one; gravity, a third that does as well, is beaten by the two together."""
     base, traces = pushed.fit, pushed.traces
     ranked = tuple(judged(name, fit(base.model.with_effect(name, np.array(p)), traces), base, 1.0) for name, p in
-                   (("gravity_imbalance", [0.06, 0.0]), ("bias_torque", [0.06]), ("asymmetric_friction", [-0.06, 0.0])))
+                   (("gravity_imbalance", [0.06, 0.0]), ("bias_torque", [0.06]), ("asymmetric_friction", [-0.06, 0.0, np.inf, np.inf])))
     newest = (replace(ranked[0], name="stribeck"),)
     rounds = [ranked, newest]
     found = exchanged(ranked[0].fit, rounds, traces, 1.0, 1)

@@ -86,13 +86,27 @@ def test_one_block_stands_out_among_bad_ones():
 
 def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
     u = np.where(T < 1.0, INPUTS["multisine"](T), 0.0)
-    knock = np.array([-300.0, 2.24, 0.08, 0.0])
+    knock = np.array([-300.0, 2.24, 0.08, 0.0, np.inf])
     y = ReducedModel(lumped(TRUTH), [("load_disturbance", knock)]).simulate(T, u).measured
     still = trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(9).standard_normal(T.size), name="still"), None)
     model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}, scales=replace(pushed.fit.model.scales, recordings=1))
     (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
-    size, begin, length, record = dict(begins[0].model.effects)["load_disturbance"]
+    size, begin, length, record, fade = dict(begins[0].model.effects)["load_disturbance"]
     assert size == pytest.approx(-300.0, rel=0.3) and begin == pytest.approx(2.24, abs=0.02) and length == pytest.approx(0.08, rel=0.3) and record == 0
+
+
+@pytest.mark.parametrize("size, fade", [(-300.0, 0.1), (-600.0, 0.05)])
+def test_a_knock_that_fades_is_found_where_it_throws_a_resting_rudder(pushed, size, fade):
+    """Any other push leaves much of it: less throws the rudder not at all, and what ends leaves it elsewhere."""
+    u = np.where(T < 1.0, INPUTS["multisine"](T), 0.0)
+    knock = np.array([size, 2.24, np.inf, 0.0, fade])
+    y = ReducedModel(lumped(TRUTH), [("load_disturbance", knock)]).simulate(T, u).measured
+    still = trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(9).standard_normal(T.size), name="still"), None)
+    model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}, scales=replace(pushed.fit.model.scales, recordings=1))
+    (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
+    found = [dict(begin.model.effects)["load_disturbance"] for begin in begins]
+    fading = next(p for p in found if np.isfinite(p[4]))
+    assert fading[0] == pytest.approx(size, rel=0.3) and fading[1] == pytest.approx(2.24, abs=0.02) and fading[4] == pytest.approx(fade, rel=0.3)
 
 
 def test_a_knock_is_tried_in_its_surroundings(pushed):
@@ -101,8 +115,8 @@ def test_a_knock_is_tried_in_its_surroundings(pushed):
     near = _Surroundings(run, pushed.traces, 1.0)
     for moment in (0.02, 1.4, 2.95):
         gains = []
-        knocked = run.model.with_effect("load_disturbance", np.array([300.0, moment, 0.08, 1.0]))
-        part, _, (level, without) = near.of(1, moment)
+        knocked = run.model.with_effect("load_disturbance", np.array([300.0, moment, 0.08, 1.0, np.inf]))
+        part, (level, without), *_ = near.of(1, moment)
         assert level == 1.0
         for some in (part, trace):
             before, after = (float(np.sum(score(near.misfit(some, residuals_in(model, some, 1, 5.0)), 1.0))) for model in (run.model, knocked))

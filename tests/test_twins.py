@@ -14,9 +14,9 @@ from test_reduced import SCALES
 TOLERANCE = 0.05  # of the effect's own size
 VISIBLE = 0.2  # [deg] RMS
 SIZES = {  # where the first start of an effect is too small to be seen beside the two plants' own difference, or has not all of its terms
-    "inductance": [0.008, 300.0], "input_delay": [0.0043], "backlash": [0.012, 0.6, 0.2, 120.0, 0.2], "stribeck": [40.0, 0.6, 1.4],
+    "inductance": [0.008, 300.0], "input_delay": [0.0043], "backlash": [0.012, 0.6, 0.2, 120.0, 0.2], "stribeck": [40.0, 0.6, 1.4, np.inf],
     "end_stop": [0.15, 0.35, 100.0, 0.3], "sensor_quantisation": [0.0213], "voltage_saturation": [5.0, 8.0],
-    "load_disturbance": [150.0, 0.6, 0.5, 0.0], "sensor_dropout": [4.0, 0.08], "sensor_lag": [0.01, 0.0103],
+    "load_disturbance": [150.0, 0.6, 0.5, 0.0, np.inf], "sensor_dropout": [4.0, 0.08], "sensor_lag": [0.01, 0.0103],
     "cogging": [22.0, 0.125, 0.0, 0.3, 1.0], "sensor_nonlinearity": [0.2, 0.1, np.inf, np.inf, np.inf],
     "shaft_compliance": [12.0, 0.1, 0.6, 0.2, 0.03], "torque_saturation": [0.5, 24.0], "running_in": [0.5, 0.5],
     "uneven_damping": [5.0, 3.0, 0.3, np.inf, np.inf, np.inf],
@@ -71,12 +71,21 @@ def test_both_plants_read_the_recordings_own_clock():
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - early.theta)
 
 
+def plain_form(name, p):
+    """Without the last number, and what says something only together with it."""
+    effect = BY_NAME[name]
+    names = [parameter.name for parameter in effect.parameters]
+    gone = next((group for group in effect.together if names[-1] in group), names[-1:])
+    return [np.inf if some in gone else v for some, v in zip(names, p, strict=True)]
+
+
 @pytest.mark.parametrize(("name", "p"), [("presliding", [0.005, 0.1, np.inf, 1.5]), ("presliding", [0.005, 0.1, np.inf, 2.0]), ("presliding", [0.02, 0.1, np.inf, 0.7]),
-                                         ("current_limit", [80.0, 0.3]), ("inductance", [0.008, 60.0]), ("hinge_moment_cubic", [300.0, 0.2]), ("quadratic_drag", [1.0, 2.6])])
+                                         ("current_limit", [80.0, 0.3]), ("inductance", [0.008, 60.0]), ("hinge_moment_cubic", [300.0, 0.2]), ("quadratic_drag", [1.0, 2.6]),
+                                         ("asymmetric_friction", [30.0, 0.0, 0.2, 0.5]), ("stribeck", [80.0, 0.6, 2.0, 0.5]), ("load_disturbance", [250.0, 0.6, 0.5, 0.0, 0.1])])
 def test_another_form_agrees(name, p):
     """What the last number, absent in the plain form, makes of an effect, is in the twin as well: a bristle's exponent, what flows beyond a limit."""
     u = INPUTS["multisine"](T)
-    law, plain = (ReducedModel(EQ_5, [(name, np.array(some))]).simulate(T, u) for some in (p, [*p[:-1], np.inf]))
+    law, plain = (ReducedModel(EQ_5, [(name, np.array(some))]).simulate(T, u) for some in (p, plain_form(name, p)))
     twin = MechanicalPlant(EQ_5, [(name, np.array(p))], parameters=SHEET.parameters).simulate(T, u)
     size = rms_deg(law.theta - plain.theta)
     assert size > VISIBLE

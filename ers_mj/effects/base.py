@@ -238,6 +238,10 @@ class Effect:
         """What the compiled law receives as its ``p`` (at most 5 numbers)."""
         return p
 
+    def is_lawful(self, p: np.ndarray) -> bool:
+        """Whether its compiled law adds anything at these numbers to what its ``coefficients`` say."""
+        return True
+
     def command(self, p: np.ndarray, u: np.ndarray) -> np.ndarray:
         """What the motor's terminals see (N,) of the command u (N,)."""
         return u

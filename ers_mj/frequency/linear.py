@@ -127,7 +127,7 @@ def matrices(model: ReducedModel, theta: float, omega: float) -> tuple[np.ndarra
 
 def _slopes(model: ReducedModel, c: Coefficients, theta: float, omega: float) -> tuple[float, float, float]:
     """Slopes over theta, w and j of what the effects' laws add to the rudder's acceleration, in motion upwards at a drive that holds the speed."""
-    laws = [(effect, effect.constants(values, c)) for effect, values in ((BY_NAME[name], values) for name, values in model.effects)]
+    laws = [(effect, effect.constants(values, c)) for effect, values in ((BY_NAME[name], values) for name, values in model.effects) if effect.is_lawful(values)]
     j = c.a_1 * (theta - c.theta_0) + c.a_mech_plus * omega + c.c_1 * np.sign(theta - c.theta_0) + c.c_2_plus
 
     def force(theta: float, w: float, j: float) -> float:

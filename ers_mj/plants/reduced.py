@@ -85,14 +85,15 @@ class ReducedModel:
 
     def __post_init__(self):
         c = self.coefficients
-        p = np.zeros((len(EFFECTS), N_PARAMETERS))
+        p, lawful = np.zeros((len(EFFECTS), N_PARAMETERS)), []
         for name, values in self.effects:
             effect = BY_NAME[name]
             c = effect.coefficients(values, c)
-            if effect.torque or effect.friction or effect.inertia or effect.memory:
+            if (effect.torque or effect.friction or effect.inertia or effect.memory) and effect.is_lawful(values):
+                lawful.append(name)
                 constants = effect.constants(values, c)
                 p[ROW[name], :len(constants)] = constants
-        object.__setattr__(self, "_lowered", (np.array(c, float), rows_of(tuple(name for name, _ in self.effects), c.has_motor_side), p))
+        object.__setattr__(self, "_lowered", (np.array(c, float), rows_of(tuple(lawful), c.has_motor_side), p))
 
     @property
     def coupled(self) -> bool:
