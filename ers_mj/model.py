@@ -187,6 +187,13 @@ class Model:
             local[name] = rows
         return replace(self, effects=(*self.effects, (name, start)), local=local or None)
 
+    def with_form(self, name: str, start: np.ndarray) -> Model:
+        """The model with one of its effects at ``start``, another form of it; what a wave's phase is in each recording stays."""
+        model = self.without_effect(name).with_effect(name, start)
+        if BY_NAME[name].wave is None or not BY_NAME[name].local:
+            return model
+        return replace(model, local={**model.local, name: self.local[name].copy()})
+
     def without_effect(self, name: str) -> Model:
         """The model with one effect less."""
         local = {k: v for k, v in (self.local or {}).items() if k != name}

@@ -67,9 +67,9 @@ def wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str
     out = []
     for name, found in finished.items():
         if name in BY_NAME:
-            without, p = found.model.without_effect(name), dict(found.model.effects)[name]
-            out += [(effect.name, Begin(without.with_effect(effect.name, start), {})) for effect in BY_NAME.values()
-                    if effect.name not in exclude for start in effect.grown(name, p, found.model.scales)]
+            model, without, p = found.model, found.model.without_effect(name), dict(found.model.effects)[name]
+            out += [(effect.name, Begin(model.with_form(name, start) if effect.name == name else without.with_effect(effect.name, start), {}))
+                    for effect in BY_NAME.values() if effect.name not in exclude for start in effect.grown(name, p, model.scales)]
     return out
 
 

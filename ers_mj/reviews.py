@@ -198,8 +198,7 @@ def widened(current: Fit, newest: str, traces: Sequence[Trace], tau: float, jobs
         return found if found.cost - current.cost > MISSED else fit(found.model, traces, tau=tau, steps=SWEEP)
 
     for name in (n for n in current.model.names if n != newest):
-        without, p = current.model.without_effect(name), dict(current.model.effects)[name]
-        begun = [without.with_effect(name, start) for start in BY_NAME[name].grown(name, p, current.model.scales)]
+        begun = [current.model.with_form(name, start) for start in BY_NAME[name].grown(name, dict(current.model.effects)[name], current.model.scales)]
         with ThreadPoolExecutor(jobs) as pool:
             best = min(pool.map(refitted, begun), key=priced, default=current)
         if priced(best) < priced(current) - TIE:

@@ -99,7 +99,7 @@ def test_slopes_along_the_motion_are_those_of_the_thresholds(name):
 
 def test_what_is_smaller_than_a_step_shows():
     """A gust that moves the rudder by a seventh of a step: hidden in the rounding, plain to the thresholds."""
-    gust = [("periodic_gust", np.array([0.9, 1.8, 0.5]))]
+    gust = [("periodic_gust", np.array([0.9, 1.8, 0.5, *[np.inf] * 4]))]
     trace, truth = recorded(gust)
     quiet, _ = recorded()
     with_it, without = (ReducedModel(lumped(truth), some).simulate(T, trace.u).theta for some in (gust, ()))

@@ -139,7 +139,7 @@ def acting(*per_record, names=("multisine", "steps", "chirp")):
 
 
 def test_a_gust_has_a_phase_of_its_own_in_every_recording():
-    gusts = [[("periodic_gust", np.array([12.0, 2.3, phase]))] for phase in (0.4, 2.0, -1.3)]
+    gusts = [[("periodic_gust", np.array([12.0, 2.3, phase, *[np.inf] * 4]))] for phase in (0.4, 2.0, -1.3)]
     document = diagnose(acting(*gusts), read_datasheet("table1")).document
     first = document["missing"][0]
     assert first["effect"] == "periodic_gust" and first["evidence"]["heldout_rmse_with_rad"] is None

@@ -12,6 +12,7 @@ from ers_mj.effects import BY_NAME, EFFECTS, EQUIVALENT
 from ers_mj.errors import InputError
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.restarts import wider
 from ers_mj.simulation import simulate_recording, unit_of
 from servo import TRUTH
 from test_reduced import SCALES, T, table_1
@@ -110,6 +111,17 @@ def test_wider_forms_begin_near_the_plain_one(pushed):
     assert push[0] * push[4] == pytest.approx(100.0 * 0.3) and np.isinf(push[2])
     assert BY_NAME["load_disturbance"].grown("load_disturbance", push, scales)[0] == pytest.approx(plain["load_disturbance"])
     assert not any(BY_NAME[name].grown(name, some[0], scales) for name, some in wide.items() if name != "load_disturbance")
+
+
+def test_a_gust_keeps_its_phases_in_a_wider_form(pushed):
+    """They differ between recordings: with one phase for all, what a swell adds would be lost in what they lose."""
+    model, gust = pushed.fit.model, BY_NAME["periodic_gust"]
+    model = model.with_effect("periodic_gust", gust.starts(model.scales)[0])
+    model.local["periodic_gust"][:, 0] = phases = np.arange(len(model.local["periodic_gust"])) + 0.3
+    forms = [model.with_form("periodic_gust", p) for p in gust.grown("periodic_gust", dict(model.effects)["periodic_gust"], model.scales)]
+    assert len(forms) > 2 and all(np.array_equal(form.local["periodic_gust"][:, 0], phases) and form.names == model.names for form in forms)
+    begun = [begin.model for name, begin in wider({"periodic_gust": replace(pushed.fit, model=model)}, ()) if name == "periodic_gust"]
+    assert len(begun) == len(forms) and all(np.array_equal(some.local["periodic_gust"][:, 0], phases) for some in begun)
 
 
 def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):

@@ -46,7 +46,7 @@ def test_a_play_less_wide_than_its_contact_gives_way_is_a_shaft(pushed):
 
 def test_a_faint_law_beside_an_effect_must_stand_alone():
     """A friction of 1 % of the drive's torque beside a drag that leaves twenty times as much, and what no law of the servo offers more than another."""
-    start = started(recorded([("quadratic_drag", np.array([1.0, np.inf])), ("load_dependent_friction", np.array([0.01]))]))
+    start = started(recorded([("quadratic_drag", np.array([1.0, np.inf])), ("load_dependent_friction", np.array([0.01, np.inf]))]))
     found = selection.select(start.fit, start.traces, jobs=1)
     assert found.chosen.model.names == ("quadratic_drag", "load_dependent_friction")
     assert selection.FAINT_GAIN < found.rounds[1][0].gain < selection.LATER_GAIN

@@ -70,7 +70,7 @@ def test_a_shaft_beside_a_bristle_equals_an_independent_scheme(name, x_s_deg, de
 
 
 @pytest.mark.parametrize("label, strength, shape, ours", [
-    ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08]),
+    ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08, np.inf]),
     ("cogging", 0.04, {"cycles_per_motor_rev": 4, "phase": 0.7}, [-0.04 / 0.0031, 2.0 * np.pi / (4 * 22.26), 0.7, np.inf, np.inf])], ids=["friction", "cogging"])
 @pytest.mark.parametrize("name", ["multisine", "steps"])
 def test_a_law_acts_on_its_own_body_beside_a_shaft(name, label, strength, shape, ours):

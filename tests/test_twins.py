@@ -81,7 +81,8 @@ def plain_form(name, p):
 
 @pytest.mark.parametrize(("name", "p"), [("presliding", [0.005, 0.1, np.inf, 1.5]), ("presliding", [0.005, 0.1, np.inf, 2.0]), ("presliding", [0.02, 0.1, np.inf, 0.7]),
                                          ("current_limit", [80.0, 0.3]), ("inductance", [0.008, 60.0]), ("hinge_moment_cubic", [300.0, 0.2]), ("quadratic_drag", [1.0, 2.6]),
-                                         ("asymmetric_friction", [30.0, 0.0, 0.2, 0.5]), ("stribeck", [80.0, 0.6, 2.0, 0.5]), ("load_disturbance", [250.0, 0.6, 0.5, 0.0, 0.1])])
+                                         ("asymmetric_friction", [30.0, 0.0, 0.2, 0.5]), ("stribeck", [80.0, 0.6, 2.0, 0.5]), ("load_disturbance", [250.0, 0.6, 0.5, 0.0, 0.1]), ("load_dependent_friction", [0.3, 60.0]),
+                                         ("periodic_gust", [40.0, 1.3, 0.4, 0.3, 0.5, 0.4, 1.0])])
 def test_another_form_agrees(name, p):
     """What the last number, absent in the plain form, makes of an effect, is in the twin as well: a bristle's exponent, what flows beyond a limit."""
     u = INPUTS["multisine"](T)

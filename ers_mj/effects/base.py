@@ -156,7 +156,7 @@ class Effect:
 
     ``torque(p, theta, w, j, t)``, ``friction(p, level, theta, w, j, direction)`` and ``inertia(p, theta)``, which gives the inertia over that of
     the plain plant and half its slope by theta, are compiled laws (or None); an inertia acts beside a torque or a friction, of one body.
-    ``memory(p, theta, w, j, h)`` is what the last of five constants becomes within a sample of length h, and begins at 0;
+    ``memory(p, theta, w, j, h)`` is what the fifth constant becomes within a sample of length h, and begins at 0;
     ``coefficients``, ``command`` and ``measure`` act outside the integrator. All are the identity unless overridden.
     ``mjcf`` says in a sentence how a MuJoCo model shows the effect; ``edit_spec`` does it. What acts through
     ``coefficients`` needs no more: the model is written from them. A law without a twin is applied step by step.
@@ -235,7 +235,7 @@ class Effect:
         return c
 
     def constants(self, p: np.ndarray, c: Coefficients) -> np.ndarray:
-        """What the compiled law receives as its ``p`` (at most 5 numbers)."""
+        """What the compiled law receives as its ``p`` (at most 7 numbers)."""
         return p
 
     def is_lawful(self, p: np.ndarray) -> bool:

@@ -10,8 +10,8 @@ from numba import njit
 from ers_mj.effects import EFFECTS
 from ers_mj.plants.compiled import inlined
 
-MEMORY = 4  # the last constant of a law, which may be a memory
-N_PARAMETERS = max(MEMORY + 1, max(len(effect.parameters) for effect in EFFECTS))
+MEMORY = 4  # the constant of a law that may be a memory
+N_PARAMETERS = 7  # constants of a law at most
 
 
 def _chain_torque(laws):
@@ -97,12 +97,17 @@ _inertia_of = _chain_inertia([(row, e.inertia) for row, e in enumerate(EFFECTS) 
 
 
 @inlined
+def _constants(p, k):
+    return p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4], p[k, 5], p[k, 6]
+
+
+@inlined
 def _torques(on, row, p, theta, w, j, t):
     """Sum of the torques of the effects that a row names."""
     a = 0.0
     for i in range(on[row, 0]):
         k = on[row, i + 1]
-        a += _torque_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta, w, j, t)
+        a += _torque_of(k, _constants(p, k), theta, w, j, t)
     return a
 
 
@@ -129,7 +134,7 @@ def friction_level(on, p, level, theta, w, j, direction):
     """The friction level after every effect that is on."""
     for i in range(on[1, 0]):
         k = on[1, i + 1]
-        level = _friction_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), level, theta, w, j, direction)
+        level = _friction_of(k, _constants(p, k), level, theta, w, j, direction)
     return level
 
 
@@ -138,20 +143,20 @@ def moved(on, p, theta, w, a):
     """The acceleration that is left of ``a``, per total inertia, where effects change the inertia along the travel."""
     for i in range(on[2, 0]):
         k = on[2, i + 1]
-        inertia, half_slope = _inertia_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), theta)
+        inertia, half_slope = _inertia_of(k, _constants(p, k), theta)
         a = (a - half_slope * w * w) / inertia
     return a
 
 
 @inlined
 def remember(on, p, x, h):
-    """Bring the memories of effects, their last constants, on by a sample of length h from the state x = (theta, w, j, theta_m, w_m, ...)."""
+    """Bring the memories of effects, their fifth constants, on by a sample of length h from the state x = (theta, w, j, theta_m, w_m, ...)."""
     for i in range(on[3, 0]):
         k = on[3, i + 1]
-        p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), x[0], x[1], x[2], h)
+        p[k, MEMORY] = _memory_of(k, _constants(p, k), x[0], x[1], x[2], h)
     for i in range(on[5, 0]):
         k = on[5, i + 1]
-        p[k, MEMORY] = _memory_of(k, (p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4]), x[3], x[4], x[2], h)
+        p[k, MEMORY] = _memory_of(k, _constants(p, k), x[3], x[4], x[2], h)
 
 
 @lru_cache
