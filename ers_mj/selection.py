@@ -30,7 +30,7 @@ AMPLE, LOST_OF_AMPLE = 2.0, 0.3  # times the gain that matters from which it may
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH), one that takes a GOOD_PART aside
 MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGEST = 60_000_000, 50_000_000, 140_000_000, 220_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
-# for that does not show by itself, a round beside a bristle is left at its first refits, none is begun, and none where one body leaves more than forks do; more by as much as the
+# for that does not show by itself, a round beside a bristle is left at its first refits, none is begun, and none where effects without a bristle leave more than forks do; more by as much as the
 # recordings last longer than a MINUTE together
 MINUTE = 60.0  # [s]
 GOOD_PART = 0.35  # share of C that a third effect must take away where the model stays wrong, if the second did not
@@ -55,7 +55,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle, is left out after MOST_EFFORT, and no round
-    begins after LAST_BEGUN; where effects of one body leave more than forks of stick and slip do, one for what takes a good part of that may until LONGEST. One beside a
+    begins after LAST_BEGUN; where effects without a bristle leave more than forks of stick and slip do, one for what takes a good part of that may until LONGEST. One beside a
     bristle that is under way at LAST_RACED goes little further than its first refits.
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
