@@ -90,16 +90,18 @@ def test_where_forks_do_not_account_for_what_is_left_thresholds_are_tried_as_the
     assert not {*tried} & {"end_stop", "bias_torque", "supply_sag"}
 
 
-@pytest.mark.parametrize("doubtful", [True, False])
-def test_what_forks_do_not_account_for_is_looked_at_longer(pushed, monkeypatch, doubtful):
+@pytest.mark.parametrize("much, dear, longer", [(True, False, True), (False, False, False), (True, True, False)])
+def test_what_forks_do_not_account_for_is_looked_at_longer(pushed, monkeypatch, much, dear, longer):
+    """Beside a bristle alone, where a round may take minutes, it is not."""
     tried = []
     monkeypatch.setattr(selection, "LAST_BEGUN", 0)
     monkeypatch.setattr(selection, "candidates", lambda *_: tried.append(True) or [])
     monkeypatch.setattr(selection, "_is_cheap_and_wrong", lambda *_: False)
-    monkeypatch.setattr(reviews, "is_doubtful", lambda *_: doubtful)
+    monkeypatch.setattr(reviews, "leaves_more_than_forks", lambda *_: much)
+    monkeypatch.setattr(selection, "is_dear", lambda _: dear)
     monkeypatch.setattr(reviews, "swept", lambda *_: [])
     selection.select(pushed.fit, pushed.traces)
-    assert bool(tried) is doubtful
+    assert bool(tried) is longer
 
 
 def test_what_bends_and_twists_takes_longest(pushed):
