@@ -21,7 +21,7 @@ class AsymmetricFriction(Friction):
     parameters = (
         Parameter("dF", "torque", "half the difference of Coulomb friction, up minus down", positive=False),
         Parameter("dB", "damping", "half the difference of viscous friction, up minus down", positive=False),
-        Parameter("rest", "ratio", "share of dF where motion begins", positive=False, lower=-2.0, upper=5.0, absent=np.inf),
+        Parameter("rest", "ratio", "share of dF where motion begins", positive=False, lower=0.0, upper=1.0, absent=np.inf),
         Parameter("v_a", "speed", "speed at which it has become dF", absent=np.inf),
     )
     sized, needs, together = 2, (("dF", "dB"),), (("rest", "v_a"),)
