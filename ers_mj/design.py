@@ -99,8 +99,7 @@ class Bench:
     def trace(self, excitation: Mapping, duration: float, rate: float) -> Trace:
         """An empty recording of an excitation."""
         t, u = signal({**excitation, "duration_s": duration, "rate_hz": min(rate, excitation["rate_hz"])})
-        empty = make_trace("next", t, u, np.zeros(t.size), np.ones(t.size, bool), None, None, self.sigma, 0.0)
-        return replace(empty, start=(excitation["start"], 0.0))
+        return make_trace("next", t, u, np.zeros(t.size), np.ones(t.size, bool), None, None, self.sigma, 0.0, (excitation["start"], 0.0))
 
     def filled(self, model: Model, trace: Trace) -> Trace | None:
         """The recording as the model would make it, without noise; None where the motion leaves the limits."""

@@ -19,7 +19,7 @@ from ers_mj.model import OBSERVER_RATE, STATES, Model
 from ers_mj.plants.reduced import EFFORT
 from ers_mj.ranking import (CLOCKED, FORKED, NEAR_TIE, QUIET, RIVAL, TIE, Candidate, bends_and_twists, is_clocked, is_dear, is_quiet, judged, likeliest_first,
                             rivals_of, shows)
-from ers_mj.restarts import anew, more_starts, other_forms, other_waves, wider
+from ers_mj.restarts import anew, form_of, more_starts, other_forms, other_waves, wider
 from ers_mj.screening import PEAK, Begin, attainable, screen
 from ers_mj.traces import Blocks, Trace
 
@@ -40,6 +40,7 @@ EXPLAINED = 0.25  # share of C that a leader which explains everything leaves at
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 HALF_STEP = 0.5  # of a coarse converter's, by which an effect moves the reading at least
 STEP_GAIN = 30.0  # of C, from which it is told even if that is less: many thresholds together tell what is much smaller than a step
+GLANCE, BEHIND = 5, 0.4  # steps of a first look at further forms of what leads, and the share of what the effect has won by which one may be behind to be fitted to the end
 QUICK = 8  # steps of a first refit, on a borrowed Jacobian
 
 
@@ -239,7 +240,7 @@ class _Race:
             if self.priced(found) < self.priced(ends[name]):
                 ends[name] = found
         best = dict(rough)
-        for name, found in self.finished([*broader, *other_waves(ends, self.exclude)]):
+        for name, found in self._finished_if_near([*broader, *other_waves(ends, self.exclude)], {**best, **ends}):
             kept = ends.get(name, best.get(name))
             if kept is None or self.priced(found) < self.priced(kept) - (max(TIE, NEAR_TIE * self.won(kept)) if BY_NAME[name].dear else 0.0):
                 ends[name] = found
@@ -249,6 +250,16 @@ class _Race:
             lead, second = ranked[0].fit, ranked[1].fit
             ranked[:rivals] = self.pool.map(lambda c: judged(c.name, converged(c.fit, second if c.fit is lead else lead, self.traces, self.tau), self.base, self.tau), ranked[:rivals])
         return ranked
+
+    def _finished_if_near(self, begun: Sequence[tuple[str, Begin]], kept: Mapping[str, Fit]) -> list[tuple[str, Fit]]:
+        """Of the starts of each form of an effect the one that a few steps bring furthest, fitted to the end if it is not far BEHIND what the effect, or else the leader, has won."""
+        best: dict[tuple, tuple[str, Fit]] = {}
+        for name, found in self.fitted(begun, GLANCE, renewals=GLANCE):
+            form = name, form_of(found.model, name)
+            best[form] = min(best.get(form, (name, found)), (name, found), key=lambda item: self.total(item[1]))
+        most, won = self.most_won(kept), {name: self.won(found) for name, found in kept.items()}
+        return self.finished([(name, found) for name, found in best.values()
+                              if self.won(found) >= won.get(name, most) - max(BEHIND * won.get(name, most), LEAST_GAIN)])
 
     def _judged(self, ends: Iterable[tuple[str, Fit]]) -> list[Candidate]:
         return [judged(name, found, self.base, self.tau) for name, found in ends]

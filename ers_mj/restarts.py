@@ -47,15 +47,16 @@ def other_forms(finished: Mapping[str, Fit], starts: Mapping[str, Sequence[Begin
     """The best start of each other form (which of its numbers are absent) of the finished effects: after a few steps forms are no more alike than effects."""
     out = []
     for name in (n for n in finished if n in BY_NAME):
-        known = [_form(finished[name].model, name)]
+        known = [form_of(finished[name].model, name)]
         for begin in starts.get(name, ()):
-            if (form := _form(begin.model, name)) not in known:
+            if (form := form_of(begin.model, name)) not in known:
                 known.append(form)
                 out.append((name, begin))
     return out
 
 
-def _form(model: Model, name: str) -> tuple[bool, ...]:
+def form_of(model: Model, name: str) -> tuple[bool, ...]:
+    """Which numbers of an effect are there."""
     return tuple(np.isfinite(dict(model.effects)[name]).tolist())
 
 

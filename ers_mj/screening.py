@@ -17,7 +17,7 @@ from ers_mj.traces import BLOCK, Blocks, Trace
 MOST_SENT, MOST_BENT, LATER = 10, 14, 8  # candidates of the screening that are refitted at most, in the first round, there if bent, and beside an effect
 PROMISING, PROMISING_DEAR = 0.25, 0.6  # share of the best one's promise from which a candidate is refitted
 LESS = 0.1  # share of the best one's promise from which an effect is screened from further places where the first is bent
-UNLIKELY = 0.05  # share of the promise from which a law is refitted, below which what it promises to first order is not followed up
+UNLIKELY = 0.1  # share of the promise from which an effect is refitted, below which what it promises to first order is not followed up
 LEAST_PROMISE = 0.6  # of the gain that matters, that the secant of a candidate must promise where a model is quiet
 LEAST_SIZE, MOST_SIZE = 0.002, 3.0  # of a start's visible size, to which the screening may scale it
 HOTTEST, KNOCKS, NEARER = 3, (0.08, 0.25), 60  # blocks in which a knock is looked for, the lengths [s] from which its fit is begun, and simulations of it
@@ -27,7 +27,9 @@ USUAL = 0.95  # share of the blocks that are no worse than a bad one
 HALF_NORMAL = 0.4  # mean of what a normal number is above its median, in its standard deviations
 OUTWEIGHED = 5.0  # how far the mean misfit of blocks may lie above their geometric mean before one of them hides what a knock does to the others
 LEAD, TAIL = 0.1, 2.0  # [s] before a knock begins and after, in which it is tried
+SPARSE = 2e-3  # [s] between the samples that tell a wave's share to first order
 RUNAWAY = 1e12  # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
+ANOTHER = 1.5  # times the size at which a secant was taken, or that part of it, from which what it asks for is another size
 IDLE, HALVINGS = 0.1, 6  # of C that a push which moves little changes; of the way from it to the next that throws the rudder
 
 
@@ -70,7 +72,7 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
     the first place, or from all of them where it is far from the noise, ``bent`` by what is missing (from the further ones of those with LESS of the best one's
     promise so far): MOST_SENT (MOST_BENT) at most, those with PROMISING of the best one's promise, and where it is ``quiet`` those whose share of what is left is
     worth LEAST_PROMISE of the ``least`` gain that matters. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.)
-    A law that to first order promises UNLIKELY of that, or of what follows from the second best promise, is not simulated; beside a
+    What to first order promises UNLIKELY of that, or of what follows from the second best promise, is not simulated; beside a
     bristle, where tangents may run away, what they tell only chooses among starts.
 
     A knock is looked for from the first place only, what is dear to simulate is refitted from its most promising one, and each effect from as many
@@ -86,22 +88,23 @@ def screen(places: Sequence[Model], traces: Sequence[Trace], tau: float, exclude
         (known, targets), scales = _targets(place, e, traces, tau), replace(place.scales, hot=_hot(e, traces, tau))
         if quiet and not floor:
             floor = 2.0 * LEAST_PROMISE * least / float(targets[0][2] @ targets[0][2])
+        whole, sparse = (run, targets, traces), _sparse(run, targets, traces)
         starts = {name: BY_NAME[name].starts(scales) for name in names if place is places[0] or not BY_NAME[name].once}
-        shares = {name: _first_order(run, BY_NAME[name], some, targets, traces) for name, some in starts.items()}
-        for name in sorted(starts, key=lambda name: -max(shares[name], default=math.inf)):
+        first = {name: _first_order(*(sparse if BY_NAME[name].wave else whole), BY_NAME[name], some) for name, some in starts.items()}
+        shares = {name: max((share for share, _ in told), default=math.inf) for name, told in first.items()}
+        for name in sorted(starts, key=lambda name: -shares[name]):
             effect, most_tried = BY_NAME[name], max(BY_NAME[name].tries, tries)
             second = sorted((0.0, 0.0, *(promise for other, promise in promises.items() if not BY_NAME[other].once)))[-2]  # the best one's may be a fork
-            if (share := max(shares[name], default=math.inf)) < UNLIKELY * max(floor, PROMISING * second) and not place.plant().bends:
-                promises.setdefault(name, share)
+            if shares[name] < UNLIKELY * max(floor, PROMISING * second) and not place.plant().bends:
+                promises.setdefault(name, shares[name])
                 continue
             if effect.once:
                 found = _knocks(run, effect, starts[name], targets[0][2], traces, tau)
             else:
-                hopeful = _hopeful(starts[name], shares[name], most_tried)
-                found = [p for start in hopeful if (p := _promise(place, effect, start, e, targets, traces))]
+                found = [p for start, size in _hopeful(effect, starts[name], first[name], most_tried) if (p := _promise(place, effect, start, size, e, targets, traces))]
             if found:
                 found.sort(key=lambda p: -p[0])
-                begun = [Begin(model, known) for _, model in _of_each_form(found)[:most_tried]]
+                begun = [Begin(model, known) for _, model in _of_each_form(found, lambda p: p[1].effects[-1][1])[:most_tried]]
                 if not effect.dear:
                     begins.setdefault(name, []).append(begun)
                 elif found[0][0] > promises.get(name, 0.0):
@@ -126,21 +129,40 @@ def attainable(misfit: np.ndarray, counts: np.ndarray, tau: float) -> float:
     return left - HALF_NORMAL * level / (tau + level) * float(np.sum(np.sqrt(2.0 / counts)))
 
 
-def _of_each_form(found: list[tuple[float, Model]]) -> list[tuple[float, Model]]:
-    """The starts, the best first of each form (which of its parameters are absent), then the others."""
-    forms = [tuple(np.isfinite(model.effects[-1][1])) for _, model in found]
+def _of_each_form(found: Sequence, start_of: Callable[..., np.ndarray]) -> list:
+    """What belongs to starts, the best first, with the best of each form (which of its parameters are absent) before the others."""
+    forms = [tuple(np.isfinite(start_of(item))) for item in found]
     return [p for k, p in enumerate(found) if forms[k] not in forms[:k]] + [p for k, p in enumerate(found) if forms[k] in forms[:k]]
 
 
-def _first_order(run: Run, effect: Effect, starts: Sequence[np.ndarray], targets, traces: Sequence[Trace]) -> np.ndarray:
-    """Shares (S,) that the starts of a law promise to first order along a place's own motion; none (0,) where that tells too little.
+def _sparse(run: Run, targets, traces: Sequence[Trace]) -> tuple[Run, list, list[Trace]]:
+    """The run, what is to be explained and the traces with samples SPARSE apart, where they are uniform: enough to choose by among many waves. (Of a friction that
+    follows the current the first order tells nothing at such samples.)
+    """
+    strides = [max(1, int(SPARSE / trace.sample_time + 0.01)) if trace.is_uniform else 1 for trace in traces]
+    if max(strides) == 1:
+        return run, targets, traces
+    begins = np.cumsum([0, *(trace.rows for trace in traces)])
+    rows, shares = [], []
+    for begin, stride, trace in zip(begins, strides, traces):
+        some = np.arange(begin, begin + trace.rows).reshape(-1, trace.t.size)[:, ::stride].ravel()
+        rows.append(some)
+        shares.append(np.full(some.size, math.sqrt(stride)))
+    rows, shares = np.concatenate(rows), np.concatenate(shares)
+    fewer = [(root[rows] * shares, np.linalg.qr(basis[rows] * shares[:, None])[0], residual[rows] * shares) for root, basis, residual in targets]
+    motions = tuple(np.ascontiguousarray(motion[::stride]) for motion, stride in zip(run.motions, strides))
+    return Run(run.model, run.left[rows], motions), fewer, [trace.sparse(stride) for trace, stride in zip(traces, strides)]
+
+
+def _first_order(run: Run, targets, traces: Sequence[Trace], effect: Effect, starts: Sequence[np.ndarray]) -> list[tuple[float, float]]:
+    """The share that each start of an effect promises to first order along a place's own motion, and the multiple of it that does; nothing where that tells too little.
 
     The tangents of one body are near enough to choose by, whatever stops, delays, sensors and a motor that a shaft or a play parts from the rudder make of
-    them; along a rudder that bends a bristle, where they may run away, only laws with many starts are asked.
+    them; along a rudder that bends a bristle, where they may run away, only laws with many starts are asked, and no size told.
     """
-    many = len(starts) > effect.tries + 1
-    if not starts or not (effect.torque or effect.friction) or effect.once or run.model.plant().bends and not many:
-        return np.empty(0)
+    bends = run.model.plant().bends
+    if not starts or effect.once or not effect.tangible or bends and not _is_chosen(effect, starts):
+        return []
     place, motions = _of_one_body(run.model), run.motions
     if effect.at_motor and place is not run.model:
         motions = [np.ascontiguousarray(motion[:, [3, 1, 2, 3]]) for motion in motions]  # along the motor's angle, of which its law is
@@ -149,14 +171,32 @@ def _first_order(run: Run, effect: Effect, starts: Sequence[np.ndarray], targets
     changes = -place.changes(traces, OBSERVER_RATE, [place.with_effect(effect.name, s) for s in every], 1.0, motions).T
     changes[~(np.max(np.abs(changes), axis=1) < RUNAWAY)] = 0.0
     ends = _ends(effect, traces)
-    return np.max([_shares(changes, waves, ends, target, effect.signed)[0] for target in targets], axis=0)
+    told = [_shares(changes, waves, ends, target, effect.signed) for target in targets]
+    return [max((float(shares[k]), 1.0 if bends else _size(multiples[k])) for shares, multiples in told) for k in range(len(starts))]
 
 
-def _hopeful(starts: Sequence[np.ndarray], shares: np.ndarray, tries: int) -> Sequence[np.ndarray]:
-    """Of many starts those that promise most to first order."""
-    if len(starts) <= tries + 1 or not shares.size:
-        return starts
-    return [starts[i] for i in sorted(np.argsort(shares)[::-1][:tries])]
+def _is_chosen(effect: Effect, starts: Sequence[np.ndarray], tries: int | None = None) -> bool:
+    """Whether an effect has more starts than are tried, of which the first order tells the best: those of a law."""
+    return len(starts) > (effect.tries if tries is None else tries) + 1 and bool(effect.torque or effect.friction)
+
+
+def _hopeful(effect: Effect, starts: Sequence[np.ndarray], told: Sequence[tuple[float, float]], tries: int) -> list[tuple[np.ndarray, float]]:
+    """The starts, of many those that promise most to first order, and the multiples of them that do; 1 where the first order was not asked or has none."""
+    sizes = [size if np.isfinite(size) and size else 1.0 for _, size in told] or [1.0] * len(starts)
+    chosen = range(len(starts))
+    if _is_chosen(effect, starts, tries) and told:
+        chosen = sorted(_of_each_form(sorted(chosen, key=lambda i: -told[i][0]), lambda i: starts[i])[:tries])
+    return [(starts[i], sizes[i]) for i in chosen]
+
+
+def _size(multiples: np.ndarray) -> float:
+    """How many times a start a mixture (G, waves) of it is: of a wave the root of its mean square over the spans, else signed."""
+    return float(multiples[0, 0]) if multiples.shape[1] == 1 else math.sqrt(float(np.mean(np.sum(multiples**2, axis=1))))
+
+
+def _tried(size: float) -> float:
+    """A size as far as the screening goes."""
+    return math.copysign(min(max(abs(size), LEAST_SIZE), MOST_SIZE), size)
 
 
 def _of_one_body(model: Model) -> Model:
@@ -295,51 +335,60 @@ def _nearer(gain: Callable[[np.ndarray], float], effect: Effect, start: np.ndarr
     return whole(found.x)
 
 
-def _promise(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
+def _promise(place, effect, start, size, e, targets, traces) -> tuple[float, Model] | None:
     """Share of the residual that the start's secant explains, and the model with the start as large as the secant asks for.
 
     A secant across a large step bends, or is all stick and slip that fork; where the effect is proportional to its leading parameters it is taken
-    again at the size that it asks for, and what that one asks for is where a refit begins.
+    at the ``size`` that the first order tells, again at the size that it asks for if that is ANOTHER, and what that one asks for is where a refit begins.
     """
     if effect.wave and np.isfinite(start[effect.wave[1]]):
-        return _promise_of_wave(place, effect, start, e, targets, traces)
-    best, ends, whole, size = None, _ends(effect, traces), start, 1.0
+        return _promise_of_wave(place, effect, start, size, e, targets, traces)
+    best, ends, size = None, _ends(effect, traces), _tried(size) if effect.sized else 1.0
     for _ in range(2 if effect.sized else 1):
-        secant = residuals(place.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
+        secant = residuals(place.with_effect(effect.name, _scaled(effect, start, size)), traces, OBSERVER_RATE) - e
         if not np.all(np.isfinite(secant)):
             break
-        share, factor = max((float(part[0]), float(size[0, 0, 0])) for part, size in
+        share, factor = max((float(part[0]), float(multiples[0, 0, 0])) for part, multiples in
                             (_shares(secant[None], 1, ends, target, effect.signed) for target in targets))
-        size = math.copysign(min(max(abs(size * factor), LEAST_SIZE), MOST_SIZE), size * factor)
-        start = np.append(size * whole[:effect.sized], whole[effect.sized:])
+        size = _tried(size * factor)
         if best is None or share > best[0]:
-            best = share, place.with_effect(effect.name, start)
+            best = share, place.with_effect(effect.name, _scaled(effect, start, size))
+        if 1.0 / ANOTHER < factor < ANOTHER:
+            break
     return best
 
 
-def _promise_of_wave(place, effect, start, e, targets, traces) -> tuple[float, Model] | None:
+def _scaled(effect: Effect, start: np.ndarray, size: float) -> np.ndarray:
+    """The start as many times as large."""
+    return np.append(size * start[:effect.sized], start[effect.sized:])
+
+
+def _promise_of_wave(place, effect, start, size, e, targets, traces) -> tuple[float, Model] | None:
     """As _promise, from the start and its quarter period: their best mixture tells amplitude and phase, in each recording its own if local.
 
     Of a wave that is 20 times too large, as a small cog's start may be, the rudder sticks and slips elsewhere, and its secants tell no more than the size to try;
     what a sensor adds to its reading moves nothing.
     """
     amplitudes, phase = list(effect.wave[0]), effect.wave[1]
-    best, ends, whole, size = None, _ends(effect, traces), start, 1.0
+    best, ends, begun, size = None, _ends(effect, traces), start.copy(), _tried(size)
     for _ in range(1 if effect.subsystem == "sensor" else 2):
-        secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (start, _quarter(effect, start))]
+        begun[amplitudes] = size * start[amplitudes]
+        secants = [residuals(place.with_effect(effect.name, s), traces, OBSERVER_RATE) - e for s in (begun, _quarter(effect, begun))]
         if not np.all(np.isfinite(secants)):
             break
         (share,), (mixture,) = max((_shares(np.array(secants), 2, ends, target, True) for target in targets), key=lambda found: found[0][0])
-        sizes, turns = np.hypot(*mixture.T), np.arctan2(mixture[:, 1], mixture[:, 0])
-        size = min(max(size * math.sqrt(float(np.mean(sizes**2))), LEAST_SIZE), MOST_SIZE)
-        found, start = start.copy(), whole.copy()
-        found[amplitudes] = start[amplitudes] = size * whole[amplitudes]
-        found[phase] += turns[0]
+        turns, factor = np.arctan2(mixture[:, 1], mixture[:, 0]), _size(mixture)
+        size = _tried(size * factor)
         if best is None or share > best[0]:
+            found = begun.copy()
+            found[amplitudes] = size * start[amplitudes]
+            found[phase] += turns[0]
             model = place.with_effect(effect.name, found)
             if effect.local:
-                model.local[effect.name][:, effect.local_columns.index(phase)] = whole[phase] + turns
+                model.local[effect.name][:, effect.local_columns.index(phase)] = start[phase] + turns
             best = float(share), model
+        if 1.0 / ANOTHER < factor < ANOTHER:
+            break
     return best
 
 

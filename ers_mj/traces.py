@@ -82,6 +82,18 @@ class Trace:
         return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels), supply=pick(self.supply),
                        converter=self.converter)
 
+    def sparse(self, stride: int) -> Trace:
+        """Every so many samples of a uniform trace, under the mean of what was put in between."""
+        if stride <= 1:
+            return self
+        some, begins = slice(None, None, stride), np.arange(0, self.t.size, stride)
+        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])  # noqa: E731
+        mean = np.add.reduceat(self.u, begins) / np.diff(np.append(begins, self.t.size))
+        block = self.block[some]
+        return replace(self, t=pick(self.t), u=mean, y=pick(self.y), valid=pick(self.valid), enable=pick(self.enable), load=pick(self.load), block=block,
+                       counts=np.bincount(block[self.valid[some]], minlength=block[-1] + 1).astype(float), supply=pick(self.supply),
+                       channels=tuple(replace(c, values=pick(c.values)) for c in self.channels))
+
     def without(self, spans: Sequence[slice]) -> Trace:
         """The trace with further spans lost."""
         if not spans:
@@ -89,8 +101,8 @@ class Trace:
         valid = self.valid.copy()
         for span in spans:
             valid[span] = False
-        made = make_trace(self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum)
-        return replace(made, start=self.start, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans))
+        made = make_trace(self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum, self.start)
+        return replace(made, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans))
 
     @cached_property
     def seen(self) -> np.ndarray:
@@ -197,12 +209,12 @@ def _integrates(recording: Recording, omega: np.ndarray) -> bool:
     return bool(miss.size) and float(np.sqrt(np.mean(miss**2))) < 3.0 * noise
 
 
-def make_trace(name, t, u, y, valid, enable, load, sigma, quantum) -> Trace:
-    """A trace with its blocks of BLOCK seconds and its initial state."""
+def make_trace(name, t, u, y, valid, enable, load, sigma, quantum, start: tuple[float, float] | None = None) -> Trace:
+    """A trace with its blocks of BLOCK seconds and its initial state, where that is not known as the samples show it."""
     block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
     counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
-    trace = Trace(name, t, u, np.where(valid, y, np.nan), valid, enable, load, sigma, quantum, (0.0, 0.0), block, counts)
-    return replace(trace, start=_started(trace))
+    trace = Trace(name, t, u, np.where(valid, y, np.nan), valid, enable, load, sigma, quantum, start or (0.0, 0.0), block, counts)
+    return trace if start else replace(trace, start=_started(trace))
 
 
 def _started(trace: Trace) -> tuple[float, float]:

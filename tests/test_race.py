@@ -1,5 +1,6 @@
 """A round: who is refitted, from where, and who leads at its end."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,20 @@ def test_other_laws_wave_with_the_period_that_leads(pushed):
     assert not other_waves({"position_dependent_friction": dent}, ()) and not other_waves({"gain": pushed.fit}, ())
     ripple = replace(pushed.fit, model=model.with_effect("transmission_ripple", np.array([0.05, period, 0.0, np.inf, np.inf, np.inf])))
     assert "cogging" not in {name for name, _ in other_waves({"transmission_ripple": ripple}, ())}
+
+
+def test_further_forms_are_fitted_to_the_end_where_a_few_steps_bring_them_near(pushed):
+    """Of two starts of a form the better one, and none of a law that a few steps leave far behind."""
+    traces = recorded([("bias_torque", np.array([6.0]))])
+    base = fit(pushed.fit.model, traces)
+    with ThreadPoolExecutor(1) as pool:
+        contest = race._Race(base, traces, tau_of(base.misfit), (), LEAST_GAIN, np.inf, pool)
+        begun = [(name, Begin(base.model.with_effect(name, np.array(p)), {})) for name, p in
+                 (("bias_torque", [4.0]), ("bias_torque", [-60.0]), ("sensor_lag", [0.002, np.inf]))]
+        (_, kept), = contest.finished(begun[:1])
+        found = contest._finished_if_near(begun, {"bias_torque": kept})
+    assert contest.won(kept) > 10.0 * LEAST_GAIN
+    assert [name for name, _ in found] == ["bias_torque"] and contest.total(found[0][1]) < contest.total(kept) + 0.1
 
 
 def test_forms_are_compared_at_the_end(pushed):

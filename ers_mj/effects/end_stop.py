@@ -18,7 +18,7 @@ class EndStop(Load):
         Parameter("zeta", "ratio", "damping ratio of the contact", lower=0.02, upper=2.0, absent=0.3),
     )
     needs = (("lower", "upper"),)
-    tries = 3
+    tries, tangible = 3, False
 
     def starts(self, scales):
         inset = 0.01 * (scales.high - scales.low)

@@ -27,7 +27,7 @@ class ShaftCompliance(Transmission):
         Parameter("twist_2", "position", "twist at which it takes twice the torque of a spring that does not harden (infinite: it does not)", absent=np.inf),
     )
     needs = (("f_shaft",),)
-    tries = 3
+    tries, tangible = 3, False
 
     def starts(self, scales):
         highest = 0.2 / scales.sample_time
