@@ -18,12 +18,13 @@ from ers_mj.traces import Trace
 
 MISSED = 100.0  # of C by which a model is worse without an effect that nothing else will stand for
 SWEEP, BY_SCREEN = 12, 12  # steps of a refit in the sweep, and the number of starts from which only a screening can choose
+GLANCE, GO_ON = 4, 2  # of these steps, the first ones, and how many of an effect's starts go on after them
 AT_BOUND = 1  # of an effect's numbers in the sweep, at most
 REVERSED, MOST_REVERSED, FEWER_REVERSED = 0.1, 5, 2  # share of the leader's gain from which a rival is begun with, the leader put in, how many are, and if dear
 MOST_RIVALS = 3  # candidates that may take a leader's place later, tried at most
 PAIRED, FAR, MOST_PAIRS = 0.5, 0.2, 6  # share of what all chosen effects buy, that two rivals must buy one by one to be tried as a pair, and by which the first refit of one
 # that is carried on may be behind; how many are tried
-SIZED = tuple(name for name, effect in BY_NAME.items() if effect.sized)  # in proportion to a number, which a secant shows; what has a threshold it may miss
+SIZED = tuple(name for name, effect in BY_NAME.items() if effect.sized or effect.wave)  # in proportion to a number, which a secant shows; what has a threshold it may miss
 
 
 def any_body(plant: ReducedModel) -> bool:
@@ -44,7 +45,7 @@ def swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: 
     """What a screening missed when it found nothing to add: where stick and slip fork, the secant of the very effect that acts may promise nothing.
 
     Every effect that makes a plant of these ``kinds``, is not dear and has few starts is refitted from these as they are, whatever they make worse on the way,
-    those of one body first, until the EFFORT reaches ``end``; those are returned that gain more than the screening's refit of the same effect. One whose
+    those of one body first and from the best that a GLANCE shows, until the EFFORT reaches ``end``; those are returned that gain more than the screening's refit of the same effect. One whose
     several numbers end at their bounds is none: a shaft of 1000 Hz without a resonance. With ``hops``
     a refit does not rest in the first dent of C. Beside a bristle, where a refit takes long, every other start will do.
     """
@@ -58,8 +59,11 @@ def swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: 
     for name, model in sorted(starts, key=lambda start: of_two_bodies(start[1].plant())):
         begun.setdefault(name, []).append(model)
 
-    def refitted(model):
-        return fit(model, traces, tau=tau, steps=SWEEP)
+    def glanced(model):
+        return fit(model, traces, tau=tau, steps=GLANCE)
+
+    def refitted(found):
+        return fit(found.model, traces, tau=tau, steps=SWEEP - GLANCE)
 
     def carried_on(candidate):
         found = fit(candidate.fit.model, traces, tau=tau, steps=20)
@@ -70,7 +74,8 @@ def swept(base: Fit, ranked: Sequence[Candidate], traces: Sequence[Trace], tau: 
         for name, models in begun.items():
             if EFFORT.spent >= end:
                 break
-            found = max((judged(name, found, base, tau) for found in pool.map(refitted, models)), key=lambda c: c.gain)
+            ahead = sorted(pool.map(glanced, models), key=lambda found: found.cost)[:GO_ON]
+            found = max((judged(name, found, base, tau) for found in pool.map(refitted, ahead)), key=lambda c: c.gain)
             if found.gain > max(known.get(name, 0.0), 0.0):
                 best.append(found)
         ended = list(pool.map(carried_on, best))

@@ -14,7 +14,7 @@ from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residu
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.plants.reduced import EFFORT
 from ers_mj.race import LEAST_GAIN, NEAR_LEAST, candidates
-from ers_mj.ranking import LEAST_Z, TIE, Candidate, bends_and_twists, is_clocked, is_dear, judged, likeliest_first, really, stands_alone
+from ers_mj.ranking import LEAST_Z, TIE, Candidate, bends_and_twists, is_clocked, is_dear, is_quiet, judged, likeliest_first, really, stands_alone
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, attainable, stands_out
 from ers_mj.starts import with_starts
@@ -84,7 +84,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             leader = ranked[0]
         least_z = LATER_Z if current.model.names else LEAST_Z
         outstanding = stands_out(current.misfit, tau)
-        rough = not swept and EFFORT.spent < end and _is_rough_and_wrong(current, traces)
+        rough = not swept and EFFORT.spent < end and _is_rough_and_wrong(current, traces) and not (ranked and is_quiet(ranked[0].fit, tau))
         nothing = not (ranked and _asked_for(ranked[0], least, least_z, outstanding))
         if rough or nothing and EFFORT.spent < end and _is_cheap_and_wrong(current, base, traces):
             kinds = reviews.of_one_body if swept else reviews.any_body  # the second body, which takes most of the time, once a case

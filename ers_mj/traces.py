@@ -287,9 +287,10 @@ class Blocks:
         return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0).astype(float))
 
     def misfit(self, e: np.ndarray) -> np.ndarray:
-        """Mean squared residual (in sigmas) of each block."""
+        """Mean squared residual (in sigmas) of each block; infinite where a run has all but run away."""
         begins, empty = self._begins
-        sums = np.add.reduceat(e * e, begins)
+        with np.errstate(over="ignore"):
+            sums = np.add.reduceat(e * e, begins)
         sums[empty] = 0.0
         return sums / self.counts
 

@@ -71,6 +71,19 @@ def test_the_way_out_of_a_dent_is_no_effects_gain_wherever_it_was_found(pushed, 
     assert not found and chosen.model.names == ("bias_torque",) and chosen.cost == pytest.approx(good.cost, abs=0.1)
 
 
+@pytest.mark.parametrize("all_of_it", [True, False])
+def test_behind_a_coarse_converter_nothing_is_swept_beside_what_explains_all(pushed, monkeypatch, all_of_it):
+    started, found = [], judged("bias_torque", fit(pushed.fit.model.with_effect("bias_torque", np.array([0.06])), pushed.traces), pushed.fit, 1.0)
+    found = replace(found, gain=10.0, z=9.0) if all_of_it else replace(found, gain=10.0, z=9.0, fit=replace(found.fit, misfit=np.full(found.fit.misfit.size, 2.0)))
+    monkeypatch.setattr(selection, "candidates", lambda current, *_: [] if current.model.names else [found])
+    monkeypatch.setattr(selection, "_is_rough_and_wrong", lambda current, _: not current.model.names)
+    monkeypatch.setattr(selection, "_is_cheap_and_wrong", lambda *_: False)
+    monkeypatch.setattr(selection, "_way_back", lambda *_: None)
+    monkeypatch.setattr(reviews, "swept", lambda current, *_: started.append(current.model.names) or [])
+    chosen = selection.select(pushed.fit, pushed.traces).chosen
+    assert chosen.model.names == ("bias_torque",) and (() in started) is not all_of_it
+
+
 def test_a_third_effect_must_take_a_sixth(pushed):
     two = pushed.fit.model.with_effect("quadratic_drag", np.array([1.0, np.inf])).with_effect("bias_torque", np.array([0.06]))
     wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=two)
