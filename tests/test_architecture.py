@@ -8,14 +8,14 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
 ORDER = ["errors", "minimisers", "tables", "symptoms", "recording", "datasheet", "effects", "plants", "proving", "simulation", "converter", "traces",
          "excitation", "replay", "model_file", "rendering", "window", "model", "starts", "identification", "guess", "baseline",
-         "identifying", "isolability", "remainder", "screening", "ranking", "restarts", "race", "reviews", "selection",
+         "identifying", "isolability", "remainder", "knocks", "screening", "ranking", "restarts", "race", "reviews", "selection",
          "intervals", "evaluation", "spectra", "mismatch", "evidence", "design", "advice", "localisation", "confirmation", "mimics", "multibody", "case", "document", "diagnosis",
          "known", "streaming", "tracking", "experiment",
          "validation", "controllers", "references", "closed_loop", "measures", "trial", "robustness", "gains", "claims", "frequency", "display", "validity", "frames",
          "figures", "page", "maps", "report", "validation_report", "proof_figures", "proof_report", "trial_figures", "trial_report", "frequency_figures", "frequency_report",
          "identify_figures", "identify_report", "watch_report",
          "commands", "cli"]
-SILENT = {"minimisers", "identifying", "proving", "advice", "design", "excitation", "isolability", "model", "converter", "starts", "identification", "guess", "baseline", "screening", "ranking", "restarts", "race", "reviews", "selection", "intervals",
+SILENT = {"minimisers", "identifying", "proving", "advice", "design", "excitation", "isolability", "model", "converter", "starts", "identification", "guess", "baseline", "knocks", "screening", "ranking", "restarts", "race", "reviews", "selection", "intervals",
           "evaluation", "localisation", "remainder", "confirmation", "mimics", "multibody", "case", "document", "diagnosis", "validation", "validity", "effects", "plants",
           "replay", "model_file", "rendering", "window", "frames", "controllers", "references", "closed_loop", "measures", "trial", "robustness", "gains", "claims", "spectra",
           "mismatch", "frequency", "known", "streaming", "tracking", "experiment"}

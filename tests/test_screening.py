@@ -10,10 +10,11 @@ from ers_mj.baseline import baseline
 from ers_mj.datasheet import read_datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import residuals, residuals_in, run_of, score
+from ers_mj.knocks import Surroundings, between
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
-from ers_mj.screening import Screened, _between, _first_order, _hopeful, _hot, _promise, _sparse, _Surroundings, _targets, screen, stands_out
+from ers_mj.screening import Screened, _first_order, _hopeful, _hot, _promise, _sparse, _targets, screen, stands_out
 from ers_mj.traces import trace_of
 from servo import T, TRUTH, recorded, started
 
@@ -153,7 +154,7 @@ def test_a_knock_that_fades_is_found_where_it_throws_a_resting_rudder(pushed, si
 def test_a_knock_is_tried_in_its_surroundings(pushed):
     """What begins in the run's own state gains there what it gains in all of the recording; beside a memory all of it is simulated."""
     run, trace = run_of(pushed.fit.model, pushed.traces, 5.0), pushed.traces[1]
-    near = _Surroundings(run, pushed.traces, 1.0)
+    near = Surroundings(run, pushed.traces, 1.0)
     for moment in (0.02, 1.4, 2.95):
         gains = []
         knocked = run.model.with_effect("load_disturbance", np.array([300.0, moment, 0.08, 1.0, np.inf]))
@@ -166,7 +167,7 @@ def test_a_knock_is_tried_in_its_surroundings(pushed):
         assert gains[0] == pytest.approx(gains[1], rel=0.02, abs=0.02) and abs(gains[0]) > 0.5
     assert near.of(1, 2.95)[0].t.size < 0.25 * trace.t.size and near.of(1, 0.02)[0].t.size < trace.t.size
     warm = run.model.with_effect("thermal_drift", BY_NAME["thermal_drift"].starts(run.model.scales)[0])
-    assert _Surroundings(run_of(warm, pushed.traces, 5.0), pushed.traces, 1.0).of(1, 1.4)[0] is trace
+    assert Surroundings(run_of(warm, pushed.traces, 5.0), pushed.traces, 1.0).of(1, 1.4)[0] is trace
 
 
 def test_a_knock_is_sought_on_to_where_it_throws_the_rudder():
@@ -175,9 +176,9 @@ def test_a_knock_is_sought_on_to_where_it_throws_the_rudder():
         return 0.05 if push[0] < 60.0 else 9.0 if push[0] < 70.0 else -14.0
 
     pushes = [(gain([size]), np.array([size, 0.8, 0.1, 0.0])) for size in (3.0, 11.0, 33.0, 110.0)]
-    tried = _between(gain, pushes)
+    tried = between(gain, pushes)
     assert max(won for won, _ in tried) == 9.0 and all(33.0 < push[0] < 110.0 for _, push in tried)
-    assert not _between(gain, pushes[:3]) and not _between(gain, pushes[3:])
+    assert not between(gain, pushes[:3]) and not between(gain, pushes[3:])
 
 
 def test_knocks_are_looked_for_where_a_recording_leaves_enough(pushed):
