@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import fit, jacobian_of, residuals, residuals_in, run_of, score, tau_of
+from ers_mj.identification import columns_of, fit, residuals, residuals_in, score, tau_of
 from ers_mj.model import OBSERVER_RATE, Columns, Model
 from ers_mj.starts import fitted_start
 from ers_mj.intervals import half_widths
@@ -141,7 +141,7 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[M
     the training recordings hardly see, what is held out would otherwise be judged by where the refit began.
     """
     whole = [fold.held_out for fold in parts if fold.training is not None and not fold.halved]
-    slopes = _slopes(model, whole) if whole else {}
+    slopes = columns_of(model, whole, OBSERVER_RATE, by_tangents=False) if whole else {}
 
     def along(begun: Model, fold: Fold, known: Columns) -> Model:
         return fit(begun, fold.training, tau=tau, steps=REFIT_STEPS, known=known, renewals=0, tolerance=REFIT_END).model
@@ -152,19 +152,12 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[M
         begun = model.of_records(fold.known)
         found = along(begun, fold, _beside(slopes, begun, fold, whole)) if slopes else begun
         if np.array_equal(found.vector(begun.layout()), begun.vector(begun.layout())):
-            found = along(begun, fold, _slopes(begun, fold.training))
+            found = along(begun, fold, columns_of(begun, fold.training, OBSERVER_RATE, by_tangents=False))
         mine = {name: rows[[fold.record]] for name, rows in (model.local or {}).items()}
         return settled(replace(found, local=mine or None), fold.held_out, tau)
 
     with ThreadPoolExecutor(jobs) as pool:
         return list(pool.map(one, parts))
-
-
-def _slopes(model: Model, traces: Sequence[Trace]) -> Columns:
-    """The Jacobian's columns of a model along its recordings, by finite differences."""
-    layout = model.layout()
-    run = run_of(model.at(layout, model.vector(layout)), traces, OBSERVER_RATE)
-    return {f.key: column for f, column in zip(layout, jacobian_of(run, traces, OBSERVER_RATE, by_tangents=False).T)}
 
 
 def _beside(slopes: Columns, begun: Model, fold: Fold, traces: Sequence[Trace]) -> Columns:

@@ -324,6 +324,12 @@ def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns |
     return jacobian
 
 
+def columns_of(model: Model, traces: Sequence[Trace], rate: float, by_tangents: bool = True) -> Columns:
+    """The columns of a model's Jacobian, with which fits that begin near by may begin."""
+    run = _begun(model, traces, rate)
+    return {f.key: column for f, column in zip(run.model.layout(), jacobian_of(run, traces, rate, by_tangents=by_tangents).T)}
+
+
 def central_jacobian(model: Model, layout, z: np.ndarray, traces: Sequence[Trace], rate: float) -> np.ndarray:
     """Central differences (N, k) of the residuals: tangents, good to a few per cent each, blur the directions in which their columns cancel."""
     step = step_of(model)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ers_mj.effects import BY_NAME, EQUIVALENT
-from ers_mj.identification import Fit, converged, fit, near_noise, residuals_in, score
+from ers_mj.identification import Fit, columns_of, converged, fit, near_noise, residuals_in, score
 from ers_mj.isolability import PARAMETER_PRICE
 from ers_mj.model import OBSERVER_RATE, STATES, Model
 from ers_mj.plants.reduced import EFFORT
@@ -35,7 +35,8 @@ FAILED = 0.05  # share of the best first refit's gain below which a promise was 
 FOREMOST = 2  # effects of the largest promise: refitted from their other starts whatever the first refit's gain, on Jacobians of their own if bent (beside
 # an effect that is not dear all that promise and are not: there a borrowed Jacobian has been bent by two)
 TAUT = 10.0  # times the observer's rate, at which C has few dents: a refit that begins so finds valleys that others miss
-LET_GO = 10  # of these refits, how many go on at the observer's own rate (on 72 rounds of tuning seeds each that mattered was among the first eight)
+HELD, LET_GO = 20, 10  # of these refits, how many go on with a Jacobian of their own, and how many of those at the observer's own rate (on 72 rounds of
+# tuning seeds each that mattered was among the first eight)
 EXPLAINED = 0.25  # share of C that a leader which explains everything leaves at most
 NEAR_LEAST = 0.5  # share of the gain that matters below which the best first refit is not carried on
 HALF_STEP = 0.5  # of a coarse converter's, by which an effect moves the reading at least
@@ -214,8 +215,11 @@ class _Race:
         if not best or not self._leaves_much(min(best.values(), key=self.total)) or is_dear(self.base) or self.spent():
             return
         begun = more_starts(self.base.model, [name for name in BY_NAME if name not in self.exclude], self.screened.promising(), self.starts)
-        taut = self._mapped(begun, lambda _: {"rate": TAUT * OBSERVER_RATE, "steps": QUICK, "renewals": 2})
-        for name, found in self.fitted(sorted(taut, key=lambda item: item[1].cost)[:LET_GO], 6, renewals=1):
+        rate = TAUT * OBSERVER_RATE
+        known = columns_of(self.base.model, self.traces, rate)
+        glances = self._mapped(begun, lambda _: {"rate": rate, "steps": QUICK, "known": known, "renewals": 0})
+        taut = self._mapped(_cheapest(glances, HELD), lambda _: {"rate": rate, "steps": QUICK, "renewals": 1})
+        for name, found in self.fitted(_cheapest(taut, LET_GO), 6, renewals=1):
             best[name] = min(best.get(name, found), found, key=self.total)
 
     def _leaves_much(self, found: Fit) -> bool:
@@ -272,6 +276,10 @@ class _Race:
 def _leaders(ends: Mapping[Label, Fit], total: Callable[[Fit], float]) -> dict[str, Fit]:
     """The best fit by name of those by (name, place)."""
     return {name: min((found for (other, _), found in ends.items() if other == name), key=total) for name, _ in ends}
+
+
+def _cheapest(found: Sequence[tuple[str, Fit]], most: int) -> list[tuple[str, Fit]]:
+    return sorted(found, key=lambda item: item[1].cost)[:most]
 
 
 def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace]) -> bool:
