@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
+import subprocess
+import sys
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
 import numba
+
+COMPILING = "ERS_MJ_COMPILING"  # in the environment of the process that compiles
+EVERY_MODULE = ("import importlib, pkgutil, ers_mj.plants as plants\n"
+                "for module in pkgutil.iter_modules(plants.__path__):\n    importlib.import_module(f'ers_mj.plants.{module.name}')")
 
 
 def cache_folder() -> Path:
@@ -50,3 +57,18 @@ def compiled_cache():
         yield
     finally:
         numba.config.CACHE_DIR = before
+
+
+def compile_once() -> None:
+    """Have another process compile all of plants/, once for each state of the sources: what a compiler has taken of memory it does not give back.
+
+    Where that fails each module compiles for itself when it is imported.
+    """
+    done, package = cache_folder() / "done", Path(__file__).resolve().parent.parent
+    if COMPILING in os.environ or not sys.executable or done.exists():
+        return
+    logging.getLogger(__name__).warning("ers-mj: compiling the simulator for this machine, once: one to three minutes")
+    path = os.pathsep.join([str(package.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+    compiled = subprocess.run([sys.executable, "-c", EVERY_MODULE], env={**os.environ, COMPILING: "1", "PYTHONPATH": path}, stdout=subprocess.DEVNULL)
+    if compiled.returncode == 0:
+        done.touch()
