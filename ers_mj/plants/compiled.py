@@ -48,23 +48,13 @@ def inlined(function):
     return numba.njit(nogil=True, _nrt=False, forceinline=True)(function)
 
 
-@contextmanager
-def compiled_cache():
-    """Numba keeps what is decorated inside this block in :func:`cache_folder`."""
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_folder())
-    try:
-        yield
-    finally:
-        numba.config.CACHE_DIR = before
-
-
-def compile_once() -> None:
-    """Have another process compile all of plants/, once for each state of the sources: what a compiler has taken of memory it does not give back.
+def _compile_once() -> None:
+    """Have another process compile all of plants/, once for each state and place of the sources: what a compiler has taken of memory it does not give back.
 
     Where that fails each module compiles for itself when it is imported.
     """
-    done, package = cache_folder() / "done", Path(__file__).resolve().parent.parent
+    package = Path(__file__).resolve().parent.parent
+    done = cache_folder() / f"done-{hashlib.sha256(str(package).encode()).hexdigest()[:16]}"
     if COMPILING in os.environ or not sys.executable or done.exists():
         return
     logging.getLogger(__name__).warning("ers-mj: compiling the simulator for this machine, once: one to three minutes")
@@ -72,3 +62,15 @@ def compile_once() -> None:
     compiled = subprocess.run([sys.executable, "-c", EVERY_MODULE], env={**os.environ, COMPILING: "1", "PYTHONPATH": path}, stdout=subprocess.DEVNULL)
     if compiled.returncode == 0:
         done.touch()
+
+
+@contextmanager
+def compiled_cache():
+    """Numba keeps what is decorated inside this block in :func:`cache_folder`, where it has been compiled before."""
+    _compile_once()
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_folder())
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = before
