@@ -12,9 +12,10 @@ from ers_mj import reviews
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import Fit, fit, hopped, is_rough, near_noise, residuals_in, score, tau_of
 from ers_mj.model import OBSERVER_RATE, Model
-from ers_mj.plants.reduced import EFFORT
+from ers_mj.plants.reduced import EFFORT, ReducedModel
 from ers_mj.race import LEAST_GAIN, NEAR_LEAST, candidates
-from ers_mj.ranking import LEAST_Z, TIE, Candidate, bends_and_twists, is_clocked, is_dear, is_quiet, judged, likeliest_first, really, stands_alone
+from ers_mj.ranking import (LEAST_Z, RIVAL, TIE, Candidate, bends_and_twists, is_clocked, is_dear, is_quiet, judged, likeliest_first, priced, really,
+                            stands_alone)
 from ers_mj.remainder import left_by_sensor, more_is_missing
 from ers_mj.screening import PEAK, attainable, stands_out
 from ers_mj.starts import with_starts
@@ -35,6 +36,7 @@ MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGEST = 60_000_000, 50_000_000, 140_000_0
 MINUTE = 60.0  # [s]
 GOOD_PART = 0.35  # share of C that a third effect must take away where the model stays wrong, if the second did not
 OUTWEIGHED = 0.2  # share of a later law's gain below which that of what has its own clock was found in a bent model
+MOST_PARTED = 2  # rivals of a lone effect of two bodies beside which a round is run
 MODEST, DENT, MOST_MENDED = 30.0, 1.0, 2  # gain of C up to which, and how much of it, the model itself may win on its way back; how often (see _most_mended)
 
 
@@ -60,7 +62,7 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
     """
     longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / MINUTE)
     end, raced, last, longest = (EFFORT.spent + longer * effort for effort in (MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGEST))
-    current, rounds, mended, swept, reviewed, paired, took = base, [], 0, False, False, False, 0.0
+    current, rounds, mended, swept, reviewed, paired, parted, took = base, [], 0, False, False, False, False, 0.0
     tau = tau_of(base.misfit)
     while EFFORT.spent < (longest if not is_dear(current) and reviews.leaves_more_than_forks(current, tau) else last):
         if (taken := _taken(current, rounds)) >= MOST_ROUNDS:
@@ -104,6 +106,8 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
             other = None if reviewed or EFFORT.spent >= end or not reviews.is_doubtful(current, tau) else reviews.reviewed(current, rounds, traces, tau, exclude, jobs, end)
             if other is None and not paired:
                 other, paired = reviews.paired(current, rounds, traces, tau, jobs), True
+            if other is None and not parted and EFFORT.spent < last and reviews.leaves_more_than_forks(current, tau):
+                other, parted = _beside_a_rival(current, rounds, traces, tau, exclude, jobs), True
             if other is None:
                 break
             (current, rounds), reviewed = other, True
@@ -126,6 +130,26 @@ def select(base: Fit, traces: Sequence[Trace], *, anchors: Sequence[Mapping[str,
         if near_noise(current):
             current = reviews.exchanged(current, rounds, traces, tau, jobs)
     return Selection(base, current, tuple(rounds), tau, traces)
+
+
+def _beside_a_rival(current: Fit, rounds: Sequence[tuple[Candidate, ...]], traces: Sequence[Trace], tau: float, exclude: Sequence[str],
+                    jobs: int) -> tuple[Fit, list[tuple[Candidate, ...]]] | None:
+    """A rival of one body in the place of a lone play, shaft or bristle beside which nothing is found, with what a round finds beside it, and their rounds, if that is
+    better: a second body does a part of much, and what acts with the rival need not show alone.
+    """
+    if not current.model.plant().coupled or len(current.model.names) != 1 or rounds[0][0].name not in current.model.names:
+        return None
+    leader, *others = rounds[0]
+    rivals = [c for c in others if c.name in BY_NAME and not (is_dear(c.fit) or BY_NAME[c.name].once or c.fit.model.plant().coupled)
+              and c.gain >= RIVAL * leader.gain]
+    ends = [(rival, ranked) for rival in rivals[:MOST_PARTED]
+            if (ranked := candidates(rival.fit, traces, tau, jobs, (*exclude, rival.name, *_coupled(rival.fit.model))))]
+    if not ends:
+        return None
+    rival, ranked = min(ends, key=lambda end: priced(end[1][0].fit))
+    if priced(ranked[0].fit) >= priced(current) - TIE:
+        return None
+    return ranked[0].fit, [(rival, *(c for c in rounds[0] if c is not rival)), tuple(ranked)]
 
 
 def _gains_that_matter(current: Fit, tau: float, in_order: bool) -> tuple[float, float]:
@@ -185,9 +209,18 @@ def _is_rough_and_wrong(current: Fit, traces: Sequence[Trace]) -> bool:
 
 def _bending_and_twisting(model: Model) -> list[str]:
     """The effects that make a plant whose friction bends a bristle and whose shaft twists, which the model's has only one of."""
+    return [name for name, plant in _plants_beside(model) if plant.bends and plant.has_motor_side]
+
+
+def _coupled(model: Model) -> list[str]:
+    """The effects that make a plant of more than one body, which takes long to simulate."""
+    return [name for name, plant in _plants_beside(model) if plant.coupled]
+
+
+def _plants_beside(model: Model) -> list[tuple[str, ReducedModel]]:
+    """The plants that a model's becomes with what may give it more than one body."""
     starts = ((name, effect.starts(model.scales)[:1]) for name, effect in BY_NAME.items() if effect.subsystem == "transmission" or effect.dear)
-    plants = ((name, model.with_effect(name, start).plant()) for name, some in starts if name not in model.names for start in some)
-    return [name for name, plant in plants if plant.bends and plant.has_motor_side]
+    return [(name, model.with_effect(name, start).plant()) for name, some in starts if name not in model.names for start in some]
 
 
 def _knocks_beside(current: Fit, ranked: Sequence[Candidate]) -> bool:

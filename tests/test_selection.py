@@ -9,7 +9,9 @@ from ers_mj import reviews, selection
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import fit, score
 from ers_mj.ranking import Candidate, judged
-from ers_mj.selection import GOOD_PART, _asked, _asked_for, _bending_and_twisting, _gains_that_matter, _in_its_place, _reconsidered, _taken
+from ers_mj.selection import (GOOD_PART, _asked, _asked_for, _bending_and_twisting, _beside_a_rival, _gains_that_matter, _in_its_place, _reconsidered,
+                              _taken)
+from servo import TRUTH, recorded, started
 
 
 def test_a_round_whose_effect_became_needless_is_given_again_once(pushed):
@@ -132,3 +134,21 @@ def test_what_a_refit_turns_into_another_effect_gives_way_to_it(pushed):
         now = pushed.fit.model.with_effect("shaft_compliance", np.array([50.0, 0.7, rho, 0.0, np.inf]))
         other = _in_its_place(replace(pushed.fit, model=now), pushed.fit, (shaft, winding), 1.0)
         assert other is None if first is None else other[0].name == first and len(other) == 2
+
+
+def test_a_lone_shaft_that_leaves_much_gives_way_to_two_effects_of_one_body():
+    """A drive that delays and sleeps: a springy shaft does a part of both."""
+    values = {**TRUTH, "c_2": 85.0}
+    truth = {"drive_dead_zone": np.array([0.95, np.inf]), "input_delay": np.array([0.0157])}
+    start = started(recorded(list(truth.items()), values=values), values)
+
+    def alone(name, p):
+        return judged(name, fit(start.fit.model.with_effect(name, p), start.traces, steps=6), start.fit, 1.0)
+
+    delay = alone("input_delay", truth["input_delay"])
+    shaft = replace(alone("shaft_compliance", BY_NAME["shaft_compliance"].starts(start.fit.model.scales)[0]), gain=delay.gain)
+    others = [name for name in BY_NAME if name not in (*truth, "shaft_compliance", "quadratic_drag")]
+    found, rounds = _beside_a_rival(shaft.fit, [(shaft, delay), ()], start.traces, 1.0, others, 1)
+    assert set(found.model.names) == set(truth) and [ranked[0].name for ranked in rounds] == ["input_delay", "drive_dead_zone"]
+    assert _beside_a_rival(shaft.fit, [(shaft,), ()], start.traces, 1.0, others, 1) is None
+    assert _beside_a_rival(delay.fit, [(delay, shaft), ()], start.traces, 1.0, others, 1) is None
