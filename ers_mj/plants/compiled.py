@@ -59,7 +59,8 @@ def _compile_once() -> None:
         return
     logging.getLogger(__name__).warning("ers-mj: compiling the simulator for this machine, once: one to three minutes")
     path = os.pathsep.join([str(package.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
-    compiled = subprocess.run([sys.executable, "-c", EVERY_MODULE], env={**os.environ, COMPILING: "1", "PYTHONPATH": path}, stdout=subprocess.DEVNULL)
+    compiled = subprocess.run([sys.executable, "-c", EVERY_MODULE], env={**os.environ, COMPILING: "1", "PYTHONPATH": path},
+                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     if compiled.returncode == 0:
         done.touch()
 
