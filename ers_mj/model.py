@@ -126,7 +126,7 @@ class Model:
         most = {"frequency": 1.0 / self.scales.sample_time, "period": 2.0 * self.scales.position / BY_NAME[name].fewest_turns}
         most = most.get(parameter.name if parameter.kind == "position" else parameter.kind, np.inf)
         least = {"position": SMALLEST * self.scales.noise, "frequency": FEWEST_CYCLES / self.scales.duration}.get(parameter.kind, 1e-12)
-        lower = max(parameter.lower, least) if parameter.positive else parameter.lower
+        lower = least if parameter.positive and parameter.lower <= 0.0 else parameter.lower
         ends = self._near_travel() if parameter.on_travel else (lower, min(parameter.upper, most))
         return Free(name, parameter.name, index, parameter.positive, scale, *ends, local=local)
 

@@ -29,6 +29,7 @@ PLAIN = 1.3  # noise levels of what a model leaves of a coarse converter's readi
 LOST = 0.2  # share of the gain that the blocks which lose may lose, where it falls in so few blocks that their z-score cannot be large
 AMPLE, LOST_OF_AMPLE = 2.0, 0.3  # times the gain that matters from which it may be more: of 275 servos without missing physics one offers a lasting law as much, and its z-score asks for that as well
 ONCE = 6.0  # of C that an effect which acts once must buy, or screening.PEAK
+ANYWHERE = 3.0  # of C by which a knock beside an effect must be ahead of a law that is asked for too: it chooses its moment where that law is missed most
 MOST_ROUNDS, FEWER_ROUNDS = 3, 2  # effects at most, and where the model itself stays wrong (see identification.ROUGH), one that takes a GOOD_PART aside
 MOST_EFFORT, LAST_RACED, LAST_BEGUN, LONGEST = 60_000_000, 50_000_000, 140_000_000, 220_000_000  # [us] of simulation (plants.reduced.Effort) after which nothing is looked
 # for that does not show by itself, a round beside a bristle is left at its first refits, none is begun, and none where effects without a bristle leave more than forks do; more by as much as the
@@ -257,14 +258,18 @@ def _way_back(ranked: Sequence[Candidate], current: Fit, traces: Sequence[Trace]
 def _asked(ranked: Sequence[Candidate], current: Fit, gains: tuple[float, float], least_z: float, outstanding: bool) -> Candidate | None:
     """What is named in this round: the first that is asked for at the ``gains`` that matter, and that one alone which leads where nothing is named yet.
 
-    A knock shows that something is missing; where the law that leads explains more of it by a TIE, that is named.
+    A knock shows that something is missing; where the law that leads explains more of it by a TIE, that is named, and beside an effect a law that is asked for
+    as well and explains not much less (ANYWHERE).
     """
     least, faint = gains
-    asked = next((c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)
-                  and _asked_for(c, faint if c.gain < least and stands_alone(c, ranked) else least, least_z, outstanding)), None)
-    if asked is None or asked is ranked[0] or not BY_NAME[asked.name].once:
-        return asked
-    return ranked[0] if ranked[0].name in BY_NAME and ranked[0].worth > asked.worth + TIE else asked
+    asked = [c for c in ranked if (c is ranked[0] or current.model.names and c.name in BY_NAME)
+             and _asked_for(c, faint if c.gain < least and stands_alone(c, ranked) else least, least_z, outstanding)]
+    if not asked or asked[0].name not in BY_NAME or not BY_NAME[asked[0].name].once:
+        return asked[0] if asked else None
+    knock, leader = asked[0], ranked[0]
+    if leader is not knock and leader.name in BY_NAME and leader.worth > knock.worth + TIE:
+        return leader
+    return next((c for c in asked[1:] if not BY_NAME[c.name].once and c.worth > knock.worth - ANYWHERE), knock)
 
 
 def _asked_for(candidate: Candidate, least: float, least_z: float, outstanding: bool) -> bool:

@@ -124,6 +124,16 @@ def test_a_gust_keeps_its_phases_in_a_wider_form(pushed):
     assert len(begun) == len(forms) and all(np.array_equal(some.local["periodic_gust"][:, 0], phases) for some in begun)
 
 
+def test_a_gust_may_swell_more_slowly_than_it_may_swing(pushed):
+    """A swing of less than three cycles bends to any drift; what swells once within the recording has the cycles of its wave to tell it."""
+    model = pushed.fit.model
+    starts = BY_NAME["periodic_gust"].grown("periodic_gust", BY_NAME["periodic_gust"].starts(model.scales)[0], model.scales)
+    forms = [model.with_effect("periodic_gust", start) for start in starts if np.isfinite(start[5])]
+    swings, swells = ([next(f.lower for f in form.layout() if (f.owner, f.name) == ("periodic_gust", name)) for form in forms] for name in ("f", "f_s"))
+    assert swings == pytest.approx([3.0 / model.scales.duration] * len(forms)) and max(swells) < 0.5 / model.scales.duration
+    assert not any(form.at_bound(f) for form in forms for f in form.layout() if f.name == "f_s")
+
+
 def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
     """Behind a gear of 20 a motor that cogs thrice a turn has a period of 0.105 rad at the output; without a gear any period may be its own."""
     scales = replace(pushed.fit.model.scales, low=-0.3, high=0.3, cog=2 * np.pi / 60.0)

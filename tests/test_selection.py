@@ -51,6 +51,16 @@ def test_a_knock_gives_way_to_a_law_that_explains_more(pushed, gain, named):
     assert _asked(ranked[:1], dead, (4.0, 1.5), 2.0, False) is None
 
 
+@pytest.mark.parametrize("gain, named", [(8.1, "voltage_saturation"), (8.3, "load_disturbance")])
+def test_a_knock_gives_way_to_a_law_that_is_asked_for_as_well(pushed, gain, named):
+    """It chooses its moment, so that it must be well ahead; not where nothing is named yet, since what has no law may look like both."""
+    delayed = replace(pushed.fit, model=pushed.fit.model.with_effect("input_delay", np.array([7e-3])))
+    ranked = [Candidate("load_disturbance", delayed, gain, 1.4, 0.0, 3.0), Candidate("end_stop", delayed, 5.3, 1.0, 4.0, 3.0),
+              Candidate("voltage_saturation", delayed, 5.2, 1.5, 0.1, 3.0)]
+    assert _asked(ranked, delayed, (4.0, 1.5), 2.0, False).name == named
+    assert _asked(ranked, pushed.fit, (3.0, 3.0), 1.7, False).name == "load_disturbance"
+
+
 def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed):
     """Of 100 C that are left a tenth is enough in order, and a good part out of it; of hardly any what is more than chance."""
     wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=pushed.fit.model.with_effect("quadratic_drag", np.array([1.0, np.inf])))

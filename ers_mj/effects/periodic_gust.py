@@ -8,6 +8,7 @@ from ers_mj.effects.base import Load, Parameter, law
 
 CYCLES = range(3, 41)  # within the longest recording, from which a fit is begun: a sine fits within one cycle only
 FLAT, SWELLS = 0.1, (1.0, 2.0, 3.0)  # third harmonic, and cycles of a swell within that recording, from which wider forms are begun
+SLOWEST = 0.02  # [Hz] of a swell: its wave within has the cycles that tell it from a drift
 
 
 class PeriodicGust(Load):
@@ -24,7 +25,7 @@ class PeriodicGust(Load):
         Parameter("phase", "phase", "phase of the sine at time zero, another in every recording", positive=False, per_record=True),
         Parameter("third", "ratio", "third harmonic over the first", positive=False, lower=-0.5, upper=0.5, absent=np.inf),
         Parameter("swell", "ratio", "by how much its amplitude swells", positive=False, lower=-1.0, upper=1.0, absent=np.inf),
-        Parameter("f_s", "frequency", "frequency of the swell", absent=np.inf),
+        Parameter("f_s", "frequency", "frequency of the swell", lower=SLOWEST, absent=np.inf),
         Parameter("phase_s", "phase", "phase of the swell at time zero", positive=False, absent=np.inf),
     )
     needs, together = (("A",),), (("swell", "f_s", "phase_s"),)
