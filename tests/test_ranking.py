@@ -8,7 +8,7 @@ import pytest
 from ers_mj import selection
 from ers_mj.effects import BY_NAME
 from ers_mj.isolability import probabilities
-from ers_mj.ranking import judged, likeliest_first, shows, stands_alone
+from ers_mj.ranking import BENT, judged, likeliest, likeliest_first, shows, stands_alone
 from servo import recorded, started
 
 
@@ -30,6 +30,19 @@ def test_of_two_alike_the_one_without_play_is_likelier(pushed):
     assert probabilities({"backlash": better, "shaft_compliance": narrow})["backlash"] > 0.8
     seen = replace(wide, model=pushed.fit.model.with_effect("backlash", np.array([5e-4, 0.6, 0.2, 80.0, 0.2])))  # wider than its contact gives way
     assert probabilities({"backlash": seen, "shaft_compliance": narrow})["backlash"] == pytest.approx(1 / (1 + np.exp(-0.75)), abs=0.01)
+
+
+def test_a_torque_that_bends_along_the_travel_is_gravity(pushed):
+    """Its slope is the spring's and costs nothing; how it bends follows from its size, so that it must do better than what is constant, and not as well."""
+    model = pushed.fit.model
+    models = {name: model.with_effect(name, BY_NAME[name].starts(model.scales)[0]) for name in ("bias_torque", "asymmetric_friction", "gravity_imbalance")}
+    fits = {name: replace(pushed.fit, model=some, hessian=np.eye(len(some.layout()))) for name, some in models.items()}
+    alike = probabilities(fits)
+    assert alike["gravity_imbalance"] == pytest.approx(alike["bias_torque"]) and likeliest(fits) == "bias_torque"
+    for better, first in ((0.9, "bias_torque"), (1.1, "gravity_imbalance")):
+        cost = float(np.sum(np.log(1.0 + fits["gravity_imbalance"].misfit)))
+        bent = replace(fits["gravity_imbalance"], misfit=(1.0 + fits["gravity_imbalance"].misfit) * BENT ** (-better / pushed.fit.misfit.size) - 1.0)
+        assert float(np.sum(np.log(1.0 + bent.misfit))) < cost and likeliest({**fits, "gravity_imbalance": bent}) == first
 
 
 def test_a_play_less_wide_than_its_contact_gives_way_is_a_shaft(pushed):
