@@ -52,7 +52,7 @@ def isolability(leader: Fit, others: Sequence[Fit], traces: Sequence[Trace]) -> 
 def probabilities(fits: Mapping[str, Fit]) -> dict[str, float]:
     """How probable each of these explanations is, if one of them is true; they sum to one.
 
-    C is a logarithm of a likelihood, so exp(-C) weighs, less the price of the parameters that are no others' (Effect.redundant); a play closes into a springy shaft, which is likelier unless
+    C is a logarithm of a likelihood, so exp(-C) weighs, less the price of the parameters, but those that only stand in for the baseline's (Effect.redundant); a play closes into a springy shaft, which is likelier unless
     the play is seen, and less likely if it is: a spring that hardens does much of what a play does. What one stick or one slip did may not happen
     again: the weights are averaged over draws in which every run of RUN blocks counts by a random share of its own (Bayesian
     bootstrap; pseudo-BMA+ of Yao et al. 2018), so that an advantage won in one place does not exclude the rest.

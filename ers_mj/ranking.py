@@ -25,7 +25,7 @@ FORKED = 6.0  # of C that forks of stick and slip leave: two blocks off by 5.8 s
 TIE, NEAR_TIE = 1.0, 0.02  # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
 RIVAL = 0.3  # share of the leader's gain from which a candidate may take its place later
 NEARLY = 0.5  # share of the gain of a form of another effect (Effect.really) that this other must win itself to be told in its place
-BENT = 1.06  # times the probability of a torque that is constant, from which one that changes along the travel (Effect.bends) is told in its place: of 54 torques of
+CURVED = 1.06  # times the probability of a torque that is constant, from which one that changes along the travel (Effect.curves) is told in its place: of 54 torques of
 # 4178 to 4192 none reaches it, of 33 gravities eight
 CLOCKED = 0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
 
@@ -114,12 +114,12 @@ def likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
 
 def likeliest(fits: Mapping[str, Fit]) -> str:
     """The most probable of what is not clocked, or else of all; the probabilities of those that are one with it count as its own, but beside what is a form of
-    one of them that bends as the motion does (BENT)."""
+    one of them that changes along the travel (CURVED)."""
     chances = probabilities(fits)
     kinds = {name: next((group for group in EQUIVALENT if name in group), {name}) for name in fits}
     first = max(fits, key=lambda name: (not is_clocked(name), sum(chances[other] for other in kinds[name] if other in chances), chances[name]))
-    bent = (name for name in fits if name in BY_NAME and BY_NAME[name].bends in kinds[first])
-    return next((name for name in bent if chances[name] >= BENT * max(chances[other] for other in kinds[first] if other in chances)), first)
+    curved = (name for name in fits if name in BY_NAME and BY_NAME[name].curves in kinds[first])
+    return next((name for name in curved if chances[name] >= CURVED * max(chances[other] for other in kinds[first] if other in chances)), first)
 
 
 def rivals_of(ranked: Sequence[Candidate]) -> list[Candidate]:

@@ -8,7 +8,7 @@ import pytest
 from ers_mj import selection
 from ers_mj.effects import BY_NAME
 from ers_mj.isolability import probabilities
-from ers_mj.ranking import BENT, judged, likeliest, likeliest_first, shows, stands_alone
+from ers_mj.ranking import CURVED, judged, likeliest, likeliest_first, shows, stands_alone
 from servo import recorded, started
 
 
@@ -41,7 +41,7 @@ def test_a_torque_that_bends_along_the_travel_is_gravity(pushed):
     assert alike["gravity_imbalance"] == pytest.approx(alike["bias_torque"]) and likeliest(fits) == "bias_torque"
     for better, first in ((0.9, "bias_torque"), (1.1, "gravity_imbalance")):
         cost = float(np.sum(np.log(1.0 + fits["gravity_imbalance"].misfit)))
-        bent = replace(fits["gravity_imbalance"], misfit=(1.0 + fits["gravity_imbalance"].misfit) * BENT ** (-better / pushed.fit.misfit.size) - 1.0)
+        bent = replace(fits["gravity_imbalance"], misfit=(1.0 + fits["gravity_imbalance"].misfit) * CURVED ** (-better / pushed.fit.misfit.size) - 1.0)
         assert float(np.sum(np.log(1.0 + bent.misfit))) < cost and likeliest({**fits, "gravity_imbalance": bent}) == first
 
 

@@ -170,7 +170,7 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     redundant: ClassVar[int] = 0  # of its numbers, how many only stand in for the baseline's own, so that they explain nothing more
-    bends: ClassVar[str] = ""  # the effect of which it is a form that changes along the travel by what its size tells, so that either may be the better one
+    curves: ClassVar[str] = ""  # the effect of which it is a form that changes along the travel by what its size tells, so that either may be the better one
     wave: ClassVar[tuple[tuple[int, ...], int] | None] = None  # amplitudes (of which a start has one) and phase: the screening finds both from two quarter periods
     fewest_turns: ClassVar[float] = 0.8  # periods of a wave over position within the travel: a longer one is no wave but a slope
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted

@@ -21,7 +21,7 @@ class GravityImbalance(Load):
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),
     )
     sized, tries = 2, 3
-    redundant, bends = 1, "bias_torque"  # its slope is the spring's; how it bends follows from its size at the middle of the travel
+    redundant, curves = 1, "bias_torque"  # its slope is the spring's; how it bends follows from its size at the middle of the travel
 
     def starts(self, scales):
         """At the middle of the travel: a torque, a stiffness, and both either way."""
