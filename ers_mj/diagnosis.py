@@ -90,7 +90,7 @@ def _symptoms(recordings: Sequence[Recording], traces: Sequence[Trace], travel: 
         seconds = sum(float(t.t[-1] - t.t[0]) for t in traces)
         found["sensor_dropout"] = np.array([len(lost) / seconds, np.mean([(s.stop - s.start) * t.sample_time for t, s in lost])])
     quantum = max(t.quantum for t in traces)
-    ahead = all(r.behind > 0 and t.is_coarse for r, t in zip(recordings, traces, strict=True))
+    ahead = 2 * sum(r.behind > 0 and t.is_coarse for r, t in zip(recordings, traces, strict=True)) > len(traces)
     if quantum > COARSE * travel or ahead:
         found["sensor_quantisation"] = np.array([quantum])
     return found

@@ -17,9 +17,11 @@ LEAP = 3.5, 6.0, 1.5  # grid steps, noise levels beyond the usual change, and us
 LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
 DITHER, COLOURED = 0.35, 3.0  # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may let it stay
 FEWEST_TURNS = 5  # of the reading within NEIGHBOURS, as noise makes them and motion does not
-RARER = 0.1  # share of the gaps of one step that either kind has at least, where a converter behind makes two kinds of them
+RARER = 0.005  # share of the gaps of one step that either kind has at least, where a converter behind makes two kinds of them
+FINER = 8  # steps between any two neighbouring levels, from which a lattice that all are on is chance, or a converter behind
 FLOAT32 = float(np.finfo(np.float32).eps)
 WITHIN = 1.75  # times the smallest gap between rounded levels up to which a gap is one step of the converter ahead
+REACHES = 2.5, 5.0, 10.0, 20.0  # steps up to which gaps are counted, one after the other, to know the step ahead
 LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
 
 
@@ -123,7 +125,7 @@ def converter_step(y: np.ndarray) -> float:
         return 0.0
     grain = decimal_grain(levels)
     multiple = np.gcd.reduce(np.rint(np.diff(levels) / grain).astype(np.int64)) if grain else 1
-    if multiple > 1:
+    if multiple > 1 and np.diff(levels).min() < FINER * multiple * grain:
         return _ahead(levels, multiple * grain) or float(multiple * grain)
     return _rounded_lattice(levels, grain) or (grain if np.ptp(levels) < COARSE * grain else 0.0)
 
@@ -138,7 +140,7 @@ def step_behind(y: np.ndarray, step: float) -> float:
     gaps = np.diff(levels)
     gaps = gaps[np.abs(gaps - step) < 0.5 * step]
     short, long = gaps[gaps < np.mean(gaps)] if gaps.size else gaps, gaps[gaps >= np.mean(gaps)] if gaps.size else gaps
-    if min(short.size, long.size) < RARER * gaps.size or gaps.size < FEWEST_LEVELS:
+    if min(short.size, long.size) < max(RARER * gaps.size, FEWEST_LEVELS):
         return 0.0
     behind = float(np.mean(long) - np.mean(short))
     finest, apart = 8 * max(decimal_grain(levels), FLOAT32 * np.abs(levels).max()), np.mean(short) / max(behind, 1e-300)
@@ -176,6 +178,9 @@ def _ahead(levels: np.ndarray, step: float) -> float:
     if not step or gaps.size < FEWEST_LEVELS or gaps.min() < 1.5 * step:
         return 0.0
     coarse = float(np.mean(gaps[gaps < WITHIN * gaps.min()]))
+    for reach in REACHES:  # the longer a gap, the better must the step be known to count it
+        few = gaps[gaps < reach * coarse]
+        coarse = float(np.sum(few) / np.sum(np.rint(few / coarse)))
     counts = np.cumsum(np.rint(gaps / coarse))
     slope, offset = np.polyfit(counts, np.cumsum(gaps), 1)
     missed = np.abs(np.cumsum(gaps) - offset - slope * counts)
