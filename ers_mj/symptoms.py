@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 NEIGHBOURS = 20  # samples on either side of a held span that say how the signal usually moves
 SHORTEST_HELD = 5  # samples
@@ -222,7 +221,8 @@ def excursions(y: np.ndarray, sigma: float, times: float = JUMP, usual: float = 
     change = np.diff(y[known])
     if change.size < 2 * NEIGHBOURS:
         return []
-    jump = change - median_filter(change, 2 * CALM_CHANGES + 1, mode="nearest")
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(change, CALM_CHANGES, mode="edge"), 2 * CALM_CHANGES + 1)
+    jump = change - np.median(around, axis=1)
     least = times * max(sigma, float(np.quantile(np.abs(jump), usual)))
     large = np.flatnonzero(np.abs(jump) > least)
     out, end = [], -1
