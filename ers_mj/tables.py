@@ -14,7 +14,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv
-import pyarrow.parquet
 
 from .errors import InputError
 
@@ -47,6 +46,8 @@ def parse_table(content: bytes, suffix: str, name: str) -> pa.Table:
 
 
 def _parquet(content: bytes, name: str) -> pa.Table:
+    import pyarrow.parquet  # here alone: it takes a while, and most recordings are CSV
+
     try:
         table = pa.parquet.read_table(pa.BufferReader(content))
     except (pa.ArrowException, OSError) as error:
