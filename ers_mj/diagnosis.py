@@ -13,7 +13,7 @@ import numpy as np
 from ers_mj.baseline import baseline, sharpened
 from ers_mj.case import Case
 from ers_mj.confirmation import confirmed
-from ers_mj.converter import COARSE
+from ers_mj.converter import COARSE, FINE, ORDINARY
 from ers_mj.datasheet import Datasheet
 from ers_mj.document import Diagnosis, told
 from ers_mj.effects import SUSPECTS
@@ -82,17 +82,17 @@ def _ordinary(model: Model) -> tuple[str, ...]:
 def _symptoms(recordings: Sequence[Recording], traces: Sequence[Trace], travel: float) -> dict[str, np.ndarray]:
     """Sensor effects that show in the data itself, with their parameters.
 
-    A converter is one where it is coarse for the travel, or where it stands ahead of another, which is the sensor's own, and makes most of the noise.
+    A converter is one where it is coarse for the travel, or coarser than those of rudders' angles are and not fine for the travel.
     """
     found = {}
     lost = [(t, span) for t in traces for span in t.lost]
     if len(lost) >= FEWEST_LOST:
         seconds = sum(float(t.t[-1] - t.t[0]) for t in traces)
         found["sensor_dropout"] = np.array([len(lost) / seconds, np.mean([(s.stop - s.start) * t.sample_time for t, s in lost])])
-    quantum = max(t.quantum for t in traces)
-    ahead = 2 * sum(r.behind > 0 and t.is_coarse for r, t in zip(recordings, traces, strict=True)) > len(traces)
-    if quantum > COARSE * travel or ahead:
-        found["sensor_quantisation"] = np.array([quantum])
+    quanta = [t.quantum for t in traces]
+    unusual = recordings[0].output_unit == "rad" and np.median(quanta) > max(ORDINARY, FINE * travel)
+    if max(quanta) > COARSE * travel or unusual:
+        found["sensor_quantisation"] = np.array([max(quanta)])
     return found
 
 

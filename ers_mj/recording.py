@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors import InputError
-from .symptoms import at_extreme, converter_step, decimal_grain, frozen_spans, held_spans, step_behind, varied
+from .symptoms import at_extreme, converter_step, decimal_grain, frozen_spans, held_spans, varied
 from .tables import cell_of, listed, numbers, parse_table, read_content, select_run, split_spec, write_whole
 
 FEWEST_SAMPLES = 100
@@ -74,7 +74,6 @@ class Recording:
         input_unit: "V" or "pct".
         output_unit: "rad", "m" or "V".
         quantum: the converter's step [`output_unit`] as `converter_step` finds it in the file's own unit.
-        behind: the step of a finer converter behind that one (see `step_behind`), 0 where none shows.
         name, path, sha256: file name with its run, path, and hash of the bytes that were read.
         problems: what was worked around or ignored, a sentence each.
     """
@@ -94,7 +93,6 @@ class Recording:
     input_unit: str = "V"
     output_unit: str = "rad"
     quantum: float = 0.0
-    behind: float = 0.0
     name: str = "array"
     path: str = ""
     sha256: str = ""
@@ -157,8 +155,7 @@ def read_recording(path_or_spec: str | os.PathLike, mapping: Mapping[str, str] |
     step = converter_step(printed["y"])
     problems = _problems(fields, printed, labels, step) + _ignored(table.column_names, labels)
     origin = {"name": name, "path": str(path), "sha256": hashlib.sha256(content).hexdigest()}
-    return Recording(**fields, **units, **origin, quantum=step * roles["y"].factor,
-                     behind=step_behind(printed["y"], step) * roles["y"].factor, problems=tuple(problems))
+    return Recording(**fields, **units, **origin, quantum=step * roles["y"].factor, problems=tuple(problems))
 
 
 def write_recording(path: str | os.PathLike, columns: Mapping[str, Sequence[float]]) -> None:
@@ -208,7 +205,7 @@ def from_arrays(
     step = converter_step(values["y"])
     problems = _problems(fields, values, labels, step)
     origin = {"name": name, "sha256": hashlib.sha256(b"".join(x.tobytes() for x in values.values())).hexdigest()}
-    return Recording(**fields, **units, **origin, quantum=step, behind=step_behind(values["y"], step), problems=tuple(problems))
+    return Recording(**fields, **units, **origin, quantum=step, problems=tuple(problems))
 
 
 def _refuse_unknown_unit(noun: str, unit: str, field: str, name: str) -> None:

@@ -16,7 +16,6 @@ LEAP = 3.5, 6.0, 1.5  # grid steps, noise levels beyond the usual change, and us
 LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
 DITHER, COLOURED = 0.35, 3.0  # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may let it stay
 FEWEST_TURNS = 5  # of the reading within NEIGHBOURS, as noise makes them and motion does not
-RARER = 0.005  # share of the gaps of one step that either kind has at least, where a converter behind makes two kinds of them
 FINER = 8  # steps between any two neighbouring levels, from which a lattice that all are on is chance, or a converter behind
 FLOAT32 = float(np.finfo(np.float32).eps)
 WITHIN = 1.75  # times the smallest gap between rounded levels up to which a gap is one step of the converter ahead
@@ -127,24 +126,6 @@ def converter_step(y: np.ndarray) -> float:
     if multiple > 1 and np.diff(levels).min() < FINER * multiple * grain:
         return _ahead(levels, multiple * grain) or float(multiple * grain)
     return _rounded_lattice(levels, grain) or (grain if np.ptp(levels) < COARSE * grain else 0.0)
-
-
-def step_behind(y: np.ndarray, step: float) -> float:
-    """The step of a converter behind the one of this ``step`` that y (N,) lies on, in y's unit; 0.0 where none shows.
-
-    It rounds the steps ahead of it to its own, so that they are of two kinds which differ by one of these. Where it fits into ``step`` a whole
-    number of times nothing shows. Pass values in the unit they were printed in.
-    """
-    levels = np.unique(y[np.isfinite(y)])
-    gaps = np.diff(levels)
-    gaps = gaps[np.abs(gaps - step) < 0.5 * step]
-    short, long = gaps[gaps < np.mean(gaps)] if gaps.size else gaps, gaps[gaps >= np.mean(gaps)] if gaps.size else gaps
-    if min(short.size, long.size) < max(RARER * gaps.size, FEWEST_LEVELS):
-        return 0.0
-    behind = float(np.mean(long) - np.mean(short))
-    finest, apart = 8 * max(decimal_grain(levels), FLOAT32 * np.abs(levels).max()), np.mean(short) / max(behind, 1e-300)
-    sharp = behind > finest and max(np.std(short), np.std(long)) < 0.1 * behind
-    return behind if sharp and abs(apart - np.rint(apart)) < ON_LATTICE else 0.0
 
 
 def decimal_grain(levels: np.ndarray) -> float:

@@ -91,15 +91,14 @@ def test_a_coarse_sensor_is_told_from_the_data():
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
 
 
-@pytest.mark.parametrize("ahead, noise, told", [(8.795e-4, 1e-4, True), (0.0, 1e-4, False), (8.795e-4, 5e-4, False)])
-def test_a_converter_ahead_of_the_sensors_own_is_one(ahead, noise, told):
-    """As long as its step makes most of the noise; the sensor's own counts only where it is coarse for the travel."""
-    fine, random = 1.2783e-4, np.random.default_rng(2)
-    y = 0.3 * np.sin(5.0 * T) + noise * random.standard_normal(T.size)
-    y = np.round(y / ahead) * ahead if ahead else y
-    r = from_arrays(T, np.zeros(T.size), np.round(np.round(y / fine) * fine, 7))
-    found = _symptoms([r], [trace_of(r, None)], 0.6)
-    assert found == ({"sensor_quantisation": pytest.approx([ahead], rel=1e-3)} if told else {})
+@pytest.mark.parametrize("degrees, travel, unit, told", [(0.041, 0.5, "rad", True), (0.029, 0.5, "rad", False), (0.0879, 1.9, "rad", False), (0.041, 0.5, "V", False),
+                                                            (0.041, 0.2, "V", True)])
+def test_a_step_is_an_effect_where_rudders_converters_are_finer_or_the_travel_has_few(degrees, travel, unit, told):
+    step = np.radians(degrees)
+    y = np.round((0.5 * travel * np.sin(5.0 * T) + 1e-4 * np.random.default_rng(2).standard_normal(T.size)) / step) * step
+    r = from_arrays(T, np.zeros(T.size), y, output_unit=unit)
+    found = _symptoms([r], [trace_of(r, None)], travel)
+    assert found == ({"sensor_quantisation": pytest.approx([step], rel=1e-3)} if told else {})
 
 
 @pytest.mark.parametrize("step", [0.0, np.radians(0.6)])
