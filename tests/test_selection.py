@@ -61,6 +61,16 @@ def test_a_knock_gives_way_to_a_law_that_is_asked_for_as_well(pushed, gain, name
     assert _asked(ranked, pushed.fit, (3.0, 3.0), 1.7, False).name == "load_disturbance"
 
 
+@pytest.mark.parametrize("name, gain, z, asked", [("drive_dead_zone", 3.6, 3.3, True), ("drive_dead_zone", 3.6, 2.7, False), ("drive_dead_zone", 2.8, 4.0, False),
+                                                  ("gain", 3.6, 3.3, False)])
+def test_beside_an_effect_a_law_may_buy_less_where_it_buys_it_nearly_everywhere(pushed, name, gain, z, asked):
+    """A rival buys nearly as much, so that it does not stand alone; what differs between recordings is no law."""
+    dead = replace(pushed.fit, model=pushed.fit.model.with_effect("drive_dead_zone", BY_NAME["drive_dead_zone"].starts(pushed.fit.model.scales)[0]))
+    ranked = [Candidate(name, dead, gain, z, 0.5, 0.4), Candidate("stribeck", replace(dead, misfit=dead.misfit + 1.0), 0.9 * gain, 2.0, 0.5, 0.4)]
+    assert (_asked(ranked, dead, (4.0, 1.5), 2.0, False) is ranked[0]) is asked
+    assert _asked(ranked, pushed.fit, (4.0, 4.0), 1.7, False) is None
+
+
 def test_where_the_model_stays_wrong_a_third_effect_must_take_a_good_part(pushed):
     """Of 100 C that are left a tenth is enough in order, and a good part out of it; of hardly any what is more than chance."""
     wrong = replace(pushed.fit, misfit=np.full(100, np.e - 1.0) * 2.0, model=pushed.fit.model.with_effect("quadratic_drag", np.array([1.0, np.inf])))
