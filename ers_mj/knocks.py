@@ -14,7 +14,7 @@ from ers_mj.identification import Run, residuals_in, score
 from ers_mj.model import OBSERVER_RATE, Model
 from ers_mj.traces import BLOCK, Blocks, Trace
 
-NEARER = 60  # simulations in which a knock is brought nearer
+NEARER, NEAR = 60, 0.05  # simulations in which a knock is brought nearer at most, and of C, within which all that were tried last are near enough
 OUTWEIGHED = 5.0  # how far the mean misfit of blocks may lie above their geometric mean before one of them hides what a knock does to the others
 LEAD, TAIL = 0.1, 2.0  # [s] before a knock begins and after, in which it is tried
 IDLE, HALVINGS = 0.1, 6  # of C that a push which moves little changes; of the way from it to the next that throws the rudder
@@ -126,6 +126,8 @@ def _nearer(gain: Callable[[np.ndarray], float], effect: Effect, start: np.ndarr
         return out
 
     step = [0.03 if effect.parameters[k].name == "t_0" else 0.3 * start[k] for k in free]
-    first = start[free] + np.vstack([np.zeros(len(free)), np.diag(step)])
-    found = minimize(lambda p: -gain(whole(p)), start[free], method="Nelder-Mead", options={"initial_simplex": first, "maxfev": NEARER})
+    bounds = [(effect.parameters[k].lower, effect.parameters[k].upper) for k in free]
+    first = np.clip(start[free] + np.vstack([np.zeros(len(free)), np.diag(step)]), *np.transpose(bounds))
+    found = minimize(lambda p: -gain(whole(p)), first[0], method="Nelder-Mead", bounds=bounds,
+                     options={"initial_simplex": first, "maxfev": NEARER, "xatol": np.inf, "fatol": NEAR})
     return whole(found.x)

@@ -10,7 +10,7 @@ from ers_mj.baseline import baseline
 from ers_mj.datasheet import read_datasheet
 from ers_mj.effects import BY_NAME
 from ers_mj.identification import residuals, residuals_in, run_of, score
-from ers_mj.knocks import Surroundings, between
+from ers_mj.knocks import NEARER, Surroundings, _nearer, between
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.recording import from_arrays
@@ -179,6 +179,22 @@ def test_a_knock_is_sought_on_to_where_it_throws_the_rudder():
     tried = between(gain, pushes)
     assert max(won for won, _ in tried) == 9.0 and all(33.0 < push[0] < 110.0 for _, push in tried)
     assert not between(gain, pushes[:3]) and not between(gain, pushes[3:])
+
+
+def test_a_knock_is_brought_nearer_within_its_bounds_and_no_longer_than_it_pays():
+    """One that gains the more, the faster it fades, which has a least time; and one that gains nothing anywhere."""
+    effect, tried = BY_NAME["load_disturbance"], []
+    start = np.array([10.0, 0.8, np.inf, 0.0, 0.05])
+
+    def gain(push):
+        tried.append(push[4])
+        return 1.0 / push[4]
+
+    fade = effect.parameters[4]
+    assert _nearer(gain, effect, start)[4] == fade.lower and fade.lower <= min(tried) and max(tried) <= fade.upper
+    tried.clear()
+    _nearer(lambda push: tried.append(push[4]) or 0.0, effect, start)
+    assert len(tried) < NEARER / 4
 
 
 def test_knocks_are_looked_for_where_a_recording_leaves_enough(pushed):
