@@ -1,7 +1,7 @@
 """How close the MuJoCo plant is, and what it costs: `python analysis/benchmark_mujoco.py [SECTION...]`.
 
-Sections: reduced play step hold warnings twins speed; all without argument (about four minutes on two cores). Angles are RMS of
-theta in degrees on ten seconds at 1 kHz unless said otherwise.
+Sections: reduced play step hold warnings twins speed; all without argument (about four minutes on two cores). Angles
+are RMS of theta in degrees on ten seconds at 1 kHz unless said otherwise.
 """
 
 import os
@@ -29,8 +29,18 @@ T = np.arange(0.0, 10.0, 1e-3)
 SHEET = read_datasheet("table1")
 MODELS = {False: lumped(SHEET.to_lumped() | {"tau_e": 0.0}), True: lumped(SHEET.to_lumped())}
 GAPS_DEG = (0.1, 0.5, 1.0)
-SCALES = Scales(position=0.4, low=0.15, high=0.4, speed=4.0, acceleration=110.0, input=10.0, sample_time=1e-3, noise=1e-4, quantum=0.0,
-                is_angle=True)
+SCALES = Scales(
+    position=0.4,
+    low=0.15,
+    high=0.4,
+    speed=4.0,
+    acceleration=110.0,
+    input=10.0,
+    sample_time=1e-3,
+    noise=1e-4,
+    quantum=0.0,
+    is_angle=True,
+)
 
 
 def rms_deg(x):
@@ -48,8 +58,10 @@ def row(label, numbers):
 def reduced():
     """No play, constant ratio, against the event-exact reduced model."""
     for inductance, c in MODELS.items():
-        errors = {name: rms_deg(rudder(inductance).simulate(T, f(T)).theta - ReducedModel(c).simulate(T, f(T)).theta)
-                  for name, f in INPUTS.items()}
+        errors = {
+            name: rms_deg(rudder(inductance).simulate(T, f(T)).theta - ReducedModel(c).simulate(T, f(T)).theta)
+            for name, f in INPUTS.items()
+        }
         row(f"inductance {'on' if inductance else 'off'}", errors)
 
 
@@ -59,7 +71,9 @@ def play():
         for gap_deg in GAPS_DEG:
             gap, errors = np.radians(gap_deg), {}
             for name, f in INPUTS.items():
-                truth = independent_two_mass.simulate(SHEET.parameters, gap, MOTOR_SHARE, T, f(T), inductance=inductance)
+                truth = independent_two_mass.simulate(
+                    SHEET.parameters, gap, MOTOR_SHARE, T, f(T), inductance=inductance
+                )
                 errors[name] = rms_deg(rudder(inductance, gap=gap).simulate(T, f(T)).theta - truth)
             row(f"+-{gap_deg} deg, inductance {'on' if inductance else 'off'}", errors)
 
@@ -69,8 +83,13 @@ def step():
     for linkage in LINKAGES:
         for gap_deg in (0.0, *GAPS_DEG):
             options = {"linkage": linkage, "gap": np.radians(gap_deg)}
-            moved = {name: rms_deg(rudder(**options).simulate(T, f(T)).theta - rudder(timestep=2.5e-5, **options).simulate(T, f(T)).theta)
-                     for name, f in INPUTS.items()}
+            moved = {
+                name: rms_deg(
+                    rudder(**options).simulate(T, f(T)).theta
+                    - rudder(timestep=2.5e-5, **options).simulate(T, f(T)).theta
+                )
+                for name, f in INPUTS.items()
+            }
             row(f"{linkage}, +-{gap_deg} deg", moved)
 
 
@@ -84,10 +103,16 @@ def hold():
 
 def warnings():
     """MuJoCo's warnings in 60 s of random voltage (+-24 V, a new one every 5 to 50 ms)."""
-    shipped = {name: mujoco.MjModel.from_xml_path(str(mjcf_folder() / name))
-               for name in ("scene.xml", "rudder_rod.xml", "rudder_constant.xml")}
-    built = {f"built, {linkage}, +-{gap} deg, inductance {on}": rudder(on, linkage=linkage, gap=np.radians(gap)).model
-             for linkage in LINKAGES for gap in (0.0, 0.5) for on in MODELS}
+    shipped = {
+        name: mujoco.MjModel.from_xml_path(str(mjcf_folder() / name))
+        for name in ("scene.xml", "rudder_rod.xml", "rudder_constant.xml")
+    }
+    built = {
+        f"built, {linkage}, +-{gap} deg, inductance {on}": rudder(on, linkage=linkage, gap=np.radians(gap)).model
+        for linkage in LINKAGES
+        for gap in (0.0, 0.5)
+        for on in MODELS
+    }
     for name, model in (shipped | built).items():
         data, rng = mujoco.MjData(model), np.random.default_rng(7)
         while data.time < 60.0:
@@ -128,8 +153,10 @@ def speed():
             data = [mujoco.MjData(plants[0].model) for _ in range(cores)]
             bare.append(_seconds(lambda: pool.rollout([p.model for p in plants], data, states, control)))
     steps = 32 * (t.size - 1) * 20
-    print(f"  32 plants on {cores} cores: {steps / min(ours) / 1e3:.0f} k steps/s, bare rollout {steps / min(bare) / 1e3:.0f} k; "
-          f"ratio of times {min(ours) / min(bare):.3f}")
+    print(
+        f"  32 plants on {cores} cores: {steps / min(ours) / 1e3:.0f} k steps/s, bare rollout"
+        f" {steps / min(bare) / 1e3:.0f} k; ratio of times {min(ours) / min(bare):.3f}"
+    )
 
 
 def _start(plant):

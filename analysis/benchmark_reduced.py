@@ -1,7 +1,6 @@
 """Speed and error of the reduced model: `python analysis/benchmark_reduced.py`.
-
-Speed is milliseconds of one core for a simulated second at 1 kHz (best of 20). Error is the largest change of theta [deg] against an
-independent scheme (baseline) or against segments ten times finer (effects).
+ Speed is milliseconds of one core for a simulated second at 1 kHz (best of 20). Error is the largest change of theta
+[deg] against an independent scheme (baseline) or against segments ten times finer (effects).
 """
 
 import sys
@@ -20,8 +19,18 @@ from ers_mj.plants.reduced import ReducedModel, lumped  # noqa: E402
 
 T = np.arange(0.0, 10.0, 1e-3)
 SHEET = read_datasheet("table1")
-SCALES = Scales(position=0.4, low=0.15, high=0.4, speed=4.0, acceleration=110.0, input=10.0, sample_time=1e-3, noise=1e-4, quantum=0.0,
-                is_angle=True)
+SCALES = Scales(
+    position=0.4,
+    low=0.15,
+    high=0.4,
+    speed=4.0,
+    acceleration=110.0,
+    input=10.0,
+    sample_time=1e-3,
+    noise=1e-4,
+    quantum=0.0,
+    is_angle=True,
+)
 
 
 def milliseconds(model, u):
@@ -50,7 +59,9 @@ def main():
     for effect in EFFECTS:
         for start in effect.starts(SCALES)[:1]:
             model = ReducedModel(base.coefficients, [(effect.name, start)])
-            print(f"{effect.name:34}{milliseconds(model, u):8.3f}{worst(model.simulate(T, u).theta, model.simulate(T, u, refine=10).theta):14.1e}")
+            print(
+                f"{effect.name:34}{milliseconds(model, u):8.3f}{worst(model.simulate(T, u).theta, model.simulate(T, u, refine=10).theta):14.1e}"
+            )
 
 
 if __name__ == "__main__":

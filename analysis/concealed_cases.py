@@ -1,10 +1,10 @@
 """Conceal effects in an independent servo and write the recordings, in the format of the shared development cases.
 
     python analysis/concealed_cases.py --out DIR --seed 1 --cases 28 --effects first --kind single
-
-writes DIR/case-NNN/{datasheet.toml, rec1.csv, ...} and DIR/truth/case-NNN.json. Kinds and effects are taken in turn: case i has
-kind number i modulo the kinds given (repeat a word to weigh it: `--kind single,single,none`), and the k-th single case has effect
-number k modulo the effects. Every case draws from its own child of the seed, so a case does not depend on the others or on --jobs.
+ writes DIR/case-NNN/{datasheet.toml, rec1.csv, ...} and DIR/truth/case-NNN.json. Kinds and effects are taken in turn:
+case i has kind number i modulo the kinds given (repeat a word to weigh it: `--kind single,single,none`), and the k-th
+single case has effect number k modulo the effects. Every case draws from its own child of the seed, so a case does not
+depend on the others or on --jobs.
 """
 
 import argparse
@@ -23,8 +23,12 @@ from ers_mj.proving.servo import draw_servo  # noqa: E402
 from ers_mj.proving.sizing import ALIKE, pooled, refit, sizes, step_for  # noqa: E402
 
 KINDS = ("single", "none", "pair", "outside")
+
+
 def tune(servo, effect, shape, target):
-    """(strength, size) whose size comes closest to the target: false position on the logarithms, within plausible bounds."""
+    """(strength, size) whose size comes closest to the target: false position on the logarithms, within plausible
+    bounds.
+    """
     low, high = np.log(effect.low), np.log(effect.high)
     if effect.name == "inductance":
         low = np.log(max(effect.low, 2.5 * servo["params"]["L"]))
@@ -44,7 +48,9 @@ def tune(servo, effect, shape, target):
 
 
 def next_guess(seen, low, high):
-    """Secant through the last two where it stays well inside (low, high), else the middle; near-flat sizes get the middle."""
+    """Secant through the last two where it stays well inside (low, high), else the middle; near-flat sizes get the
+    middle.
+    """
     (a, fa), (b, fb) = seen[-2:] if len(seen) > 1 else ((0.0, 0.0), (0.0, 0.0))
     if abs(fb - fa) > 0.05 and a != b:
         guess = b - fb * (b - a) / (fb - fa)
@@ -66,10 +72,17 @@ def conceal(rng, servo, name, span):
             best = (strength, shape, size)
         if abs(np.log(size / target)) < 0.4:
             break
-    return {"label": name, "strength_name": effect.strength_name, "strength": best[0], "shape": best[1], "target_sigma": target}
+    return {
+        "label": name,
+        "strength_name": effect.strength_name,
+        "strength": best[0],
+        "shape": best[1],
+        "target_sigma": target,
+    }
 
 
-# ---- one case ---------------------------------------------------------------------------------------------------------
+# ---- one case
+# ---------------------------------------------------------------------------------------------------------
 
 
 def plan(options):
@@ -106,7 +119,10 @@ def make_case(job):
     index, child, (kind, name), options = job
     rng, case = np.random.default_rng(child), f"case-{index + 1:03d}"
     servo = draw_servo(rng, options.coloured)
-    effects = [conceal(rng, servo, label, (options.sigma_min, options.sigma_max)) for label in names_of(rng, kind, name, options)]
+    effects = [
+        conceal(rng, servo, label, (options.sigma_min, options.sigma_max))
+        for label in names_of(rng, kind, name, options)
+    ]
     per_record, runs = sizes(servo, effects, FINE)
     for effect in effects:
         alone = per_record if len(effects) == 1 else sizes(servo, [effect], step_for([effect]))[0]
@@ -128,14 +144,33 @@ def truth_of(case, kind, servo, effects, runs, per_record, left, seed):
     visible = None if None in left else pooled(servo, left)
     theta_0, sensor = servo["params"]["theta_0"], servo["sensor"]
     inductance = [run_without_inductance(servo, r, x) for r, x in zip(servo["records"], runs)]
-    records = [{"kind": r["kind"], "closed_loop": r["closed_loop"], "duration_s": round(r["t"].size / sensor["sample_rate_hz"], 3),
-                "travel_deg": [float((x.true.min() - theta_0) / DEG), float((x.true.max() - theta_0) / DEG)],
-                "heldout_floor_rad": sensor["noise_sigma_eff_rad"]} for r, x in zip(servo["records"], runs)]
-    return {"labels": [e["label"] for e in effects], "kind": kind, "true_parameters": servo["params"], "effects": effects,
-            "effect_size_sigma": pooled(servo, per_record), "effect_size_per_record": [round(x, 3) for x in per_record],
-            "visibility_after_refit_sigma": visible, "visibility_per_record": [x if x is None else round(x, 3) for x in left],
-            "baseline_inductance_size_sigma": pooled(servo, inductance), **sensor, "umax_V": servo["controller"]["UMAX"],
-            "controller": servo["controller"], "records": records, "seed": seed, "case": case}
+    records = [
+        {
+            "kind": r["kind"],
+            "closed_loop": r["closed_loop"],
+            "duration_s": round(r["t"].size / sensor["sample_rate_hz"], 3),
+            "travel_deg": [float((x.true.min() - theta_0) / DEG), float((x.true.max() - theta_0) / DEG)],
+            "heldout_floor_rad": sensor["noise_sigma_eff_rad"],
+        }
+        for r, x in zip(servo["records"], runs)
+    ]
+    return {
+        "labels": [e["label"] for e in effects],
+        "kind": kind,
+        "true_parameters": servo["params"],
+        "effects": effects,
+        "effect_size_sigma": pooled(servo, per_record),
+        "effect_size_per_record": [round(x, 3) for x in per_record],
+        "visibility_after_refit_sigma": visible,
+        "visibility_per_record": [x if x is None else round(x, 3) for x in left],
+        "baseline_inductance_size_sigma": pooled(servo, inductance),
+        **sensor,
+        "umax_V": servo["controller"]["UMAX"],
+        "controller": servo["controller"],
+        "records": records,
+        "seed": seed,
+        "case": case,
+    }
 
 
 def run_without_inductance(servo, record, result):
@@ -148,24 +183,40 @@ def run_without_inductance(servo, record, result):
 
 def write_datasheet(path, rate):
     """Table 1 and the sample rate."""
-    lines = ["[parameters]", *(f"{name} = {value}" for name, value in TABLE_1.items()), "", "[recording]",
-             f"sample_rate_hz = {rate}", ""]
+    lines = [
+        "[parameters]",
+        *(f"{name} = {value}" for name, value in TABLE_1.items()),
+        "",
+        "[recording]",
+        f"sample_rate_hz = {rate}",
+        "",
+    ]
     path.write_text("\n".join(lines))
 
 
 def write_record(path, record, result, sensor, rng):
     """Columns t_s, u_V, theta_rad, then i_A and theta_ref_rad where there are any."""
-    columns = {"t_s": (record["t"], "%.4f" if sensor["sample_rate_hz"] > 1000 else "%.3f"), "u_V": (result.u, "%.4f"),
-               "theta_rad": (result.theta, "%.7f")}
+    columns = {
+        "t_s": (record["t"], "%.4f" if sensor["sample_rate_hz"] > 1000 else "%.3f"),
+        "u_V": (result.u, "%.4f"),
+        "theta_rad": (result.theta, "%.7f"),
+    }
     if sensor["has_current"]:
         columns["i_A"] = (result.i_A + sensor["current_sigma_A"] * rng.standard_normal(result.i_A.size), "%.4f")
     if record["closed_loop"]:
         columns["theta_ref_rad"] = (record["ref"], "%.5f")
-    np.savetxt(path, np.stack([values for values, _ in columns.values()], 1), delimiter=",", header=",".join(columns),
-               comments="", fmt=[form for _, form in columns.values()])
+    np.savetxt(
+        path,
+        np.stack([values for values, _ in columns.values()], 1),
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+        fmt=[form for _, form in columns.values()],
+    )
 
 
-# ---- command line -----------------------------------------------------------------------------------------------------
+# ---- command line
+# -----------------------------------------------------------------------------------------------------
 
 
 def effect_names(text):
@@ -192,11 +243,15 @@ def read_options(arguments):
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cases", type=int, default=28)
     parser.add_argument("--effects", type=effect_names, default=LISTED, help="name,name,... or all or first")
-    parser.add_argument("--kind", type=kind_names, default=("single",), help="of single,none,pair,outside; repeats weigh")
+    parser.add_argument(
+        "--kind", type=kind_names, default=("single",), help="of single,none,pair,outside; repeats weigh"
+    )
     parser.add_argument("--sigma-min", type=float, default=3.0)
     parser.add_argument("--sigma-max", type=float, default=200.0)
     parser.add_argument("--coloured", type=float, default=0.0, help="share of the cases with coloured noise")
-    parser.add_argument("--no-refit", dest="refit", action="store_false", help="leave visibility_after_refit_sigma null (faster)")
+    parser.add_argument(
+        "--no-refit", dest="refit", action="store_false", help="leave visibility_after_refit_sigma null (faster)"
+    )
     parser.add_argument("--jobs", type=int, default=multiprocessing.cpu_count())
     return parser.parse_args(arguments)
 

@@ -1,9 +1,10 @@
 """Is it finite time? Phase portraits, V_3 along them, and the approach to rest: `python analysis/finite_time.py`.
-
-The loop of `ftrc` around Eq. (5) at 10 kHz, let go at several distances, with q = 97/99 (the paper's), q = 5/7 (far from 1, so that finite time shows)
-and q = 1 (the same law made linear), otherwise Eq. (40)'s gains. Two plants: Eq. (5) as it is, and one without friction, preload and voltage limit,
-which is the double integrator of the proof. V_3 is Eq. (24)'s with x1 as the controller has it. Printed: the time to come within 0.1 and 0.005 of the
-start for good, the share of samples in which V_3 grows by more than 1e-6 of its first value, and its largest growth. Writes docs/paper/finite_time.png.
+ The loop of `ftrc` around Eq. (5) at 10 kHz, let go at several distances, with q = 97/99 (the paper's), q = 5/7 (far
+from 1, so that finite time shows) and q = 1 (the same law made linear), otherwise Eq. (40)'s gains. Two plants: Eq. (5)
+as it is, and one without friction, preload and voltage limit, which is the double integrator of the proof. V_3 is Eq.
+(24)'s with x1 as the controller has it. Printed: the time to come within 0.1 and 0.005 of the start for good, the share
+of samples in which V_3 grows by more than 1e-6 of its first value, and its largest growth. Writes
+docs/paper/finite_time.png.
 """
 
 from __future__ import annotations
@@ -34,13 +35,21 @@ PICTURE = Path(__file__).resolve().parents[1] / "docs" / "paper" / "finite_time.
 
 
 def let_go(sheet: Datasheet, q: Fraction, start: float, u_max: float) -> np.ndarray:
-    """Rows (N, 4) of t [s] and Eq. (7)'s x1 [rad s], x2 [rad], x3 [rad/s] of a loop that is let go at x2 = start [rad]."""
+    """Rows (N, 4) of t [s] and Eq. (7)'s x1 [rad s], x2 [rad], x3 [rad/s] of a loop that is let go at x2 = start
+    [rad].
+    """
     law = CONTROLLERS["ftrc"](Servo.of(sheet), RATE, u_max, gains=Gains(q=q), filter_s=0.0)
     t = np.arange(round(SECONDS * RATE)) / RATE
     home = law.servo.theta_0 + 0.2
     law.reset(home - start)
     plant = build_plant(sheet)
-    run = close(law, sampled(plant, RATE, (home - start, 0.0)), Sensor((), t), Reference("rest", t, np.full(t.size, home), 0 * t, 0 * t), plant.terminal)
+    run = close(
+        law,
+        sampled(plant, RATE, (home - start, 0.0)),
+        Sensor((), t),
+        Reference("rest", t, np.full(t.size, home), 0 * t, 0 * t),
+        plant.terminal,
+    )
     x2 = home - run.theta
     return np.column_stack([t, np.cumsum(x2) / RATE, x2, -run.omega])
 
@@ -57,21 +66,37 @@ def main() -> None:
     bare = replace(sheet, parameters={**sheet.parameters, "F_c": 0.0, "T_LH": 0.0})
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.8, 6.6), layout="constrained")
-        for row, (name, plant, u_max) in zip(figure.subplots(2, 3), (("Eq. (5), 24 V", sheet, 24.0), ("no friction, preload, limit", bare, 1e9)), strict=True):
+        for row, (name, plant, u_max) in zip(
+            figure.subplots(2, 3),
+            (("Eq. (5), 24 V", sheet, 24.0), ("no friction, preload, limit", bare, 1e9)),
+            strict=True,
+        ):
             portrait, fall, approach = row
-            print(f"{name}\n  {'q':>6} {'start [deg]':>12} {'to 0.1 [ms]':>12} {'to 0.005 [ms]':>13} {'V_3 grows in':>13} {'by at most':>11}")
+            print(
+                f"{name}\n  {'q':>6} {'start [deg]':>12} {'to 0.1 [ms]':>12} {'to 0.005 [ms]':>13} {'V_3 grows in':>13}"
+                f" {'by at most':>11}"
+            )
             for q, colour in POWERS:
                 for start in STARTS_DEG:
                     rows = let_go(plant, q, math.radians(start), u_max)
                     V = np.array([lyapunov(Gains(q=q), *x) for x in rows[::EVERY, 1:]])
                     growth = np.diff(V) / V[0]
-                    print(f"  {str(q):>6} {start:12g} {1e3 * within(rows, 0.1):12.1f} {1e3 * within(rows, 0.005):13.1f} {np.mean(growth > GROWTH):13.1%} {max(growth.max(), 0):11.2g}")
+                    print(
+                        f"  {str(q):>6} {start:12g} {1e3 * within(rows, 0.1):12.1f} {1e3 * within(rows, 0.005):13.1f}"
+                        f" {np.mean(growth > GROWTH):13.1%} {max(growth.max(), 0):11.2g}"
+                    )
                     portrait.plot(np.degrees(rows[:, 2]), np.degrees(rows[:, 3]), color=colour, linewidth=1.1)
                     if start == STARTS_DEG[-1]:
                         fall.semilogy(1e3 * rows[::EVERY, 0], np.maximum(V, 1e-18), color=colour, label=f"q = {q}")
-                        approach.semilogy(1e3 * rows[:, 0], np.maximum(np.degrees(np.abs(rows[:, 2])), 1e-8), color=colour)
+                        approach.semilogy(
+                            1e3 * rows[:, 0], np.maximum(np.degrees(np.abs(rows[:, 2])), 1e-8), color=colour
+                        )
             portrait.set_title(name, color=INK)
-            for ax, x, y in ((portrait, "x2 [°]", "x3 [°/s]"), (fall, "time [ms]", "V_3"), (approach, "time [ms]", "|x2| [°]")):
+            for ax, x, y in (
+                (portrait, "x2 [°]", "x3 [°/s]"),
+                (fall, "time [ms]", "V_3"),
+                (approach, "time [ms]", "|x2| [°]"),
+            ):
                 ax.set_xlabel(x)
                 ax.set_ylabel(y)
             fall.legend()

@@ -1,8 +1,9 @@
 """Play in the MuJoCo plant, found again: `python analysis/gap_in_mujoco.py [--plants N] [--seed S]`.
-
-Servos with parameters scattered by 10 % and a rigid play of +-0.3 to 1 deg (gap joint, constant linkage) are recorded in MuJoCo with
-0.01 deg of noise: multisine and steps for training, a chirp held out. The diagnosis gets Table 1 as the datasheet and those
-recordings. Printed: what was named first, the size of the play, and MuJoCo's own held-out error with plant.xml's model over the noise floor.
+ Servos with parameters scattered by 10 % and a rigid play of +-0.3 to 1 deg (gap joint, constant linkage) are recorded
+in MuJoCo with
+0.01 deg of noise: multisine and steps for training, a chirp held out. The diagnosis gets Table 1 as the datasheet and
+those recordings. Printed: what was named first, the size of the play, and MuJoCo's own held-out error with plant.xml's
+model over the noise floor.
 """
 
 from __future__ import annotations
@@ -56,11 +57,18 @@ def main() -> None:
         named += first["effect"] == "backlash"
         errors.append(abs(found / gap - 1))
         ratios.append(ratio)
-        print(f"{k:2d} {first['effect']:20s} {[m['effect'] for m in document['missing'][1:]]} play {np.degrees(gap):.3f} deg found {np.degrees(found):.3f} deg "
-              f"({found / gap - 1:+.1%}), MuJoCo held out {np.degrees(fit['mujoco_heldout_rmse_before_rad']):.4f} -> "
-              f"{np.degrees(fit['mujoco_heldout_rmse_after_rad']):.4f} deg = {ratio:.2f} noise floors, {time.perf_counter() - begin:.0f} s", flush=True)
-    print(f"backlash first: {named} of {arguments.plants}; play within 15 %: {int(np.sum(np.array(errors) <= 0.15))} of {arguments.plants}; "
-          f"MuJoCo's held-out error over the noise floor, median: {np.median(ratios):.2f}")
+        print(
+            f"{k:2d} {first['effect']:20s} {[m['effect'] for m in document['missing'][1:]]} play {np.degrees(gap):.3f}"
+            f" deg found {np.degrees(found):.3f} deg ({found / gap - 1:+.1%}), MuJoCo held out"
+            f" {np.degrees(fit['mujoco_heldout_rmse_before_rad']):.4f} ->"
+            f" {np.degrees(fit['mujoco_heldout_rmse_after_rad']):.4f} deg = {ratio:.2f} noise floors,"
+            f" {time.perf_counter() - begin:.0f} s",
+            flush=True,
+        )
+    print(
+        f"backlash first: {named} of {arguments.plants}; play within 15 %: {int(np.sum(np.array(errors) <= 0.15))} of"
+        f" {arguments.plants}; MuJoCo's held-out error over the noise floor, median: {np.median(ratios):.2f}"
+    )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""Can gravity be told from a constant torque? `python analysis/gravity_tie.py CASE [CASE ...]`, each a folder with rec*.csv and datasheet.toml.
-
-Selects effects as `ers diagnose` does and, where one of TIED is among them, fits each of these in its place from all its starts, to the floor of its valley.
-Prints C of each: two that lie within one of each other, the recordings do not tell apart.
+"""Can gravity be told from a constant torque? `python analysis/gravity_tie.py CASE [CASE ...]`, each a folder with
+rec*.csv and datasheet.toml.
+ Selects effects as `ers diagnose` does and, where one of TIED is among them, fits each of these in its place from all
+its starts, to the floor of its valley. Prints C of each: two that lie within one of each other, the recordings do not
+tell apart.
 """
 
 import argparse
@@ -41,8 +42,14 @@ def costs(folder: Path) -> dict[str, float]:
     if selected is None:
         return {}
     less = model.without_effect(selected)
-    begun = {name: [*([dict(model.effects)[name]] if name == selected else []), *BY_NAME[name].starts(less.scales)] for name in TIED}
-    return {name: min(_floor(less.with_effect(name, p), found.traces, found.tau) for p in starts) for name, starts in begun.items()}
+    begun = {
+        name: [*([dict(model.effects)[name]] if name == selected else []), *BY_NAME[name].starts(less.scales)]
+        for name in TIED
+    }
+    return {
+        name: min(_floor(less.with_effect(name, p), found.traces, found.tau) for p in starts)
+        for name, starts in begun.items()
+    }
 
 
 def _floor(model, traces, tau) -> float:
@@ -58,4 +65,8 @@ if __name__ == "__main__":
         except InputError as error:
             print(f"gravity_tie: {error}", file=sys.stderr)
             sys.exit(2)
-        print(f"{case.name}  " + ("  ".join(f"{name} {cost:.2f}" for name, cost in told.items()) or "none of them is selected"), flush=True)
+        print(
+            f"{case.name}  "
+            + ("  ".join(f"{name} {cost:.2f}" for name, cost in told.items()) or "none of them is selected"),
+            flush=True,
+        )

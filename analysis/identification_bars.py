@@ -1,8 +1,11 @@
 """What the default method reaches: `python analysis/identification_bars.py --seed 11 --sets 200`.
 
-1. Table 2's plant, the package's multisine, 2 s at 1 kHz, no noise: ten random starts within [0.2, 3] x truth; simulations and largest relative error of the seven combinations.
-2. The same at 0.01 deg noise, one data set a seed: RMS error over the Cramer-Rao level at the truth, and how often the 95 % intervals hold the truth.
-3. With current (0.5 % noise of its range) and J known: errors of all letters, on the multisine and on an input chosen for B (steps of high speed).
+1. Table 2's plant, the package's multisine, 2 s at 1 kHz, no noise: ten random starts within [0.2, 3] x truth;
+    simulations and largest relative error of the seven combinations.
+2. The same at 0.01 deg noise, one data set a seed: RMS error over the Cramer-Rao level at the truth, and how often the
+    95 % intervals hold the truth.
+3. With current (0.5 % noise of its range) and J known: errors of all letters, on the multisine and on an input chosen
+    for B (steps of high speed).
 4. The same as 2. for Table 1's plant, 5 s.
 """
 
@@ -22,8 +25,29 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.recording import from_arrays
 from ers_mj.simulation import build_plant, simulate_recording
 
-TABLE_2 = Datasheet(parameters={"L": 0.003, "R": 1.2, "k_s": 0.08, "T_LH": 0.4, "F_c": 0.2, "J": 0.001, "B": 0.006, "K_t": 0.5, "K_e": 0.6, "theta_0": 0.0})
-TOLD = {"L/R": ("L", "R"), "k_s/J": ("k_s", "J"), "T_LH/J": ("T_LH", "J"), "F_c/J": ("F_c", "J"), "B/J": ("B", "J"), "K_t/(J R)": ("K_t", "J", "R"), "K_e": ("K_e",)}
+TABLE_2 = Datasheet(
+    parameters={
+        "L": 0.003,
+        "R": 1.2,
+        "k_s": 0.08,
+        "T_LH": 0.4,
+        "F_c": 0.2,
+        "J": 0.001,
+        "B": 0.006,
+        "K_t": 0.5,
+        "K_e": 0.6,
+        "theta_0": 0.0,
+    }
+)
+TOLD = {
+    "L/R": ("L", "R"),
+    "k_s/J": ("k_s", "J"),
+    "T_LH/J": ("T_LH", "J"),
+    "F_c/J": ("F_c", "J"),
+    "B/J": ("B", "J"),
+    "K_t/(J R)": ("K_t", "J", "R"),
+    "K_e": ("K_e",),
+}
 NOISE = math.radians(0.01)
 
 
@@ -35,7 +59,11 @@ def truth(sheet: Datasheet) -> dict[str, float]:
 
 def scattered(sheet: Datasheet, random: np.random.Generator, low: float, high: float) -> Datasheet:
     """The sheet with every letter but theta_0 and n drawn within [low, high] x its value."""
-    return Datasheet(parameters={k: v if k in ("theta_0", "n") else v * random.uniform(low, high) for k, v in sheet.parameters.items()})
+    return Datasheet(
+        parameters={
+            k: v if k in ("theta_0", "n") else v * random.uniform(low, high) for k, v in sheet.parameters.items()
+        }
+    )
 
 
 def box(sheet: Datasheet) -> dict[str, tuple[float, float]]:
@@ -57,8 +85,14 @@ def starts(seed: int, count: int = 10) -> None:
             rows = identify([rec], scattered(TABLE_2, random, 0.2, 3.0), Settings(bounds=box(TABLE_2), fixed=fixed))
             values = {row.name: row.value for row in rows.rows}
             used.append(rows.evaluations)
-            errors.append(max(abs(values[k] / v - 1.0) if values.get(k) is not None else math.inf for k, v in known.items()))
-        print(f"   theta_0 {'known' if fixed else 'sought too'}: error below 1e-6 in {sum(e < 1e-6 for e in errors)} of {count} (largest {max(errors):.1e}); simulations {sorted(used)}", flush=True)
+            errors.append(
+                max(abs(values[k] / v - 1.0) if values.get(k) is not None else math.inf for k, v in known.items())
+            )
+        print(
+            f"   theta_0 {'known' if fixed else 'sought too'}: error below 1e-6 in {sum(e < 1e-6 for e in errors)} of"
+            f" {count} (largest {max(errors):.1e}); simulations {sorted(used)}",
+            flush=True,
+        )
 
 
 def cramer_rao(sheet: Datasheet, t: np.ndarray, u: np.ndarray) -> dict[str, float]:
@@ -69,7 +103,11 @@ def cramer_rao(sheet: Datasheet, t: np.ndarray, u: np.ndarray) -> dict[str, floa
 
     def angle(z):
         told = {name: v * math.exp(x) for (name, v), x in zip(truth(sheet).items(), z)}
-        letters = {**held, **{TOLD[name][0]: told[name] * math.prod(held[x] for x in TOLD[name][1:]) for name in names}, "theta_0": p["theta_0"] + z[-1]}
+        letters = {
+            **held,
+            **{TOLD[name][0]: told[name] * math.prod(held[x] for x in TOLD[name][1:]) for name in names},
+            "theta_0": p["theta_0"] + z[-1],
+        }
         return build_plant(Datasheet(parameters=letters), inductance=True).simulate(t, u, (p["theta_0"], 0.0)).theta
 
     slopes = central(angle, np.zeros(len(names) + 1), 1e-5) / NOISE
@@ -79,10 +117,17 @@ def cramer_rao(sheet: Datasheet, t: np.ndarray, u: np.ndarray) -> dict[str, floa
 def many(title: str, sheet: Datasheet, duration: float, sets: int, seed: int) -> None:
     t = np.arange(round(1000 * duration)) / 1e3
     u, known, random = INPUTS["multisine"](t), truth(sheet), np.random.default_rng(seed)
-    level, errors, held, missing = cramer_rao(sheet, t, u), {k: [] for k in known}, {k: [] for k in known}, {k: 0 for k in known}
+    level, errors, held, missing = (
+        cramer_rao(sheet, t, u),
+        {k: [] for k in known},
+        {k: [] for k in known},
+        {k: 0 for k in known},
+    )
     begin = time.process_time()
     for k in range(sets):
-        found = identify([record(sheet, t, u, NOISE, seed * 10_000 + k)], scattered(sheet, random, 0.6, 1.6), Settings(seed=k))
+        found = identify(
+            [record(sheet, t, u, NOISE, seed * 10_000 + k)], scattered(sheet, random, 0.6, 1.6), Settings(seed=k)
+        )
         rows = {row.name: row for row in found.rows}
         for name, value in known.items():
             row = rows.get(name)
@@ -91,11 +136,16 @@ def many(title: str, sheet: Datasheet, duration: float, sets: int, seed: int) ->
                 continue
             errors[name].append(row.value / value - 1.0)
             held[name].append(row.ci95[0] <= value <= row.ci95[1])
-    print(f"{title}: {sets} data sets, noise 0.01 deg, starts within [0.6, 1.6] x truth, {(time.process_time() - begin) / sets:.2f} s of one processor each")
+    print(
+        f"{title}: {sets} data sets, noise 0.01 deg, starts within [0.6, 1.6] x truth,"
+        f" {(time.process_time() - begin) / sets:.2f} s of one processor each"
+    )
     print(f"   {'':12}{'Cramer-Rao %':>14}{'RMS error %':>14}{'ratio':>8}{'covered %':>11}{'not told':>10}")
     for name in known:
         rms = float(np.sqrt(np.mean(np.square(errors[name]))))
-        print(f"   {name:12}{100 * level[name]:14.3f}{100 * rms:14.3f}{rms / level[name]:8.2f}{100 * np.mean(held[name]):11.1f}{missing[name]:10d}")
+        print(
+            f"   {name:12}{100 * level[name]:14.3f}{100 * rms:14.3f}{rms / level[name]:8.2f}{100 * np.mean(held[name]):11.1f}{missing[name]:10d}"
+        )
     print(f"   all together{'':37}{100 * np.mean(np.concatenate(list(held.values()))):11.1f}", flush=True)
 
 
@@ -106,9 +156,16 @@ def fast_steps(t: np.ndarray) -> np.ndarray:
 
 
 def current(seed: int) -> None:
-    print("3. with current and J known: errors in per cent, 10 s, angle noise 0.01 deg, current noise 0.5 % of its largest, starts within [0.6, 1.6] x truth")
-    for title, sheet, wave in (("Table 2, multisine", TABLE_2, INPUTS["multisine"]), ("Table 2, steps of 12 V", TABLE_2, fast_steps),
-                               ("Table 1, multisine", read_datasheet("table1"), INPUTS["multisine"]), ("Table 1, steps of 12 V", read_datasheet("table1"), fast_steps)):
+    print(
+        "3. with current and J known: errors in per cent, 10 s, angle noise 0.01 deg, current noise 0.5 % of its"
+        " largest, starts within [0.6, 1.6] x truth"
+    )
+    for title, sheet, wave in (
+        ("Table 2, multisine", TABLE_2, INPUTS["multisine"]),
+        ("Table 2, steps of 12 V", TABLE_2, fast_steps),
+        ("Table 1, multisine", read_datasheet("table1"), INPUTS["multisine"]),
+        ("Table 1, steps of 12 V", read_datasheet("table1"), fast_steps),
+    ):
         t, random, p = np.arange(10_000) / 1e3, np.random.default_rng(seed), sheet.parameters
         u = wave(t)
         i = build_plant(sheet, inductance=True).simulate(t, u).drive * p["J"] / (p.get("n", 1.0) * p["K_t"])
@@ -120,7 +177,10 @@ def current(seed: int) -> None:
                 if row.name in p and row.name not in ("J", "theta_0", "n"):
                     error = math.inf if row.value is None else 100 * abs(row.value / p[row.name] - 1)
                     worst[row.name] = max(worst.get(row.name, 0.0), error)
-        print(f"   {title:24}" + "  ".join(f"{name} {error:.2f}" for name, error in worst.items()) + "   (worst of 5)", flush=True)
+        print(
+            f"   {title:24}" + "  ".join(f"{name} {error:.2f}" for name, error in worst.items()) + "   (worst of 5)",
+            flush=True,
+        )
 
 
 def main() -> None:

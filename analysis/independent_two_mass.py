@@ -1,8 +1,7 @@
 """Two masses with a rigid play between them, by an implicit scheme that shares nothing with the package's plants.
-
-Motor side (share rho of the inertia J, driven) and rudder (the rest, with spring, damping and set-valued friction F_c and
-preload T_LH) meet inelastically at +-gap. Each step solves for the speeds at its end: friction, preload and contact are
-inclusions in them, so that nothing is regularised and nothing sticks out of the play.
+ Motor side (share rho of the inertia J, driven) and rudder (the rest, with spring, damping and set-valued friction F_c
+and preload T_LH) meet inelastically at +-gap. Each step solves for the speeds at its end: friction, preload and contact
+are inclusions in them, so that nothing is regularised and nothing sticks out of the play.
 """
 
 import math
@@ -13,7 +12,9 @@ from numba import njit
 
 @njit(cache=False)
 def _speed(inertia, damping, stiffness, push, theta, rest, h, friction, preload):
-    """w that solves inertia w + h (damping + h stiffness) w + h friction Sgn(w) + h preload Sgn(theta + h w - rest) = push."""
+    """w that solves inertia w + h (damping + h stiffness) w + h friction Sgn(w) + h preload Sgn(theta + h w - rest) =
+    push.
+    """
     slope = inertia + h * (damping + h * stiffness)
     corner = (rest - theta) / h
     for side in (-1.0, 1.0):
@@ -67,14 +68,29 @@ def _run(J, rho, B, k_s, T_LH, F_c, rest, torque_per_volt, emf, tau, gap, t, u, 
 def simulate(parameters, gap, rho, t, u, *, inductance=False, substeps=2000):
     """Rudder angle (N,) [rad] of Table 1's letters with a play of +-gap [rad], from rest at theta_0.
 
-    ``rho`` is the motor side's share of J; all damping and friction are the rudder's. ``substeps`` a sample: 2000 at 1 kHz
-    are 5e-7 s, at which halving the step moves theta by less than 1e-3 deg RMS.
+    ``rho`` is the motor side's share of J; all damping and friction are the rudder's. ``substeps`` a sample: 2000 at 1
+    kHz are 5e-7 s, at which halving the step moves theta by less than 1e-3 deg RMS.
     """
     p = parameters
     torque = p["n"] * p["K_t"] / p["R"]
     out = np.empty((len(t), 2))
-    _run(p["J"], rho, p["B"], p["k_s"], p["T_LH"], p["F_c"], p["theta_0"], torque, torque * p["n"] * p["K_e"],
-         p["L"] / p["R"] if inductance else 0.0, gap, np.asarray(t, float), np.asarray(u, float), substeps, out)
+    _run(
+        p["J"],
+        rho,
+        p["B"],
+        p["k_s"],
+        p["T_LH"],
+        p["F_c"],
+        p["theta_0"],
+        torque,
+        torque * p["n"] * p["K_e"],
+        p["L"] / p["R"] if inductance else 0.0,
+        gap,
+        np.asarray(t, float),
+        np.asarray(u, float),
+        substeps,
+        out,
+    )
     if not math.isfinite(out[-1, 0]):
         raise ValueError("the reference runs away")
     return out[:, 0]

@@ -1,9 +1,9 @@
 """How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
-
-Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits every effect whose secant
-promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of race.py open. Prints the largest gain in C of each servo, whether
-no other law is offered nearly as much (ranking.stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that evaluation.paired_p
-assumes.
+ Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits
+every effect whose secant promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of
+race.py open. Prints the largest gain in C of each servo, whether no other law is offered nearly as much
+(ranking.stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that
+evaluation.paired_p assumes.
 """
 
 import argparse
@@ -25,7 +25,9 @@ from ers_mj.traces import trace_of  # noqa: E402
 
 
 def largest_gain(folder):
-    """(gain in C, name) of the best effect on the recordings of a folder, whether it stands alone, and what the worst block is off by."""
+    """(gain in C, name) of the best effect on the recordings of a folder, whether it stands alone, and what the worst
+    block is off by.
+    """
     sheet = read_datasheet(str(folder / "datasheet.toml"))
     traces = [trace_of(read_recording(str(path)), sheet.parameters["J"]) for path in sorted(folder.glob("rec*.csv"))]
     start = baseline(traces, sheet, True)
@@ -44,13 +46,33 @@ if __name__ == "__main__":
     screening.LEAST_PROMISE, selection.LEAST_GAIN, reviews.LEAST_GAIN, selection.MOST_ROUNDS = 0.0, 0.0, 0.0, 1
     gains, lone, worst = [], [], []
     with tempfile.TemporaryDirectory() as folder:
-        make_cases(["--out", folder, "--seed", str(options.seed), "--cases", str(options.cases), "--kind", "none", "--coloured", "0.5", "--no-refit"])
+        make_cases(
+            [
+                "--out",
+                folder,
+                "--seed",
+                str(options.seed),
+                "--cases",
+                str(options.cases),
+                "--kind",
+                "none",
+                "--coloured",
+                "0.5",
+                "--no-refit",
+            ]
+        )
         for case in sorted(Path(folder).glob("case-*")):
             gain, name, alone, block = largest_gain(case)
             gains.append(max(gain, 0.0))
             lone.append(alone)
             worst.append(block)
-            print(f"{case.name}  {gain:6.2f}  {name:32}  {'alone' if alone else '':5}  worst block {block:6.2f}", flush=True)
-    print(f"{len(gains)} servos: mean {np.mean(gains):.2f}, 90 % {np.quantile(gains, 0.9):.2f}, largest {np.max(gains):.2f}; alone {sum(lone)}, of those that gain 1 or more "
-          f"{sum(a for a, gain in zip(lone, gains) if gain >= 1.0)} of {sum(gain >= 1.0 for gain in gains)}; "
-          f"worst blocks: median {np.median(worst):.2f}, 90 % {np.quantile(worst, 0.9):.2f}, largest {np.max(worst):.2f}")
+            print(
+                f"{case.name}  {gain:6.2f}  {name:32}  {'alone' if alone else '':5}  worst block {block:6.2f}",
+                flush=True,
+            )
+    print(
+        f"{len(gains)} servos: mean {np.mean(gains):.2f}, 90 % {np.quantile(gains, 0.9):.2f}, largest"
+        f" {np.max(gains):.2f}; alone {sum(lone)}, of those that gain 1 or more"
+        f" {sum(a for a, gain in zip(lone, gains) if gain >= 1.0)} of {sum(gain >= 1.0 for gain in gains)}; worst"
+        f" blocks: median {np.median(worst):.2f}, 90 % {np.quantile(worst, 0.9):.2f}, largest {np.max(worst):.2f}"
+    )

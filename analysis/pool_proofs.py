@@ -1,7 +1,8 @@
-"""Pool finished proofs: `python analysis/pool_proofs.py FOLDER [FOLDER ...]`, each the --out of an `ers prove` of its own seed.
-
-Prints the table of `ers prove` over the cases of all of them, what is found of several by what an effect leaves by itself, which effects from outside the
-library are flagged (those apart that have a suspect's law, see ers_mj/mimics.py), and the time by kind of case.
+"""Pool finished proofs: `python analysis/pool_proofs.py FOLDER [FOLDER ...]`, each the --out of an `ers prove` of its
+own seed.
+ Prints the table of `ers prove` over the cases of all of them, what is found of several by what an effect leaves by
+itself, which effects from outside the library are flagged (those apart that have a suspect's law, see
+ers_mj/mimics.py), and the time by kind of case.
 """
 
 from __future__ import annotations
@@ -18,7 +19,12 @@ from ers_mj.proof_report import headline, table_of
 from ers_mj.proving.scoring import class_of, scored
 
 KINDS = ("null", "single", "several", "outside")
-LIKE_A_SUSPECT = ("angle_dependent_damping", "magnetic_saturation", "running_in", "tacho_eccentricity")  # laws of the generator that have a suspect's form
+LIKE_A_SUSPECT = (
+    "angle_dependent_damping",
+    "magnetic_saturation",
+    "running_in",
+    "tacho_eccentricity",
+)  # laws of the generator that have a suspect's form
 SIGMAS = ((0.0, 1.0), (1.0, 4.0), (4.0, float("inf")))
 
 
@@ -42,15 +48,26 @@ def told(proofs: Sequence[Mapping]) -> list[str]:
     lines = [headline(results), f"{len(rows)} cases of seeds {seeds}", ""]
     lines += [f"  {what:58}{count:>14}   {share}" for what, count, share in table_of(results)]
     lines += ["", "effects found, of several, by what they leave by themselves [sigma]"]
-    hits = [(v, class_of(label) in {class_of(name) for name in row["named"]}) for row in rows if row["kind"] == "several"
-            for label, v in row["each"].items() if v is not None]
+    hits = [
+        (v, class_of(label) in {class_of(name) for name in row["named"]})
+        for row in rows
+        if row["kind"] == "several"
+        for label, v in row["each"].items()
+        if v is not None
+    ]
     for low, high in SIGMAS:
         some = [hit for v, hit in hits if low <= v < high]
         lines.append(f"  {low:g} to {'more' if high > 1e9 else f'{high:g}':14}{sum(some):>4} of {len(some)}")
     lines += ["", "outside the library, flagged"]
-    flagged = [(row["labels"][0], row["verdict"] == "unexplained" or row["significant"]) for row in rows if row["kind"] == "outside"]
-    for what, some in (("kinds with a suspect's law", [hit for label, hit in flagged if label in LIKE_A_SUSPECT]),
-                       ("kinds without", [hit for label, hit in flagged if label not in LIKE_A_SUSPECT])):
+    flagged = [
+        (row["labels"][0], row["verdict"] == "unexplained" or row["significant"])
+        for row in rows
+        if row["kind"] == "outside"
+    ]
+    for what, some in (
+        ("kinds with a suspect's law", [hit for label, hit in flagged if label in LIKE_A_SUSPECT]),
+        ("kinds without", [hit for label, hit in flagged if label not in LIKE_A_SUSPECT]),
+    ):
         lines.append(f"  {what:28}{sum(some):>4} of {len(some)}")
     lines += ["", "time a case, of one processor [s]"]
     for kind in (*KINDS, "all"):
@@ -72,7 +89,9 @@ def _read(folders: Sequence[Path]) -> list[dict]:
         try:
             proof = json.loads((folder / "results.json").read_text())
         except (OSError, ValueError):
-            raise InputError(f"{folder}: a finished proof with a results.json was expected, `ers prove --out {folder}` makes one") from None
+            raise InputError(
+                f"{folder}: a finished proof with a results.json was expected, `ers prove --out {folder}` makes one"
+            ) from None
         if not isinstance(proof, dict) or not {"rows", "seed"} <= proof.keys() or "concealed_in_real" in proof:
             raise InputError(f"{folder}: its results.json is not that of a proof on simulated servos")
         if proof["seed"] in (other["seed"] for other in proofs):

@@ -1,8 +1,8 @@
 """Eq. (4) as the paper prints it against a gap joint: `python analysis/printed_play.py [--gap DEG] [--picture FILE]`.
-
-Table 1, voltages by name, three models: Eq. (5) without play, the gap joint (two bodies, the reduced model's), Eq. (4) around Eq. (5). Eq. (4)
-has a torque where an angle belongs, so its width is taken twice: as what the return spring pulls over the play, k_s gap, and as
-whatever brings it nearest to the gap joint, input by input. Printed: how far each is from the others, and what each does at rest.
+ Table 1, voltages by name, three models: Eq. (5) without play, the gap joint (two bodies, the reduced model's), Eq. (4)
+around Eq. (5). Eq. (4) has a torque where an angle belongs, so its width is taken twice: as what the return spring
+pulls over the play, k_s gap, and as whatever brings it nearest to the gap joint, input by input. Printed: how far each
+is from the others, and what each does at rest.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ def main() -> None:
     gap = np.radians(arguments.gap)
     c = lumped(read_datasheet("table1").to_lumped() | {"tau_e": 0.0})
     spring = printed_threshold(c, gap)
-    print(f"play +-{arguments.gap:g} deg; k_s gap = {1e3 * spring * J:.3g} mN m; deviations in deg RMS, n delta in mN m\n")
+    print(
+        f"play +-{arguments.gap:g} deg; k_s gap = {1e3 * spring * J:.3g} mN m; deviations in deg RMS, n delta in mN m\n"
+    )
     print(f"{'':10} {'without play':>14} {'Eq. (4), k_s gap':>17} {'Eq. (4), nearest':>17} {'its':>8}")
     print(f"{'':10} {'less gap joint':>14} {'less gap joint':>17} {'less gap joint':>17} {'n delta':>8}")
     for name, law in INPUTS.items():

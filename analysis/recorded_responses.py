@@ -1,7 +1,8 @@
-"""How near a recording's frequency response is to the linear model: `python analysis/recorded_responses.py --plants 8 --seed 90051`.
-
-Each servo is Table 1 without Coulomb friction and preload, its J, B, K_t, K_e, k_s and R scaled at random within --spread,
-log-uniform; 1 kHz, noise 0.01 deg. Printed by input and plant: the lines of coherence above 0.95, and the largest deviation at them over all servos (bar: 0.5 dB, 3 deg for the multisine).
+"""How near a recording's frequency response is to the linear model: `python analysis/recorded_responses.py --plants 8
+--seed 90051`.
+ Each servo is Table 1 without Coulomb friction and preload, its J, B, K_t, K_e, k_s and R scaled at random within
+--spread, log-uniform; 1 kHz, noise 0.01 deg. Printed by input and plant: the lines of coherence above 0.95, and the
+largest deviation at them over all servos (bar: 0.5 dB, 3 deg for the multisine).
 """
 
 from __future__ import annotations
@@ -31,8 +32,12 @@ def band_noise(t: np.ndarray) -> np.ndarray:
 
 
 CASES: tuple[tuple[str, Callable, float], ...] = (
-    ("multisine", INPUTS["multisine"], 10.0), ("multisine", INPUTS["multisine"], 30.0), ("chirp", INPUTS["chirp"], 10.0),
-    ("steps", INPUTS["steps"], 7.0), ("band noise", band_noise, 10.0))
+    ("multisine", INPUTS["multisine"], 10.0),
+    ("multisine", INPUTS["multisine"], 30.0),
+    ("chirp", INPUTS["chirp"], 10.0),
+    ("steps", INPUTS["steps"], 7.0),
+    ("band noise", band_noise, 10.0),
+)
 
 
 def compared(sheet: Datasheet, plant: str, u: Callable, duration: float, seed: int) -> tuple[Gap, int]:
@@ -53,16 +58,24 @@ def main() -> None:
     arguments = parser.parse_args()
     sheet, sheets = read_datasheet("table1"), []
     for k in range(arguments.plants):
-        factors = dict(zip(SCALED, arguments.spread ** np.random.default_rng(arguments.seed + k).uniform(-1, 1, len(SCALED)), strict=True))
+        factors = dict(
+            zip(
+                SCALED,
+                arguments.spread ** np.random.default_rng(arguments.seed + k).uniform(-1, 1, len(SCALED)),
+                strict=True,
+            )
+        )
         parameters = {key: x * factors.get(key, 1.0) for key, x in sheet.parameters.items()}
         sheets.append(replace(sheet, parameters={**parameters, "F_c": 0.0, "T_LH": 0.0}))
     for name, u, duration in CASES:
         for plant in ("reduced", "mujoco"):
             found = [compared(x, plant, u, duration, arguments.seed + k) for k, x in enumerate(sheets)]
-            print(f"{name:10} {duration:3g} s {plant:8} sure {sum(g.lines for g, _ in found)} of {sum(n for _, n in found)} lines, at most "
-                  f"{max(g.max_db for g, _ in found):.2f} dB {max(g.max_deg for g, _ in found):.2f} deg, "
-                  f"a gap told of {sum(g.linear for g, _ in found)} servos",
-                  flush=True)
+            print(
+                f"{name:10} {duration:3g} s {plant:8} sure {sum(g.lines for g, _ in found)} of"
+                f" {sum(n for _, n in found)} lines, at most {max(g.max_db for g, _ in found):.2f} dB"
+                f" {max(g.max_deg for g, _ in found):.2f} deg, a gap told of {sum(g.linear for g, _ in found)} servos",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
 """`ers watch` against its bars: how soon it finds a change, how soon it flags a play, and how often it flags nothing.
 
     python analysis/watch_bars.py --seed 1
-
-Streams of 1 kHz under the package's multisine, which is the persistent excitation of the bars (the named input, over and over), watched from Table 1's
-datasheet whatever the servo is. Reduced plant and MuJoCo; servos are Table 1's with J B K_t K_e k_s T_LH F_c R scattered within a factor --scatter. Noise
-0.01 deg where nothing else is said. A change of F_c by 20 % counts as found from when c_2 stays within 5 % of its new value; a play opens to +-0.5 deg. Times are
-counted from the change, and show the HOP of the estimates. "x real time" is over processor time, of one core.
+ Streams of 1 kHz under the package's multisine, which is the persistent excitation of the bars (the named input, over
+and over), watched from Table 1's datasheet whatever the servo is. Reduced plant and MuJoCo; servos are Table 1's with J
+B K_t K_e k_s T_LH F_c R scattered within a factor --scatter. Noise
+0.01 deg where nothing else is said. A change of F_c by 20 % counts as found from when c_2 stays within 5 % of its new
+value; a play opens to +-0.5 deg. Times are counted from the change, and show the HOP of the estimates. "x real time" is
+over processor time, of one core.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ STEP, GAP, NEAR = 0.2, math.radians(0.5), 0.05
 Part = tuple[float, Datasheet, float]  # seconds, servo, half-width of its play [rad]
 
 
-def stream(parts: list[Part], plant: str, noise: float, random: np.random.Generator, named: str = "multisine") -> tuple[np.ndarray, ...]:
+def stream(
+    parts: list[Part], plant: str, noise: float, random: np.random.Generator, named: str = "multisine"
+) -> tuple[np.ndarray, ...]:
     """t, u, y (N,) of a servo that changes from part to part; angle and speed go on."""
     angles, inputs, state, at = [], [], None, 0
     for seconds, sheet, gap in parts:
@@ -74,8 +77,12 @@ def steps(plant: str, count: int, spread: float, random: np.random.Generator) ->
         told += any("c_2" in e.changed for e in found if e.t > at)
         raised += flags(found)
         speeds.append(speed)
-    print(f"F_c -+20 %, {plant:7} {count} streams: found after {np.median(seconds):.2f} s (median), {max(seconds):.2f} s (largest), within 1 s in "
-          f"{sum(s <= 1 for s in seconds)}; announced in {told}; flags {raised}; {np.median(speeds):.1f}x real time ({min(speeds):.1f} least)", flush=True)
+    print(
+        f"F_c -+20 %, {plant:7} {count} streams: found after {np.median(seconds):.2f} s (median), {max(seconds):.2f} s"
+        f" (largest), within 1 s in {sum(s <= 1 for s in seconds)}; announced in {told}; flags {raised};"
+        f" {np.median(speeds):.1f}x real time ({min(speeds):.1f} least)",
+        flush=True,
+    )
 
 
 def plays(plant: str, count: int, spread: float, random: np.random.Generator) -> None:
@@ -87,11 +94,17 @@ def plays(plant: str, count: int, spread: float, random: np.random.Generator) ->
         early += any(e.flag for e in found if e.t <= at)
         seconds.append(up[0] if up else math.inf)
         speeds.append(speed)
-    print(f"play opens, {plant:7} {count} streams: flagged in {sum(map(math.isfinite, seconds))}, after {np.median(seconds):.2f} s (median), {max(seconds):.2f} s "
-          f"(largest); flags before {early}; {np.median(speeds):.1f}x real time ({min(speeds):.1f} least)", flush=True)
+    print(
+        f"play opens, {plant:7} {count} streams: flagged in {sum(map(math.isfinite, seconds))}, after"
+        f" {np.median(seconds):.2f} s (median), {max(seconds):.2f} s (largest); flags before {early};"
+        f" {np.median(speeds):.1f}x real time ({min(speeds):.1f} least)",
+        flush=True,
+    )
 
 
-def nothing(plant: str, minutes: float, noise_deg: float, spread: float, random: np.random.Generator, named: str = "multisine") -> None:
+def nothing(
+    plant: str, minutes: float, noise_deg: float, spread: float, random: np.random.Generator, named: str = "multisine"
+) -> None:
     raised, announced, worst, speeds, errors, left = 0, 0, [], [], [], minutes * 60
     while left > 1:
         seconds, sheet = min(100.0, left), servo(spread, random)
@@ -101,22 +114,32 @@ def nothing(plant: str, minutes: float, noise_deg: float, spread: float, random:
         worst.append(max(e.misfit for e in settled))
         errors += [e.values["c_2"] / sheet.to_lumped()["c_2"] - 1 for e in settled]
         speeds.append(speed)
-    print(f"unchanged, {plant:7} {named:9} {minutes:4.1f} min, noise {noise_deg:g} deg: flags {raised}, changes announced {announced}, largest misfit {max(worst):.2f} "
-          f"(median over streams {np.median(worst):.2f}), RMS error of c_2 {100 * np.sqrt(np.mean(np.square(errors))):.2f} %, {np.median(speeds):.1f}x real time "
-          f"({min(speeds):.1f} least)", flush=True)
+    print(
+        f"unchanged, {plant:7} {named:9} {minutes:4.1f} min, noise {noise_deg:g} deg: flags {raised}, changes announced"
+        f" {announced}, largest misfit {max(worst):.2f} (median over streams {np.median(worst):.2f}), RMS error of c_2"
+        f" {100 * np.sqrt(np.mean(np.square(errors))):.2f} %, {np.median(speeds):.1f}x real time ({min(speeds):.1f}"
+        " least)",
+        flush=True,
+    )
 
 
 def drifting(spread: float, random: np.random.Generator) -> None:
     """F_c swings by 30 % with a period of 60 s, in parts of 0.1 s."""
     sheet = servo(spread, random)
     share = lambda t: 1 + 0.3 * np.sin(2 * np.pi * t / 60)  # noqa: E731
-    found, speed = watched(*stream([(0.1, changed(sheet, share(k / 10)), 0.0) for k in range(1200)], "reduced", NOISE, random))
+    found, speed = watched(
+        *stream([(0.1, changed(sheet, share(k / 10)), 0.0) for k in range(1200)], "reduced", NOISE, random)
+    )
     c_2 = sheet.to_lumped()["c_2"]
     at = lambda lag: [e.values["c_2"] / c_2 - share(e.t - lag) for e in found if e.t > 5]  # noqa: E731
     lags = np.arange(0, 3, 0.1)
     left = [np.sqrt(np.mean(np.square(at(lag)))) for lag in lags]
-    print(f"drift of F_c by +-30 %, period 60 s, 120 s: RMS error of c_2 {100 * left[0]:.2f} %, of which a lag of {lags[int(np.argmin(left))]:.1f} s explains all but "
-          f"{100 * min(left):.2f} %; flags {flags(found)}; {speed:.1f}x real time", flush=True)
+    print(
+        f"drift of F_c by +-30 %, period 60 s, 120 s: RMS error of c_2 {100 * left[0]:.2f} %, of which a lag of"
+        f" {lags[int(np.argmin(left))]:.1f} s explains all but {100 * min(left):.2f} %; flags {flags(found)};"
+        f" {speed:.1f}x real time",
+        flush=True,
+    )
 
 
 def servo(spread: float, random: np.random.Generator) -> Datasheet:
@@ -127,8 +150,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scatter", type=float, default=1.25)
-    parser.add_argument("--streams", type=int, default=30, help="of each kind of change on the reduced plant; a third in MuJoCo")
-    parser.add_argument("--minutes", type=float, default=30.0, help="unchanged, reduced; a sixth in MuJoCo and at each other noise level and input")
+    parser.add_argument(
+        "--streams", type=int, default=30, help="of each kind of change on the reduced plant; a third in MuJoCo"
+    )
+    parser.add_argument(
+        "--minutes",
+        type=float,
+        default=30.0,
+        help="unchanged, reduced; a sixth in MuJoCo and at each other noise level and input",
+    )
     arguments = parser.parse_args()
     random, spread = np.random.default_rng(arguments.seed), arguments.scatter
     for plant, count in (("reduced", arguments.streams), ("mujoco", -(-arguments.streams // 3))):

@@ -1,7 +1,6 @@
 """What to record next: the input, or the further channel, that would settle what the recordings at hand leave open.
-
-Where explanations are left, the input under which they differ most after a refit (design.py); where none is, the one that narrows
-the intervals of what was named. Everything is simulated within the limits that the recordings show.
+ Where explanations are left, the input under which they differ most after a refit (design.py); where none is, the one
+that narrows the intervals of what was named. Everything is simulated within the limits that the recordings show.
 """
 
 from __future__ import annotations
@@ -12,7 +11,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ers_mj.design import CHANNELS, DESIGN_RATE, SETTLED, VAGUE, Bench, Check, Design, Explanation, Pair, chances, channels, checked, designed, solved
+from ers_mj.design import (
+    CHANNELS,
+    DESIGN_RATE,
+    SETTLED,
+    VAGUE,
+    Bench,
+    Check,
+    Design,
+    Explanation,
+    Pair,
+    chances,
+    channels,
+    checked,
+    designed,
+    solved,
+)
 from ers_mj.effects import BY_NAME
 from ers_mj.excitation import GENTLE, SHARES, Limits, excitations
 from ers_mj.identification import Fit, step_of, tau_of
@@ -21,19 +35,30 @@ from ers_mj.traces import Blocks, Trace
 
 RIVALS = 2  # explanations beside the leader that an input is designed against, the most probable first
 PATIENCE = 10  # recordings of one kind that nobody wants to make more than
-NESTED = 0.5  # share of what is left one way, below which what is left the other way shows that one explanation contains the other
+# share of what is left one way, below which what is left the other way shows that one explanation contains the other
+NESTED = 0.5
 NOISY = 4.0  # median misfit from which what the answer leaves is no longer the noise
 WIDER = 1.0  # of the travel seen, that is asked for at either end where the travel seen does not do
-CALLED = {"i_A": "the current (i_A)", "theta_m_rad": "the motor's angle (theta_m_rad)", "vin_V": "the supply voltage (vin_V)"}
+CALLED = {
+    "i_A": "the current (i_A)",
+    "theta_m_rad": "the motor's angle (theta_m_rad)",
+    "vin_V": "the supply voltage (vin_V)",
+}
 WORTH = 0.95  # of today's interval: one that stays wider is not worth a recording of its own
 SEEN = 0.5  # share of VAGUE below which a number counts as seen at all: what no recording shows may not be there
-WIDEST = 0.1  # step of the differences at most, which are as wide as a number is unknown: stick and slip that fork make no slope
+# step of the differences at most, which are as wide as a number is unknown: stick and slip that fork make no slope
+WIDEST = 0.1
 FORKED = 1.0  # of C that a model may leave of its own recording, on noise
 LOOSE = ("emf_share", "tau_e")  # numbers of the baseline that a datasheet knows better than any recording of the output
 
 
-def next_recording(leader: tuple[str, Fit], rivals: Sequence[tuple[str, Fit, float]], traces: Sequence[Trace],
-                   input_unit: str, output_unit: str) -> dict:
+def next_recording(
+    leader: tuple[str, Fit],
+    rivals: Sequence[tuple[str, Fit, float]],
+    traces: Sequence[Trace],
+    input_unit: str,
+    output_unit: str,
+) -> dict:
     """{"sentence", "excitation", "separates", "expected_sigmas", "channel", "checked"}: what would settle most.
 
     ``expected_sigmas`` belongs to the rival that differs least: sqrt(2 C) of what remains after its refit.
@@ -45,8 +70,12 @@ def next_recording(leader: tuple[str, Fit], rivals: Sequence[tuple[str, Fit, flo
         input_unit, output_unit: of u and of the output.
     """
     values, level = leader[1].model.values, max(float(np.median(leader[1].misfit)), 1.0)
-    bench = Bench(Limits.of(traces, values["a_1"] > 0 or values["c_1"] > 0), float(np.median([t.sigma for t in traces])), level,
-                  tau_of(leader[1].misfit))
+    bench = Bench(
+        Limits.of(traces, values["a_1"] > 0 or values["c_1"] > 0),
+        float(np.median([t.sigma for t in traces])),
+        level,
+        tau_of(leader[1].misfit),
+    )
     first, units = Explanation.of(*leader), {"input_unit": input_unit, "output_unit": output_unit}
     others = sorted((r for r in rivals if not _once(r[1].model)), key=lambda r: -r[2])[:RIVALS]
     if not others or _once(leader[1].model):
@@ -67,28 +96,56 @@ def _to_separate(leader: Explanation, others: Sequence[Explanation], bench: Benc
     best = designed(pairs, bench)
     if best is None:
         names = [_plain(e.name) for e in (leader, *others)]
-        return {"sentence": f"No input was found that keeps the rig within its travel and could tell {_listed(names)} apart.", "excitation": {},
-                "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": {"simulations": bench.simulations}}
+        return {
+            "sentence": (
+                f"No input was found that keeps the rig within its travel and could tell {_listed(names)} apart."
+            ),
+            "excitation": {},
+            "separates": [],
+            "expected_sigmas": 0.0,
+            "channel": None,
+            "checked": {"simulations": bench.simulations},
+        }
     told = {o.name: _told(pair, check, best.excitation, bench) for o, pair, check in zip(others, pairs, best.checks)}
     separated = [name for name, c in told.items() if c["recordings_needed"]]
     hopeless = {o.name: pair for o, pair in zip(others, pairs) if o.name not in separated}
     channel = _best_channel(told)
-    wide = {name: found for name, pair in hopeless.items() if not told[name]["nested"] and (found := _with_wider_travel(pair, bench))} if channel is None else {}
+    wide = (
+        {
+            name: found
+            for name, pair in hopeless.items()
+            if not told[name]["nested"] and (found := _with_wider_travel(pair, bench))
+        }
+        if channel is None
+        else {}
+    )
     chosen = {**best.excitation, **units}
-    words = _said(leader.name, told, channel, chosen, best.tried, "the noise" if bench.level < NOISY else "what the answer itself leaves")
+    words = _said(
+        leader.name,
+        told,
+        channel,
+        chosen,
+        best.tried,
+        "the noise" if bench.level < NOISY else "what the answer itself leaves",
+    )
     if channel is None:
         words += _widened(leader.name, [*hopeless], wide, bench.limits, units)
-    return {"sentence": " ".join(words), "excitation": chosen if separated or channel else {},
-            "separates": [leader.name, *separated] if separated else [], "expected_sigmas": math.sqrt(2 * max(best.cost, 0.0)),
-            "channel": channel, "with_wider_travel": {name: {**found.excitation, **units} for name, found in wide.items()},
-            "checked": {"against": told, "under": chosen, "tried": best.tried, "simulations": bench.simulations}}
+    return {
+        "sentence": " ".join(words),
+        "excitation": chosen if separated or channel else {},
+        "separates": [leader.name, *separated] if separated else [],
+        "expected_sigmas": math.sqrt(2 * max(best.cost, 0.0)),
+        "channel": channel,
+        "with_wider_travel": {name: {**found.excitation, **units} for name, found in wide.items()},
+        "checked": {"against": told, "under": chosen, "tried": best.tried, "simulations": bench.simulations},
+    }
 
 
 def _told(pair: Pair, there: Check, excitation: dict, bench: Bench) -> dict:
     """What is told of one rival: both ways, and with further channels.
 
-    Where the richer of the two passes for the plainer one (``nested``), what is left the other way is what its further numbers, as they were
-    fitted, would show. Unless one recording settles that, they are taken for chance.
+    Where the richer of the two passes for the plainer one (``nested``), what is left the other way is what its further
+    numbers, as they were fitted, would show. Unless one recording settles that, they are taken for chance.
     """
     back = checked(Pair(pair.answer, pair.rig), excitation, bench)
     nested = back is not None and pair.rig.z.size > pair.answer.z.size and back.cost < NESTED * there.cost
@@ -96,16 +153,28 @@ def _told(pair: Pair, there: Check, excitation: dict, bench: Bench) -> dict:
     costs = chances(pair, there, slopes, bench)
     low, middle, high = (float(c) for c in np.quantile(costs, (0.1, 0.5, 0.9)))
     needed = math.ceil(SETTLED / max(min(there.cost, middle), 1e-9))
-    return {"played_by": pair.rig.name, "cost": there.cost, "sigmas": there.sigmas, "rms_sigma": there.rms,
-            "rms_over_left": there.rms / math.sqrt(bench.level), "probability_of_wrong": 1.0 / (1.0 + math.exp(min(max(there.cost, 0.0), 700.0))),
-            "cost_range": [low, high], "cost_of_forks": there.forked, "chance_of_settling": float(np.mean(costs > SETTLED)), "cost_on_noise": there.noisy,
-            "cost_the_other_way": back.cost if back else None, "nested": nested,
-            "recordings_needed": needed if needed <= (1 if nested else PATIENCE) else None,
-            "channels_sigmas": channels(pair, there, slopes, bench) if there.cost < SETTLED else {}}
+    return {
+        "played_by": pair.rig.name,
+        "cost": there.cost,
+        "sigmas": there.sigmas,
+        "rms_sigma": there.rms,
+        "rms_over_left": there.rms / math.sqrt(bench.level),
+        "probability_of_wrong": 1.0 / (1.0 + math.exp(min(max(there.cost, 0.0), 700.0))),
+        "cost_range": [low, high],
+        "cost_of_forks": there.forked,
+        "chance_of_settling": float(np.mean(costs > SETTLED)),
+        "cost_on_noise": there.noisy,
+        "cost_the_other_way": back.cost if back else None,
+        "nested": nested,
+        "recordings_needed": needed if needed <= (1 if nested else PATIENCE) else None,
+        "channels_sigmas": channels(pair, there, slopes, bench) if there.cost < SETTLED else {},
+    }
 
 
 def _best_channel(told: Mapping[str, Mapping]) -> str | None:
-    """The channel that leaves most between the rivals that the angle alone does not tell apart; None where none does or none is needed."""
+    """The channel that leaves most between the rivals that the angle alone does not tell apart; None where none does or
+    none is needed.
+    """
     weak = [c for c in told.values() if c["cost"] < SETTLED]
     if not weak:
         return None
@@ -154,66 +223,112 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
         if best:
             break
     if best is None:
-        return {"sentence": "No other explanation is left, and no input was found that keeps the rig within its travel and would tell more.", "excitation": {},
-                "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": {"tried": tried, "simulations": bench.simulations}}
+        return {
+            "sentence": (
+                "No other explanation is left, and no input was found that keeps the rig within its travel and would"
+                " tell more."
+            ),
+            "excitation": {},
+            "separates": [],
+            "expected_sigmas": 0.0,
+            "channel": None,
+            "checked": {"tried": tried, "simulations": bench.simulations},
+        }
     ratios = {leader.layout[i].name: float(a / b) for i, a, b in zip(wanted, best[1], before)}
     weakest = leader.layout[wanted[int(np.argmin(best[1] / before))]]
     chosen, checked = {**best[0], **units}, {"interval_ratio": ratios, "tried": tried, "simulations": bench.simulations}
     whose = f"{weakest.name} of the {_plain(weakest.owner)}" if weakest.owner != "base" else weakest.name
-    sentence = f"No other explanation is left to tell apart. {asked(chosen)} It would narrow the interval of {whose} to {ratios[weakest.name]:.0%} of today's."
+    sentence = (
+        f"No other explanation is left to tell apart. {asked(chosen)} It would narrow the interval of {whose} to"
+        f" {ratios[weakest.name]:.0%} of today's."
+    )
     if ratios[weakest.name] > WORTH:
-        sentence, chosen = (f"No other explanation is left to tell apart, and none of {tried} inputs within the limits of these recordings would narrow "
-                            "an interval by much: another recording of the same kind would confirm this one."), {}
-    return {"sentence": sentence, "excitation": chosen, "separates": [], "expected_sigmas": 0.0, "channel": None, "checked": checked}
+        sentence, chosen = (
+            (
+                f"No other explanation is left to tell apart, and none of {tried} inputs within the limits of these"
+                " recordings would narrow an interval by much: another recording of the same kind would confirm this"
+                " one."
+            ),
+            {},
+        )
+    return {
+        "sentence": sentence,
+        "excitation": chosen,
+        "separates": [],
+        "expected_sigmas": 0.0,
+        "channel": None,
+        "checked": checked,
+    }
 
 
 def _spreads(curvature: np.ndarray, wanted: Sequence[int]) -> np.ndarray:
     """Standard deviations of the wanted numbers where all of them are fitted."""
-    return np.sqrt(np.maximum([solved(curvature, row)[i] for i, row in zip(wanted, np.eye(curvature.shape[0])[wanted])], 1e-300))
+    return np.sqrt(
+        np.maximum([solved(curvature, row)[i] for i, row in zip(wanted, np.eye(curvature.shape[0])[wanted])], 1e-300)
+    )
 
 
 # -- words ------------------------------------------------------------------------------------------------------------
 
 
-def _said(leader: str, told: Mapping[str, Mapping], channel: str | None, excitation: Mapping, tried: int, unit: str) -> list[str]:
+def _said(
+    leader: str, told: Mapping[str, Mapping], channel: str | None, excitation: Mapping, tried: int, unit: str
+) -> list[str]:
     """What to record, what it would settle, and what it would not, in sentences."""
     hopeful = [n for n, c in told.items() if c["recordings_needed"]]
     never = [n for n in told if n not in hopeful]
     words = [asked(excitation)] if hopeful else []
     for n in hopeful:
         c = told[n]
-        then = (f"one of them would keep less than 5 %, with a chance of {min(c['chance_of_settling'], 0.99):.0%}" if c["recordings_needed"] == 1
-                else f"{c['recordings_needed']} such recordings would be needed to settle it")
-        words.append(f"After a refit {_plain(leader)} and {_plain(n)} still differ there by {c['rms_over_left']:.2g} times {unit}, "
-                     f"{c['sigmas']:.2g} sigmas: {then}.")
+        then = (
+            f"one of them would keep less than 5 %, with a chance of {min(c['chance_of_settling'], 0.99):.0%}"
+            if c["recordings_needed"] == 1
+            else f"{c['recordings_needed']} such recordings would be needed to settle it"
+        )
+        words.append(
+            f"After a refit {_plain(leader)} and {_plain(n)} still differ there by {c['rms_over_left']:.2g} times"
+            f" {unit}, {c['sigmas']:.2g} sigmas: {then}."
+        )
         if c["nested"]:
             rich, plain = (leader, n) if c["played_by"] == leader else (n, leader)
             words.append(f"Should it be {_plain(plain)}, though, {_plain(rich)} can still pass for it.")
     if never:
         left = max(told[n]["rms_over_left"] for n in never)
-        words.append(f"No input within the limits of these recordings ({tried} simulated) tells {_listed(map(_plain, (leader, *never)))} apart by "
-                     f"the output alone: after a refit {left:.1g} times {unit} is left.")
+        words.append(
+            f"No input within the limits of these recordings ({tried} simulated) tells"
+            f" {_listed(map(_plain, (leader, *never)))} apart by the output alone: after a refit {left:.1g} times"
+            f" {unit} is left."
+        )
     if channel:
         sigmas = min(c["channels_sigmas"][channel] for c in told.values() if c["cost"] < SETTLED)
-        words.append(f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas." + ("" if hopeful else f" {asked(excitation)}"))
+        words.append(
+            f"Recording {CALLED[channel]} as well would, at {sigmas:.2g} sigmas."
+            + ("" if hopeful else f" {asked(excitation)}")
+        )
     elif most := [max(told[n]["channels_sigmas"].values()) for n in never if told[n]["channels_sigmas"]]:
         words.append(f"Nor would {_listed(CALLED.values(), 'or')}, {max(most):.1g} sigmas at most.")
     return words
 
 
-def _widened(leader: str, hopeless: Sequence[str], wide: Mapping[str, Design], limits: Limits, units: Mapping[str, str]) -> list[str]:
+def _widened(
+    leader: str, hopeless: Sequence[str], wide: Mapping[str, Design], limits: Limits, units: Mapping[str, str]
+) -> list[str]:
     """What more travel would do for whom, and what is left where nothing does."""
     more = WIDER * (limits.high - limits.low)
     low, high = (_in_degrees(x, units["output_unit"]) for x in (limits.low - more, limits.high + more))
     words = []
     for name, found in wide.items():
         wish = asked({**found.excitation, **units})
-        words.append(f"If the rig bears a travel from {low} to {high}: {wish[0].lower()}{wish[1:-1]}, which would tell {_plain(leader)} and "
-                     f"{_plain(name)} apart at {math.sqrt(2 * found.cost):.2g} sigmas.")
+        words.append(
+            f"If the rig bears a travel from {low} to {high}: {wish[0].lower()}{wish[1:-1]}, which would tell"
+            f" {_plain(leader)} and {_plain(name)} apart at {math.sqrt(2 * found.cost):.2g} sigmas."
+        )
     if stuck := [name for name in hopeless if name not in wide]:
         at_load = all(BY_NAME[name].subsystem == "load" for name in (leader, *stuck) if name in BY_NAME)
-        words.append(f"Only a change of the rig can tell {_listed(map(_plain, (leader, *stuck)))} apart"
-                     + (", such as taking the load off or turning it over." if at_load else "."))
+        words.append(
+            f"Only a change of the rig can tell {_listed(map(_plain, (leader, *stuck)))} apart"
+            + (", such as taking the load off or turning it over." if at_load else ".")
+        )
     return words
 
 
@@ -225,11 +340,18 @@ def asked(excitation: Mapping) -> str:
     """The excitation as an order."""
     e, unit = excitation, excitation["input_unit"]
     about = f" about {e['offset']:.3g} {unit}" if e["offset"] else ""
-    how = {"multisine": "a multisine from {from_hz:.3g} to {to_hz:.3g} Hz", "chirp": "a chirp from {from_hz:.3g} to {to_hz:.3g} Hz",
-           "square": "a square of growing amplitude with a period of {period_s:.3g} s",
-           "triangle": "slow triangles of growing amplitude with a period of {period_s:.3g} s", "steps": "steps held for {hold_s:.3g} s each",
-           "push_and_release": "pushes of {push_s:.3g} s either way, growing, with {rest_s:.3g} s of rest between them"}[e["kind"]]
-    return f"Record {how.format(**e)}, up to {e['amplitude']:.3g} {unit}{about}, for {e['duration_s']:.3g} s at {e['rate_hz']:.4g} Hz."
+    how = {
+        "multisine": "a multisine from {from_hz:.3g} to {to_hz:.3g} Hz",
+        "chirp": "a chirp from {from_hz:.3g} to {to_hz:.3g} Hz",
+        "square": "a square of growing amplitude with a period of {period_s:.3g} s",
+        "triangle": "slow triangles of growing amplitude with a period of {period_s:.3g} s",
+        "steps": "steps held for {hold_s:.3g} s each",
+        "push_and_release": "pushes of {push_s:.3g} s either way, growing, with {rest_s:.3g} s of rest between them",
+    }[e["kind"]]
+    return (
+        f"Record {how.format(**e)}, up to {e['amplitude']:.3g} {unit}{about}, for {e['duration_s']:.3g} s at"
+        f" {e['rate_hz']:.4g} Hz."
+    )
 
 
 def _plain(name: str) -> str:

@@ -1,4 +1,6 @@
-"""The baseline: Eq. (1) where the datasheet gives L, else Eq. (5), its identifiable parameters refitted to the recordings."""
+"""The baseline: Eq. (1) where the datasheet gives L, else Eq. (5), its identifiable parameters refitted to the
+recordings.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +23,20 @@ SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's:
 OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
 OPENING_TAU = 1e3  # and the misfit at which its cost turns to logarithms
 STARTS = 6  # guesses that are refitted
-OPENED = {"preload": STARTS, "spring": 2, "bare": 2}  # of these in a search that is only opened, in which the first has the most terms
+OPENED = {
+    "preload": STARTS,
+    "spring": 2,
+    "bare": 2,
+}  # of these in a search that is only opened, in which the first has the most terms
 BEHIND = 0.25  # of C per block, by which a kind is too far behind to be finished
 SPRINGS = {"bare": (), "spring": ("a_1",), "preload": ("a_1", "c_1")}
 VALLEY = 10.0  # of C by which two fits differ that ended in different valleys
-FEWEST_COGS = 3  # a turn of a motor: the least common multiple of its poles and slots, of which the smallest motors have two and three
-OVER_INERTIA, INERTIAS = ("a_1", "a_2", "b", "c_1", "c_2", "ampere"), (0.6, 0.7, 0.8, 1.2, 1.4, 1.8)  # what the inertia divides, and how it is tried beside what was found
+# a turn of a motor: the least common multiple of its poles and slots, of which the smallest motors have two and three
+FEWEST_COGS = 3
+OVER_INERTIA, INERTIAS = (
+    ("a_1", "a_2", "b", "c_1", "c_2", "ampere"),
+    (0.6, 0.7, 0.8, 1.2, 1.4, 1.8),
+)  # what the inertia divides, and how it is tried beside what was found
 SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
 
 Scaffolds = tuple[tuple[str, ...], ...]
@@ -40,19 +50,30 @@ def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bo
     speeds = np.concatenate([np.abs(t.y[k:] - t.y[:-k]) / (k * t.sample_time) for t, k in zip(traces, lags)])
     peak = max(float(np.max(np.abs(t.u))) for t in traces)
     supplies = [t.supply for t in traces if t.supply is not None]
-    return Scales(position=0.5 * (high - low), low=low, high=high, speed=float(np.nanquantile(speeds, 0.95)) + 1e-12,
-                  acceleration=max(values.get("c_2", 0.0), 0.05 * abs(values["b"]) * peak), input=peak,
-                  sample_time=float(np.median([t.sample_time for t in traces])),
-                  noise=float(np.median([t.sigma for t in traces])), quantum=max(t.quantum for t in traces),
-                  is_angle=is_angle, tau_e_datasheet=tau_e, duration=max(float(t.t[-1] - t.t[0]) for t in traces),
-                  recordings=len(traces), supply=float(np.median(np.concatenate(supplies))) if supplies else None)
+    return Scales(
+        position=0.5 * (high - low),
+        low=low,
+        high=high,
+        speed=float(np.nanquantile(speeds, 0.95)) + 1e-12,
+        acceleration=max(values.get("c_2", 0.0), 0.05 * abs(values["b"]) * peak),
+        input=peak,
+        sample_time=float(np.median([t.sample_time for t in traces])),
+        noise=float(np.median([t.sigma for t in traces])),
+        quantum=max(t.quantum for t in traces),
+        is_angle=is_angle,
+        tau_e_datasheet=tau_e,
+        duration=max(float(t.t[-1] - t.t[0]) for t in traces),
+        recordings=len(traces),
+        supply=float(np.median(np.concatenate(supplies))) if supplies else None,
+    )
 
 
 @dataclass(frozen=True)
 class Start:
     """The refitted baseline, the traces with their fitted initial states, and other values that fits may start from.
 
-    A refitted baseline has swallowed what it could of a missing effect; the datasheet's values, or those found under a scaffold, have not.
+    A refitted baseline has swallowed what it could of a missing effect; the datasheet's values, or those found under a
+    scaffold, have not.
     """
 
     fit: Fit
@@ -74,7 +95,10 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
     else:
         found = _from_scratch(traces, known, is_angle, jobs)
     if not np.isfinite(found.fit.cost):
-        raise InputError("no motion that the reduced model can make resembles these recordings: check units and signs of input and output")
+        raise InputError(
+            "no motion that the reduced model can make resembles these recordings: check units and signs of input and"
+            " output"
+        )
     model, gear = found.fit.model, datasheet.parameters.get("n") if datasheet is not None else None
     drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, found.traces, OBSERVER_RATE).motions)
     scales = replace(model.scales, drive=drive, cog=2 * np.pi / (FEWEST_COGS * gear) if gear else model.scales.cog)
@@ -82,9 +106,9 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
 
 
 def sharpened(start: Start, travel: float) -> Start:
-    """The baseline refitted to what coarse converters tell (see converter.py), where some are coarse for the travel [output unit]: their thresholds
-    sharpen a fit that is near, and lead one astray that is not. The inertia, which divides all of Eq. (6)'s letters but the angle, is what they tell least,
-    so it is tried larger and smaller too.
+    """The baseline refitted to what coarse converters tell (see converter.py), where some are coarse for the travel
+    [output unit]: their thresholds sharpen a fit that is near, and lead one astray that is not. The inertia, which
+    divides all of Eq. (6)'s letters but the angle, is what they tell least, so it is tried larger and smaller too.
     """
     traces = counted(start.traces, travel)
     if all(t.converter is None for t in traces):
@@ -92,14 +116,21 @@ def sharpened(start: Start, travel: float) -> Start:
     traces = with_starts(start.fit.model, traces)
     found = fit(start.fit.model, traces)
     tau, values = tau_of(found.misfit), found.model.values
-    inert = [replace(found.model, values={**values, **{name: values[name] / ratio for name in OVER_INERTIA}}) for ratio in INERTIAS]
-    found = min([fit(found.model, traces, tau=tau), *(fit(model, traces, tau=tau, steps=20) for model in inert)], key=lambda found: found.cost)
+    inert = [
+        replace(found.model, values={**values, **{name: values[name] / ratio for name in OVER_INERTIA}})
+        for ratio in INERTIAS
+    ]
+    found = min(
+        [fit(found.model, traces, tau=tau), *(fit(model, traces, tau=tau, steps=20) for model in inert)],
+        key=lambda found: found.cost,
+    )
     traces = with_starts(found.model, traces)
     return replace(start, fit=fit(found.model, traces, tau=tau_of(found.misfit)), traces=traces)
 
 
 def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:
-    """Eq. (6)'s letters from recordings alone, with the springs that these support: near enough for a search to begin, not refined.
+    """Eq. (6)'s letters from recordings alone, with the springs that these support: near enough for a search to begin,
+    not refined.
 
     What was found with more terms opens the searches with fewer; a search that is far behind is not finished.
     """
@@ -112,17 +143,27 @@ def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:
         tries = [descend(model, traces, OPENING_RATES[0], OPENING_TAU, 6, 1.0) for model in models[:count]]
         best[kind] = min(tries, key=lambda found: found.cost)
     level = min(found.cost for found in best.values()) + BEHIND * best["bare"].misfit.size
-    finished = {kind: fit(found.model, traces, rate=OPENING_RATES[1], steps=10) for kind, found in best.items() if found.cost <= level}
+    finished = {
+        kind: fit(found.model, traces, rate=OPENING_RATES[1], steps=10)
+        for kind, found in best.items()
+        if found.cost <= level
+    }
     return dict(_simplest(finished).model.values)
 
 
-def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace], list[Mapping[str, float]]]:
-    """Fit, with the initial states fitted before and after; the traces with these, and the values of another valley if it was met.
+def _refined(
+    model: Model, traces: Sequence[Trace], jobs: int
+) -> tuple[Fit, Sequence[Trace], list[Mapping[str, float]]]:
+    """Fit, with the initial states fitted before and after; the traces with these, and the values of another valley if
+    it was met.
 
-    From afar tangents and finite differences may lead to different valleys. The lower one is the baseline, the other may be the less bent.
+    From afar tangents and finite differences may lead to different valleys. The lower one is the baseline, the other
+    may be the less bent.
     """
     traces = with_starts(model, traces)
-    first, second = sorted((fit(model, traces, by_tangents=by_tangents) for by_tangents in (True, False)), key=lambda found: found.cost)
+    first, second = sorted(
+        (fit(model, traces, by_tangents=by_tangents) for by_tangents in (True, False)), key=lambda found: found.cost
+    )
     traces = with_starts(first.model, without_spikes(first.model, traces))
     found = fit(first.model, traces, tau=tau_of(first.misfit))
     others = [dict(second.model.values)] if second.cost - found.cost > VALLEY else []
@@ -138,10 +179,18 @@ def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angl
 
 
 def _free(values: Mapping[str, float], traces: Sequence[Trace]) -> tuple[str, ...]:
-    """What is fitted: springs only where there is one, the back-EMF's share only where current or an open circuit shows it."""
+    """What is fitted: springs only where there is one, the back-EMF's share only where current or an open circuit shows
+    it.
+    """
     spring, preload = values["a_1"] > 0, values["c_1"] > 0
-    names = ["a_2", "b", "c_2", *(["a_1"] if spring else []), *(["c_1"] if preload else []),
-             *(["theta_0"] if spring or preload else [])]
+    names = [
+        "a_2",
+        "b",
+        "c_2",
+        *(["a_1"] if spring else []),
+        *(["c_1"] if preload else []),
+        *(["theta_0"] if spring or preload else []),
+    ]
     opened = any(t.enable is not None and not t.enable.all() for t in traces)
     if values["tau_e"] > 0:
         names.append("tau_e")
@@ -163,14 +212,19 @@ def _ampere(b: float, traces: Sequence[Trace]) -> float:
 
 
 def _priors(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    return {"emf_share": (math.log(values["emf_share"]), SHARE_PRIOR)} if values["tau_e"] > 0 and values["emf_share"] > 0 else {}
+    return (
+        {"emf_share": (math.log(values["emf_share"]), SHARE_PRIOR)}
+        if values["tau_e"] > 0 and values["emf_share"] > 0
+        else {}
+    )
 
 
 def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, jobs: int) -> Start:
     """Several guesses, refitted as observers of falling gain; the simplest structure that the data supports.
 
-    Stops and one-sided friction disturb the search most, so both are tried as a scaffold that is taken away at the end: a spring
-    must beat one-sided friction to be kept, and what was found under the scaffold stays as an anchor for later fits.
+    Stops and one-sided friction disturb the search most, so both are tried as a scaffold that is taken away at the end:
+    a spring must beat one-sided friction to be kept, and what was found under the scaffold stays as an anchor for later
+    fits.
     """
     chosen = _structured(traces, known, is_angle, ((), ("end_stop",), ("asymmetric_friction",)), ((), ("end_stop",)))
     scales = scales_of(traces, chosen.model.values, is_angle, None)
@@ -178,16 +232,24 @@ def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle:
     return Start(found, traces, (*((dict(chosen.model.values),) if chosen.model.effects else ()), *others))
 
 
-def _structured(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, bare: Scaffolds, sprung: Scaffolds) -> Fit:
-    """The fit from guesses alone without springs, with a spring or with a preload beside it, whichever is the simplest that the data supports.
+def _structured(
+    traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, bare: Scaffolds, sprung: Scaffolds
+) -> Fit:
+    """The fit from guesses alone without springs, with a spring or with a preload beside it, whichever is the simplest
+    that the data supports.
 
     ``bare`` and ``sprung`` are the scaffolds, names of effects, under which a search without and with springs is tried.
     """
     kinds = _Kinds.of(traces, known, is_angle)
     scales = kinds.scales
-    at = {"end_stop": BY_NAME["end_stop"].starts(scales)[-1], "asymmetric_friction": BY_NAME["asymmetric_friction"].starts(scales)[0]}
+    at = {
+        "end_stop": BY_NAME["end_stop"].starts(scales)[-1],
+        "asymmetric_friction": BY_NAME["asymmetric_friction"].starts(scales)[0],
+    }
     bare, sprung = ([tuple((name, at[name]) for name in names) for names in scaffolds] for scaffolds in (bare, sprung))
-    return _simplest({kind: _searched(traces, kinds, kind, sprung if springs else bare) for kind, springs in SPRINGS.items()})
+    return _simplest(
+        {kind: _searched(traces, kinds, kind, sprung if springs else bare) for kind, springs in SPRINGS.items()}
+    )
 
 
 def _simplest(found: Mapping[str, Fit]) -> Fit:
@@ -221,9 +283,15 @@ class _Kinds:
             raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
         opened = any(t.enable is not None and not t.enable.all() for t in traces)
         shown = opened or any(c.kind == "current" for t in traces for c in t.channels)
-        starts = [{"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known} for g in guesses(traces)]
+        starts = [
+            {"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known}
+            for g in guesses(traces)
+        ]
         if not starts:
-            raise InputError("the output nowhere moves for long enough to guess parameters from it: a longer or livelier recording, or a datasheet, was expected")
+            raise InputError(
+                "the output nowhere moves for long enough to guess parameters from it: a longer or livelier recording,"
+                " or a datasheet, was expected"
+            )
         return cls(starts, scales_of(traces, starts[0], is_angle, None))
 
     def prepared(self, kind: str, values: Mapping[str, float]) -> dict[str, float]:
@@ -241,7 +309,9 @@ class _Kinds:
 
 
 def _searched(traces: Sequence[Trace], kinds: _Kinds, kind: str, scaffolds: Sequence[tuple]) -> Fit:
-    """The best of the guesses with these spring terms, under the scaffold that serves it best, of the two that open best."""
+    """The best of the guesses with these spring terms, under the scaffold that serves it best, of the two that open
+    best.
+    """
     tries = []
     for values in kinds.places(kind):
         for effects in scaffolds:

@@ -1,6 +1,6 @@
 """What the paper claims of its law, beside what these trials measured.
 
-    trials -> one sentence; and, where a claim's case was run, the claim, what was measured, and whether it holds
+trials -> one sentence; and, where a claim's case was run, the claim, what was measured, and whether it holds
 """
 
 from __future__ import annotations
@@ -13,12 +13,19 @@ from ers_mj.measures import Measures
 from ers_mj.trial import Trial
 
 LAW, FAIR, RIVALS = "ftrc", "pid-ff", ("pid", "hinf")
-SOON, LITTLE, BETTER, STEADIER = 0.1, 3.0, 0.7, 0.5  # [s], [%], shares: the paper's bars of settling, overshoot, accuracy, steady-state error
+SOON, LITTLE, BETTER, STEADIER = (
+    0.1,
+    3.0,
+    0.7,
+    0.5,
+)  # [s], [%], shares: the paper's bars of settling, overshoot, accuracy, steady-state error
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim, the case it was tried on, what was measured (plant by plant), and whether it holds on all; None where it is no yes or no."""
+    """A claim, the case it was tried on, what was measured (plant by plant), and whether it holds on all; None where it
+    is no yes or no.
+    """
 
     claim: str
     case: str
@@ -60,8 +67,15 @@ def claims(trials: Sequence[Trial]) -> list[Claim]:
         ran = {t.controller: t.measures for t in trials if (t.case, t.plant) == (case, plant) and t.measures.stable}
         for claim, text, holds in _of(case, ran) if LAW in ran else ():
             found.setdefault((claim, case), []).append((plant, text, holds))
-    return [Claim(claim, case, "; ".join(f"{plant}: {text}" for plant, text, _ in told), None if told[0][2] is None else all(h for _, _, h in told))
-            for (claim, case), told in found.items()]
+    return [
+        Claim(
+            claim,
+            case,
+            "; ".join(f"{plant}: {text}" for plant, text, _ in told),
+            None if told[0][2] is None else all(h for _, _, h in told),
+        )
+        for (claim, case), told in found.items()
+    ]
 
 
 def _of(case: str, ran: Mapping[str, Measures]) -> Iterator[tuple[str, str, bool | None]]:
@@ -73,12 +87,24 @@ def _of(case: str, ran: Mapping[str, Measures]) -> Iterator[tuple[str, str, bool
         yield "overshoots by less than 3 %", f"{law.overshoot_pct:.2f} %", law.overshoot_pct < LITTLE
     for name in RIVALS:
         if name in ran:
-            yield f"error at least 70 % below that of {name}", _against(law, ran[name]), law.rmse_rad <= (1.0 - BETTER) * ran[name].rmse_rad
+            yield (
+                f"error at least 70 % below that of {name}",
+                _against(law, ran[name]),
+                law.rmse_rad <= (1.0 - BETTER) * ran[name].rmse_rad,
+            )
             if case in ("square", "ramp"):
                 less = law.steady_state_error_rad <= (1.0 - STEADIER) * ran[name].steady_state_error_rad
-                yield f"steady-state error at least 50 % below that of {name}", _against(law, ran[name], "steady_state_error_rad"), less
+                yield (
+                    f"steady-state error at least 50 % below that of {name}",
+                    _against(law, ran[name], "steady_state_error_rad"),
+                    less,
+                )
             if case == "square" and law.energy_J is not None:
-                yield f"takes less energy than {name}", f"{law.energy_J:.1f} J against {ran[name].energy_J:.1f} J", law.energy_J < ran[name].energy_J
+                yield (
+                    f"takes less energy than {name}",
+                    f"{law.energy_J:.1f} J against {ran[name].energy_J:.1f} J",
+                    law.energy_J < ran[name].energy_J,
+                )
     if FAIR in ran:
         yield "not claimed: error beside PID with the same feed-forward", _against(law, ran[FAIR]), None
 

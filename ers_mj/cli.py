@@ -8,7 +8,9 @@ import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy comes: threads are for recordings and effects, not for small matrices
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # before numpy comes: threads are for recordings and effects, not for small matrices
 
 from ers_mj import __version__
 from ers_mj.commands import COMMANDS

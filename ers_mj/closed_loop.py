@@ -1,9 +1,8 @@
 """A controller and a plant in a loop, sample by sample.
 
     reference, measurement -> controller -> saturation -> plant for one sample -> sensor -> measurement
-
-The measurement is taken just before the voltage changes, and the voltage that follows from it acts from the same instant on; a dead time is an effect
-(``input_delay``) of the plant.
+ The measurement is taken just before the voltage changes, and the voltage that follows from it acts from the same
+instant on; a dead time is an effect (``input_delay``) of the plant.
 """
 
 from __future__ import annotations
@@ -39,8 +38,9 @@ class Sampled(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a loop did, each (N,): the rudder's angle [rad] and speed [rad/s], what was measured of it [rad], the voltage [V], and the drive's
-    acceleration [rad/s^2] at the beginning and at the end of each sample. NaN from where the loop was given up."""
+    """What a loop did, each (N,): the rudder's angle [rad] and speed [rad/s], what was measured of it [rad], the
+    voltage [V], and the drive's acceleration [rad/s^2] at the beginning and at the end of each sample. NaN from where
+    the loop was given up."""
 
     reference: Reference
     theta: np.ndarray
@@ -68,7 +68,9 @@ class Sensor:
 
     def __init__(self, effects: Sequence[tuple[str, np.ndarray]], t: np.ndarray, noise: float = 0.0, seed: int = 0):
         touching = [(BY_NAME[name], p) for name, p in effects if BY_NAME[name].subsystem == "sensor"]
-        self._before = [(effect, p) for effect, p in touching if effect.name not in AFTER_NOISE and effect.name != "sensor_lag"]
+        self._before = [
+            (effect, p) for effect, p in touching if effect.name not in AFTER_NOISE and effect.name != "sensor_lag"
+        ]
         self._lags = [p for effect, p in touching if effect.name == "sensor_lag"]
         self._after = [(effect, p) for effect, p in touching if effect.name == "sensor_quantisation"]
         self._wires = [(effect, p) for effect, p in touching if effect.name == "sensor_dropout"]

@@ -21,7 +21,9 @@ from ers_mj.traces import START, Blocks, Trace
 LARGEST_P = 0.05  # held-out p-value up to which an effect is confirmed
 SURE_P = 1e-3  # up to which it is beyond doubt
 CLEAR = 3.0  # noise levels of free-run error above which a halved error confirms an effect by itself
-WORSE = 1.3  # times the raw error that an effect which only recalibration confirms, or blocks beyond doubt, may make of it
+WORSE = (
+    1.3  # times the raw error that an effect which only recalibration confirms, or blocks beyond doubt, may make of it
+)
 HALF = 0.5  # share of the squared error that must go
 MANY = 10  # periods that a wave's fit is begun from, from which on one of them fits what is left by chance
 EDGE = 0.1  # [s] at either end of a recording, in which few samples bear a knock
@@ -31,7 +33,8 @@ EDGE = 0.1  # [s] at either end of a recording, in which few samples bear a knoc
 class Confirmed:
     """What held-out data says: scores before and after, without each effect, and the p-value of each effect.
 
-    ``shown`` are the scores before and after with the noise of what was held out, by halves where an effect was judged so.
+    ``shown`` are the scores before and after with the noise of what was held out, by halves where an effect was judged
+    so.
     """
 
     before: list[Score]
@@ -67,13 +70,26 @@ def confirmed(start: Start, selection: Selection, held: list[Trace], jobs: int) 
                 if (chance := _p_of(name, *halved, name in alone)) < LARGEST_P:
                     p[name], pairs[name] = chance, halved
                     by_halves.add(record)
-        failed = [n for n in model.names if (p[n] > LARGEST_P or _no_closer(*pairs[n], p[n]))
-                  and not _halves(pooled(after), without[n], parts)
-                  and not (pooled(after).rmse <= WORSE * without[n].rmse and _helps_recalibrated(after_models, lesser_models[n], parts))
-                  or _may_be_none(n, model, start.traces, selection.tau) or _is_a_converters(n, model, start.traces) or _is_any_wave(n, model, *pairs[n])]
+        failed = [
+            n
+            for n in model.names
+            if (p[n] > LARGEST_P or _no_closer(*pairs[n], p[n]))
+            and not _halves(pooled(after), without[n], parts)
+            and not (
+                pooled(after).rmse <= WORSE * without[n].rmse
+                and _helps_recalibrated(after_models, lesser_models[n], parts)
+            )
+            or _may_be_none(n, model, start.traces, selection.tau)
+            or _is_a_converters(n, model, start.traces)
+            or _is_any_wave(n, model, *pairs[n])
+        ]
         if not failed:
             before = _scores(base_models, parts)
-            shown = [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(before, after, parts) if fold.record not in by_halves]
+            shown = [
+                (b, a, fold.held_out.sure_noise)
+                for b, a, fold in zip(before, after, parts)
+                if fold.record not in by_halves
+            ]
             for record in sorted(by_halves):
                 cut = halves(start.traces, record)
                 ends = (_scores(refits(some, cut, selection.tau, jobs), cut) for some in (start.fit.model, model))
@@ -92,8 +108,9 @@ def _p_of(name: str, after: Sequence[Score], without: Sequence[Score], alone: bo
 def _no_closer(after: Sequence[Score], without: Sequence[Score], p: float) -> bool:
     """Whether an effect brings the free runs no closer.
 
-    Where its blocks leave no doubt, an error that forks of stick and slip make somewhat larger counts as closer, and so does one that falls in the
-    geometric mean of the recordings: one of them may teach so much that the others, without it, know the rest of the model badly.
+    Where its blocks leave no doubt, an error that forks of stick and slip make somewhat larger counts as closer, and so
+    does one that falls in the geometric mean of the recordings: one of them may teach so much that the others, without
+    it, know the rest of the model badly.
     """
     ratio = pooled(after).sure / pooled(without).sure
     if p >= SURE_P or ratio < WORSE:
@@ -102,14 +119,16 @@ def _no_closer(after: Sequence[Score], without: Sequence[Score], p: float) -> bo
 
 
 def delta_bic(name: str, model: Model, after: Score, without: Score) -> float:
-    """What an effect wins of held-out C, as a difference of BIC: twice the gain, less the logarithm of the number of blocks for each of its numbers."""
+    """What an effect wins of held-out C, as a difference of BIC: twice the gain, less the logarithm of the number of
+    blocks for each of its numbers.
+    """
     gain = float(np.sum(score(without.misfit, 1.0)) - np.sum(score(after.misfit, 1.0)))
     return 2.0 * gain - sum(np.isfinite(v) for v in dict(model.effects)[name]) * math.log(max(without.misfit.size, 2))
 
 
 def _is_any_wave(name: str, model: Model, after: Sequence[Score], without: Sequence[Score]) -> bool:
-    """Whether a wave whose period was looked for among MANY does not pay for its numbers: one of them fits any remainder a little, held out as well, since
-    the recordings are excited alike."""
+    """Whether a wave whose period was looked for among MANY does not pay for its numbers: one of them fits any
+    remainder a little, held out as well, since the recordings are excited alike."""
     effect = BY_NAME[name]
     if effect.wave is None or sum(np.isfinite(start[effect.wave[1]]) for start in effect.starts(model.scales)) < MANY:
         return False
@@ -117,16 +136,21 @@ def _is_any_wave(name: str, model: Model, after: Sequence[Score], without: Seque
 
 
 def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -> bool:
-    """Whether what acts once acts at the edge of a recording, and the interval of its size holds zero: it bends to whatever few samples leave.
+    """Whether what acts once acts at the edge of a recording, and the interval of its size holds zero: it bends to
+    whatever few samples leave.
 
-    Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose. What begins while the start is
-    read or in the last moment is none.
+    Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose. What begins
+    while the start is read or in the last moment is none.
     """
     if not BY_NAME[name].once:
         return False
     columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
     begun, width, fade = (model.local[name][:, columns.index(column)] for column in ("t_0", "width", "fade"))
-    knocks = [(b - t.t[0], w, t.t[-1] - b) for b, w, t in zip(begun, np.fmin(width, fade), traces, strict=True) if np.isfinite(b)]
+    knocks = [
+        (b - t.t[0], w, t.t[-1] - b)
+        for b, w, t in zip(begun, np.fmin(width, fade), traces, strict=True)
+        if np.isfinite(b)
+    ]
     if any(before < START or left < START for before, _, left in knocks):
         return True
     if not any(before < EDGE or left - w < EDGE for before, w, left in knocks):
@@ -137,7 +161,9 @@ def _may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float) -
 
 
 def _is_a_converters(name: str, model: Model, traces: Sequence[Trace]) -> bool:
-    """Whether a sensor's error along the travel is within half a step of a converter that makes most of the noise: it is that converter's own."""
+    """Whether a sensor's error along the travel is within half a step of a converter that makes most of the noise: it
+    is that converter's own.
+    """
     if name != "sensor_nonlinearity" or not all(t.is_coarse for t in traces):
         return False
     y = np.concatenate([t.y[t.valid] for t in traces])
@@ -147,19 +173,25 @@ def _is_a_converters(name: str, model: Model, traces: Sequence[Trace]) -> bool:
     return float(np.max(np.abs(error))) < 0.5 * max(t.quantum for t in traces)
 
 
-def _halved(model: Model, less: Model, after: Sequence[Score], without: Sequence[Score], start: Start, tau: float,
-            jobs: int) -> tuple[int, list[Score], list[Score]]:
-    """A recording, and the scores with and without an effect where this one, which teaches most of it, is held out by halves: left out as a whole, it leaves little to learn the effect from.
+def _halved(
+    model: Model, less: Model, after: Sequence[Score], without: Sequence[Score], start: Start, tau: float, jobs: int
+) -> tuple[int, list[Score], list[Score]]:
+    """A recording, and the scores with and without an effect where this one, which teaches most of it, is held out by
+    halves: left out as a whole, it leaves little to learn the effect from.
 
     It is the one in which the effect's gain falls most from where all recordings were fitted to where the others were.
     """
     traces = list(start.traces)
-    fitted = [float(np.sum(score(_misfit(less, t, k), tau) - score(_misfit(model, t, k), tau))) for k, t in enumerate(traces)]
+    fitted = [
+        float(np.sum(score(_misfit(less, t, k), tau) - score(_misfit(model, t, k), tau))) for k, t in enumerate(traces)
+    ]
     held = [float(np.sum(score(b.misfit, tau) - score(a.misfit, tau))) for a, b in zip(after, without, strict=True)]
     record = int(np.argmax(np.subtract(fitted, held)))
     parts = halves(traces, record)
     within = (_scores(refits(some, parts, tau, jobs), parts) for some in (model, less))
-    with_it, without_it = ([*known[:record], *known[record + 1:], *new] for known, new in zip((list(after), list(without)), within))
+    with_it, without_it = (
+        [*known[:record], *known[record + 1 :], *new] for known, new in zip((list(after), list(without)), within)
+    )
     return record, with_it, without_it
 
 
@@ -172,21 +204,30 @@ def _without(name: str, model: Model, start: Start, tau: float) -> Fit:
 
 
 def _halves(after: Score, without: Score, parts: Sequence[Fold]) -> bool:
-    """Whether half of the squared free-run error above the noise goes, in a clear case, and the blocks speak for it on balance.
+    """Whether half of the squared free-run error above the noise goes, in a clear case, and the blocks speak for it on
+    balance.
 
-    An effect that one recording shows best is known less well without that recording: it helps there, and is not exact to the noise.
+    An effect that one recording shows best is known less well without that recording: it helps there, and is not exact
+    to the noise.
     """
     noise = float(np.mean([fold.held_out.sigma**2 for fold in parts]))
     above, left = without.rmse**2 - noise, after.rmse**2 - noise
-    return (without.rmse > CLEAR * math.sqrt(noise) and left < HALF * above
-            and float(np.sum(score(after.misfit, 1.0))) < float(np.sum(score(without.misfit, 1.0))))
+    return (
+        without.rmse > CLEAR * math.sqrt(noise)
+        and left < HALF * above
+        and float(np.sum(score(after.misfit, 1.0))) < float(np.sum(score(without.misfit, 1.0)))
+    )
 
 
 def _helps_recalibrated(models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold]) -> bool:
-    """Whether the models halve the squared error of recordings of another day once gain, offset and friction level of that day are known."""
+    """Whether the models halve the squared error of recordings of another day once gain, offset and friction level of
+    that day are known.
+    """
     if parts[0].training is not None:
         return False
-    after, before = (pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(some, parts)]).rmse for some in (models, lesser))
+    after, before = (
+        pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(some, parts)]).rmse for some in (models, lesser)
+    )
     return after**2 < HALF * before**2
 
 

@@ -2,9 +2,8 @@
 
     reading y (N,) in whole steps -> the angle lies within half a step of y, to the noise ahead of the converter
                                   -> between two thresholds passed the same way it goes nearly straight
-
-A deviation within half a step hardly counts; what is beyond counts by what the noise ahead makes of it. Taken as noise of q / sqrt(12), rounding would hide
-all that is smaller than a step.
+ A deviation within half a step hardly counts; what is beyond counts by what the noise ahead makes of it. Taken as noise
+of q / sqrt(12), rounding would hide all that is smaller than a step.
 """
 
 from __future__ import annotations
@@ -14,8 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-COARSE, FINE = 1 / 300, 1 / 1000  # share of the travel from which a step is an effect whatever its size, and up to which an ordinary one
-ORDINARY = math.radians(0.03)  # of a rudder's angle, the step of an ordinary converter at most: 12 bits over 120 degrees have 0.0293
+COARSE, FINE = (
+    1 / 300,
+    1 / 1000,
+)  # share of the travel from which a step is an effect whatever its size, and up to which an ordinary one
+ORDINARY = math.radians(
+    0.03
+)  # of a rudder's angle, the step of an ordinary converter at most: 12 bits over 120 degrees have 0.0293
 AHEAD = 0.05  # of a step, the least noise ahead of it: what a sample time, its lattice and a sensor's small errors make
 WITHIN = 0.1  # of the weight that a deviation has as noise, which it has within a step: hardly more than nothing
 STRAIGHT = 0.05  # [s] between two thresholds, up to which the way between is taken for straight
@@ -23,7 +27,9 @@ STRAIGHT = 0.05  # [s] between two thresholds, up to which the way between is ta
 
 @dataclass(frozen=True)
 class Converter:
-    """A converter of this ``step`` [output unit]: ``sigma`` is the reading's noise with rounding, ``ahead`` that without, at least AHEAD of a step."""
+    """A converter of this ``step`` [output unit]: ``sigma`` is the reading's noise with rounding, ``ahead`` that
+    without, at least AHEAD of a step.
+    """
 
     step: float
     sigma: float
@@ -39,7 +45,9 @@ class Converter:
 
     def weighed(self, deviation: np.ndarray) -> np.ndarray:
         """Deviations (N,) [output unit] in sigmas: steeper beyond half a step."""
-        return WITHIN * deviation / self.sigma + np.sign(deviation) * self.beyond(deviation) * (1.0 / self.sure_noise - WITHIN / self.sigma)
+        return WITHIN * deviation / self.sigma + np.sign(deviation) * self.beyond(deviation) * (
+            1.0 / self.sure_noise - WITHIN / self.sigma
+        )
 
     def slope(self, deviation: np.ndarray) -> np.ndarray:
         """Of ``weighed`` by the deviation, times sigma, (N,)."""
@@ -56,7 +64,9 @@ class Converter:
         return np.maximum(np.abs(deviation) - 0.5 * self.step, 0.0)
 
     def path(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """The way (N,) [output unit] from threshold to threshold of a reading y (N,); NaN where it is not known: it turned within a step, or rested."""
+        """The way (N,) [output unit] from threshold to threshold of a reading y (N,); NaN where it is not known: it
+        turned within a step, or rested.
+        """
         passed = thresholds(y)
         if passed.size < 2:
             return np.full(y.size, np.nan)

@@ -1,6 +1,6 @@
 """The main job: recordings in, the missing physics out.
-
-    traces -> baseline -> selection -> held-out confirmation -> localisation -> intervals -> document (diagnosis.json) and evidence
+ traces -> baseline -> selection -> held-out confirmation -> localisation -> intervals -> document (diagnosis.json) and
+evidence
 """
 
 from __future__ import annotations
@@ -27,13 +27,21 @@ from ers_mj.selection import select
 from ers_mj.traces import Trace, counted, trace_of
 
 FEWEST_LOST = 3  # dropouts from which a sensor is said to have them
-AT_BOUND = 0.95  # share of the most that the baseline allows of a known inductance, from which it may be more than an ordinary one
+# share of the most that the baseline allows of a known inductance, from which it may be more than an ordinary one
+AT_BOUND = 0.95
 
 Progress = Callable[[str, float], None]
 
 
-def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdout: Sequence[Recording] = (), *, seed: int = 0,
-             jobs: int | None = None, progress: Progress = lambda text, share: None) -> Diagnosis:
+def diagnose(
+    recordings: Sequence[Recording],
+    datasheet: Datasheet | None,
+    holdout: Sequence[Recording] = (),
+    *,
+    seed: int = 0,
+    jobs: int | None = None,
+    progress: Progress = lambda text, share: None,
+) -> Diagnosis:
     """Locate, name and model what a simulation of these recordings leaves out.
 
     Args:
@@ -55,9 +63,18 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
     sensors = _symptoms(recordings, start.traces, travel)
-    chosen = select(start.fit, start.traces, anchors=start.anchors, exclude=(*_ordinary(start.fit.model), *SUSPECTS), jobs=jobs, progress=progress)
+    chosen = select(
+        start.fit,
+        start.traces,
+        anchors=start.anchors,
+        exclude=(*_ordinary(start.fit.model), *SUSPECTS),
+        jobs=jobs,
+        progress=progress,
+    )
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
-    chosen = replace(chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit)
+    chosen = replace(
+        chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
+    )
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs)
@@ -74,7 +91,9 @@ def diagnose(recordings: Sequence[Recording], datasheet: Datasheet | None, holdo
 
 
 def _ordinary(model: Model) -> tuple[str, ...]:
-    """Effects that are none here: a winding whose inductance a datasheet gives has it, as long as it is not about twice that."""
+    """Effects that are none here: a winding whose inductance a datasheet gives has it, as long as it is not about twice
+    that.
+    """
     known = model.scales.tau_e_datasheet
     return ("inductance",) if known and model.values["tau_e"] < AT_BOUND * MOST_TAU * known else ()
 
@@ -82,13 +101,16 @@ def _ordinary(model: Model) -> tuple[str, ...]:
 def _symptoms(recordings: Sequence[Recording], traces: Sequence[Trace], travel: float) -> dict[str, np.ndarray]:
     """Sensor effects that show in the data itself, with their parameters.
 
-    A converter is one where it is coarse for the travel, or coarser than those of rudders' angles are and not fine for the travel.
+    A converter is one where it is coarse for the travel, or coarser than those of rudders' angles are and not fine for
+    the travel.
     """
     found = {}
     lost = [(t, span) for t in traces for span in t.lost]
     if len(lost) >= FEWEST_LOST:
         seconds = sum(float(t.t[-1] - t.t[0]) for t in traces)
-        found["sensor_dropout"] = np.array([len(lost) / seconds, np.mean([(s.stop - s.start) * t.sample_time for t, s in lost])])
+        found["sensor_dropout"] = np.array(
+            [len(lost) / seconds, np.mean([(s.stop - s.start) * t.sample_time for t, s in lost])]
+        )
     quanta = [t.quantum for t in traces]
     unusual = recordings[0].output_unit == "rad" and np.median(quanta) > max(ORDINARY, FINE * travel)
     if max(quanta) > COARSE * travel or unusual:

@@ -24,14 +24,29 @@ from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.simulation import PER_INERTIA, unit_of
 from ers_mj.traces import Trace
 
-LEAST_FACTOR, LEAST_OFFSET = 0.02, 0.01  # of a gain or friction level, and of half the travel: a smaller drift is not worth a line
-SHEET_UNITS = {"J": "kg m^2", "B": "N m s/rad", "K_t": "N m/A", "K_e": "V s/rad", "k_s": "N m/rad", "T_LH": "N m", "F_c": "N m",
-               "R": "ohm", "L": "H", "n": "-"}
+LEAST_FACTOR, LEAST_OFFSET = (
+    0.02,
+    0.01,
+)  # of a gain or friction level, and of half the travel: a smaller drift is not worth a line
+SHEET_UNITS = {
+    "J": "kg m^2",
+    "B": "N m s/rad",
+    "K_t": "N m/A",
+    "K_e": "V s/rad",
+    "k_s": "N m/rad",
+    "T_LH": "N m",
+    "F_c": "N m",
+    "R": "ohm",
+    "L": "H",
+    "n": "-",
+}
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The document (diagnosis.json, version 1), what the report draws, the improved model, and the same in MuJoCo (plant.xml)."""
+    """The document (diagnosis.json, version 1), what the report draws, the improved model, and the same in MuJoCo
+    (plant.xml).
+    """
 
     document: dict
     evidence: Evidence
@@ -45,20 +60,43 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
     samples = gather(base, model, traces)
     verdict, missing, record_state = case.verdict, _missing(case), _record_state(case, held)
     spectrum = over_frequency(samples, traces)
-    found = places(samples, traces, case.selection.rounds, case.start.fit.cost, [m["effect"] for m in missing], case.output_unit,
-                   case.input_unit, spectrum)
+    found = places(
+        samples,
+        traces,
+        case.selection.rounds,
+        case.start.fit.cost,
+        [m["effect"] for m in missing],
+        case.output_unit,
+        case.input_unit,
+        spectrum,
+    )
     document = {
-        "version": 1, "verdict": verdict, "sentence": _sentence(case, missing, found),
+        "version": 1,
+        "verdict": verdict,
+        "sentence": _sentence(case, missing, found),
         "where": [] if verdict == "consistent" else [_place(p) for p in found],
-        "missing": missing, "remainder": _remainder(case), "record_state": record_state, "fit": case.fits,
-        "parameters": _parameters(case), "next_recording": next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit),
-        "data": _data(case), "seed": case.seed, "versions": _versions(),
+        "missing": missing,
+        "remainder": _remainder(case),
+        "record_state": record_state,
+        "fit": case.fits,
+        "parameters": _parameters(case),
+        "next_recording": next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit),
+        "data": _data(case),
+        "seed": case.seed,
+        "versions": _versions(),
     }
     if verdict == "unexplained" or case.suspects:
         document["suspects"] = _suspects(case)
     views = _views(case, samples)
-    evidence = Evidence(tuple(views), tuple(_ladder(case)), residual_map(samples), case.noise, case.output_unit,
-                        case.recordings[0].input_unit, spectrum)
+    evidence = Evidence(
+        tuple(views),
+        tuple(_ladder(case)),
+        residual_map(samples),
+        case.noise,
+        case.output_unit,
+        case.recordings[0].input_unit,
+        spectrum,
+    )
     return Diagnosis(document, evidence, _improved(case), case.rig.plant(model if case.told_effects else base))
 
 
@@ -73,8 +111,12 @@ def _suspects(case: Case) -> list[dict]:
     """The laws without a name that act here, then what else the first round found."""
     first = case.selection.rounds[0] if case.selection.rounds else ()
     others = [c for c in first[:3] if c.name in BY_NAME] if case.verdict == "unexplained" else []
-    return ([{"effect": c.name, "sentence": f"{BY_NAME[c.name].sentence}: buys {c.gain:.1f} of the misfit"} for c in case.suspects]
-            + [{"effect": c.name, "sentence": f"buys {c.gain:.1f} of {case.start.fit.cost:.1f} of the misfit"} for c in others])
+    return [
+        {"effect": c.name, "sentence": f"{BY_NAME[c.name].sentence}: buys {c.gain:.1f} of the misfit"}
+        for c in case.suspects
+    ] + [
+        {"effect": c.name, "sentence": f"buys {c.gain:.1f} of {case.start.fit.cost:.1f} of the misfit"} for c in others
+    ]
 
 
 def _effect(case: Case, name: str) -> dict:
@@ -83,10 +125,20 @@ def _effect(case: Case, name: str) -> dict:
     without = c.without[name]
     with_and_without = (None, None) if effect.local else (pooled(c.after).rmse, without.rmse)
     shown = {k: _shown(e["value"], e["unit"]) for k, e in parameters.items()}
-    return {"effect": name, "sentence": effect.describe(shown), "subsystem": effect.subsystem, "parameters": parameters,
-            "evidence": {"heldout_rmse_without_rad": with_and_without[1], "heldout_rmse_with_rad": with_and_without[0],
-                         "delta_bic": delta_bic(name, case.model, pooled(c.after), without), "p_value": c.p[name]},
-            "probability": case.found(name)[1].get(name), "alternatives": _alternatives(case, name)}
+    return {
+        "effect": name,
+        "sentence": effect.describe(shown),
+        "subsystem": effect.subsystem,
+        "parameters": parameters,
+        "evidence": {
+            "heldout_rmse_without_rad": with_and_without[1],
+            "heldout_rmse_with_rad": with_and_without[0],
+            "delta_bic": delta_bic(name, case.model, pooled(c.after), without),
+            "p_value": c.p[name],
+        },
+        "probability": case.found(name)[1].get(name),
+        "alternatives": _alternatives(case, name),
+    }
 
 
 def _effect_parameters(case: Case, name: str):
@@ -95,15 +147,24 @@ def _effect_parameters(case: Case, name: str):
         factor = case.inertia if case.inertia and parameter.kind in PER_INERTIA else 1.0
         finite = bool(np.isfinite(value))
         low_high = errors.get((name, parameter.name))
-        yield {"name": parameter.name, "entry": _per_recording(case, name, parameter, factor) | {
-            "value": float(value) * factor if finite else None,
-            "unit": unit_of(parameter.kind, case.output_unit, case.input_unit, bool(case.inertia)),
-            "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
-            "meaning": parameter.meaning}}
+        yield {
+            "name": parameter.name,
+            "entry": (
+                _per_recording(case, name, parameter, factor)
+                | {
+                    "value": float(value) * factor if finite else None,
+                    "unit": unit_of(parameter.kind, case.output_unit, case.input_unit, bool(case.inertia)),
+                    "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
+                    "meaning": parameter.meaning,
+                }
+            ),
+        }
 
 
 def _per_recording(case: Case, name: str, parameter: Parameter, factor: float) -> dict:
-    """The values in every training recording of a parameter that has one of its own in each; null where the effect is absent."""
+    """The values in every training recording of a parameter that has one of its own in each; null where the effect is
+    absent.
+    """
     if not parameter.per_record:
         return {}
     columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
@@ -114,30 +175,67 @@ def _per_recording(case: Case, name: str, parameter: Parameter, factor: float) -
 def _symptom(case: Case, name: str, values: np.ndarray) -> dict:
     """A sensor effect that was found in the data itself."""
     effect = BY_NAME[name]
-    entries = {p.name: {"value": float(v), "unit": unit_of(p.kind, case.output_unit, case.input_unit), "ci95": [None, None],
-                        "meaning": p.meaning} for p, v in zip(effect.parameters, values)}
-    return {"effect": name, "sentence": effect.describe({k: _shown(e["value"], e["unit"]) for k, e in entries.items()}),
-            "subsystem": effect.subsystem, "parameters": entries,
-            "evidence": {"heldout_rmse_without_rad": None, "heldout_rmse_with_rad": None, "delta_bic": None, "p_value": None},
-            "alternatives": []}
+    entries = {
+        p.name: {
+            "value": float(v),
+            "unit": unit_of(p.kind, case.output_unit, case.input_unit),
+            "ci95": [None, None],
+            "meaning": p.meaning,
+        }
+        for p, v in zip(effect.parameters, values)
+    }
+    return {
+        "effect": name,
+        "sentence": effect.describe({k: _shown(e["value"], e["unit"]) for k, e in entries.items()}),
+        "subsystem": effect.subsystem,
+        "parameters": entries,
+        "evidence": {
+            "heldout_rmse_without_rad": None,
+            "heldout_rmse_with_rad": None,
+            "delta_bic": None,
+            "p_value": None,
+        },
+        "alternatives": [],
+    }
 
 
 def _alternatives(case: Case, name: str) -> list[dict]:
-    """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer on them."""
+    """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer
+    on them.
+    """
     ranked, weights = case.found(name)
     others = [c for c in ranked[1:] if weights[c.name] > TIED]
     apart = isolability(ranked[0].fit, [c.fit for c in others], case.start.traces) if others else []
-    return [{"effect": c.name, "probability": weights[c.name],
-             "why_not_excluded": f"costs {abs(d.cost):.2f} {'more' if d.cost >= 0 else 'less'} than {name}, which explains {ranked[0].gain:.1f}; the two "
-                                 f"simulations differ by {d.sigmas:.2g} times the noise on these recordings",
-             "difference_sigma": d.sigmas, "cost_difference": d.cost} for c, d in zip(others, apart)]
+    return [
+        {
+            "effect": c.name,
+            "probability": weights[c.name],
+            "why_not_excluded": (
+                f"costs {abs(d.cost):.2f} {'more' if d.cost >= 0 else 'less'} than {name}, which explains"
+                f" {ranked[0].gain:.1f}; the two simulations differ by {d.sigmas:.2g} times the noise on these"
+                " recordings"
+            ),
+            "difference_sigma": d.sigmas,
+            "cost_difference": d.cost,
+        }
+        for c, d in zip(others, apart)
+    ]
 
 
 def _parameters(case: Case) -> dict:
     known = case.datasheet.to_lumped() if case.datasheet is not None else {}
     y, u = case.output_unit, case.input_unit
-    units = {"a_1": "1/s^2", "a_2": "1/s", "b": f"{y}/s^2/{u}", "c_1": f"{y}/s^2", "c_2": f"{y}/s^2", "theta_0": y, "tau_e": "s",
-             "emf_share": "-", "ampere": f"{y}/s^2/A"}
+    units = {
+        "a_1": "1/s^2",
+        "a_2": "1/s",
+        "b": f"{y}/s^2/{u}",
+        "c_1": f"{y}/s^2",
+        "c_2": f"{y}/s^2",
+        "theta_0": y,
+        "tau_e": "s",
+        "emf_share": "-",
+        "ampere": f"{y}/s^2/A",
+    }
     rows, errors = {}, case.errors
     for name in BASE:
         fitted = ("base", name) in errors
@@ -145,11 +243,22 @@ def _parameters(case: Case) -> dict:
             continue
         absent = name in ("a_1", "c_1") and case.model.values[name] == 0
         value = float(case.model.values[name]) if fitted or absent else None
-        rows[name] = {"value": value, "unit": units[name], "ci95": list(errors[("base", name)]) if fitted else [None, None],
-                      "datasheet": known.get(name), "identifiable": fitted or absent}
+        rows[name] = {
+            "value": value,
+            "unit": units[name],
+            "ci95": list(errors[("base", name)]) if fitted else [None, None],
+            "datasheet": known.get(name),
+            "identifiable": fitted or absent,
+        }
     for name, value in (case.datasheet.parameters if case.datasheet is not None else {}).items():
         if name != "theta_0":
-            rows[name] = {"value": None, "unit": SHEET_UNITS[name], "ci95": [None, None], "datasheet": value, "identifiable": False}
+            rows[name] = {
+                "value": None,
+                "unit": SHEET_UNITS[name],
+                "ci95": [None, None],
+                "datasheet": value,
+                "identifiable": False,
+            }
     rows |= _combinations(case, rows)
     return rows
 
@@ -171,13 +280,27 @@ def _record_state(case: Case, held: list[Trace]) -> list[dict]:
     for name in STATES:
         rest = 0.0 if name == "offset" else 1.0
         values = [*(states[name] if name in states else [rest] * count), *(s.get(name, (rest,))[0] for s in later)]
-        ci95 = [*(errors.get((name, k), unknown) for k in range(count)), *(s[name][1:] if name in s else unknown for s in later)]
+        ci95 = [
+            *(errors.get((name, k), unknown) for k in range(count)),
+            *(s[name][1:] if name in s else unknown for s in later),
+        ]
         least = LEAST_OFFSET * case.start.fit.model.scales.position if name == "offset" else LEAST_FACTOR
-        if any(abs(v - rest) > least and not low <= rest <= high for v, (low, high) in zip(values, ci95) if low is not None):
+        if any(
+            abs(v - rest) > least and not low <= rest <= high for v, (low, high) in zip(values, ci95) if low is not None
+        ):
             unit = case.output_unit if name == "offset" else "-"
             spread = _shown(max(values), unit), _shown(min(values), unit)
-            out.append({"name": name, "unit": unit, "values": [float(v) for v in values], "ci95": [list(ends) for ends in ci95],
-                        "sentence": f"{name.replace('_', ' ')} differs between the recordings: from {spread[1]} to {spread[0]}"})
+            out.append(
+                {
+                    "name": name,
+                    "unit": unit,
+                    "values": [float(v) for v in values],
+                    "ci95": [list(ends) for ends in ci95],
+                    "sentence": (
+                        f"{name.replace('_', ' ')} differs between the recordings: from {spread[1]} to {spread[0]}"
+                    ),
+                }
+            )
     return out
 
 
@@ -187,40 +310,72 @@ def _sentence(case: Case, missing: list, found: list[Place]) -> str:
     if verdict == "consistent":
         return "The datasheet's model explains these recordings within their noise: nothing is missing."
     if verdict == "parameters_only":
-        return "Only the numbers were off: with refitted parameters the model explains these recordings within their noise."
+        return (
+            "Only the numbers were off: with refitted parameters the model explains these recordings within their"
+            " noise."
+        )
     if verdict == "missing_physics":
         names = "; ".join(m["sentence"] for m in missing)
         if not case.told_effects:
-            return (f"The sensor shows: {names}. Beside it a mismatch is left that no effect of the library accounts for." if case.more_is_left
-                    else f"Only the sensor shows: {names}.")
+            return (
+                f"The sensor shows: {names}. Beside it a mismatch is left that no effect of the library accounts for."
+                if case.more_is_left
+                else f"Only the sensor shows: {names}."
+            )
         told = "held-out error"
         if fits["heldout_rmse_after_rad"] > math.sqrt(HALF) * fits["heldout_rmse_before_rad"] and case.holdout:
             told = "held-out error, once gain, offset and friction level of that day are known,"
             before, after = (_shown(fits[f"recalibrated_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
         return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
     place = next((p.sentence for p in found if p.axis != "subsystem"), "")
-    much = (f"; it acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}" if case.suspects
-            else f" (the best explains {case.explained:.0%} of the held-out error)")
-    return f"Something acts here that no effect of the library accounts for{much}; {place or 'it is spread over the whole record'}."
+    much = (
+        f"; it acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}"
+        if case.suspects
+        else f" (the best explains {case.explained:.0%} of the held-out error)"
+    )
+    return (
+        f"Something acts here that no effect of the library accounts for{much};"
+        f" {place or 'it is spread over the whole record'}."
+    )
 
 
 def _remainder(case: Case) -> dict:
-    words = "a mismatch is left that nothing named accounts for" if case.more_is_left else "nothing beyond the noise is left"
+    words = (
+        "a mismatch is left that nothing named accounts for"
+        if case.more_is_left
+        else "nothing beyond the noise is left"
+    )
     left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
-    return {"explained_share": case.explained, "significant": case.more_is_left, "left_sigma": left_sigma,
-            "sentence": f"{case.explained:.0%} of the squared held-out error above the noise is explained; {words}."}
+    return {
+        "explained_share": case.explained,
+        "significant": case.more_is_left,
+        "left_sigma": left_sigma,
+        "sentence": f"{case.explained:.0%} of the squared held-out error above the noise is explained; {words}.",
+    }
 
 
 def _place(p: Place) -> dict:
-    return {"axis": p.axis, "region": list(p.region) if p.region else None, "unit": p.unit, "label": p.label,
-            "share_of_error": p.share_of_error, "share_of_time": p.share_of_time, "sentence": p.sentence}
+    return {
+        "axis": p.axis,
+        "region": list(p.region) if p.region else None,
+        "unit": p.unit,
+        "label": p.label,
+        "share_of_error": p.share_of_error,
+        "share_of_time": p.share_of_time,
+        "sentence": p.sentence,
+    }
 
 
 def _data(case: Case) -> dict:
     every = [*case.recordings, *case.holdout]
     problems = [f"{r.name}: {p}" for r in every for p in r.problems] + _degrees(case)
-    return {"files": [r.name for r in every], "sha256": [r.sha256 for r in every], "output_unit": case.output_unit,
-            "input_unit": case.input_unit, "problems": problems}
+    return {
+        "files": [r.name for r in every],
+        "sha256": [r.sha256 for r in every],
+        "output_unit": case.output_unit,
+        "input_unit": case.input_unit,
+        "problems": problems,
+    }
 
 
 def _degrees(case: Case) -> list[str]:
@@ -243,7 +398,18 @@ def _views(case: Case, samples) -> list[RecordView]:
             i = [v.name for v in out].index(t.name)
             out[i] = replace(out[i], shaded=spans)
         else:
-            out.append(RecordView(t.name, False, t.t, t.u, t.y, free_run(case.start.fit.model, t, k), free_run(case.model, t, k), spans))
+            out.append(
+                RecordView(
+                    t.name,
+                    False,
+                    t.t,
+                    t.u,
+                    t.y,
+                    free_run(case.start.fit.model, t, k),
+                    free_run(case.model, t, k),
+                    spans,
+                )
+            )
     return out
 
 
@@ -254,8 +420,15 @@ def _ladder(case: Case):
         for candidate in ranked:
             names = candidate.fit.model.names
             chosen = names == case.model.names
-            yield Rung(names or (candidate.name,), candidate.gain, candidate.z, pooled(c.after).rmse if chosen else None, chosen,
-                       "" if candidate.name in BY_NAME else "differs between recordings", candidate.fit.size)
+            yield Rung(
+                names or (candidate.name,),
+                candidate.gain,
+                candidate.z,
+                pooled(c.after).rmse if chosen else None,
+                chosen,
+                "" if candidate.name in BY_NAME else "differs between recordings",
+                candidate.fit.size,
+            )
 
 
 def _improved(case: Case) -> Datasheet:
@@ -267,7 +440,10 @@ def _improved(case: Case) -> Datasheet:
     for name in case.told_effects:
         entries = {p["name"]: p["entry"]["value"] for p in _effect_parameters(case, name)}
         effects.append((name, {k: v for k, v in entries.items() if v is not None}))
-    effects += [(name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)}) for name, values in case.sensors.items()]
+    effects += [
+        (name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)})
+        for name, values in case.sensors.items()
+    ]
     parameters = dict(case.datasheet.parameters) if case.datasheet is not None else {}
     return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
 
@@ -285,5 +461,10 @@ def _versions() -> dict:
     import numba
     import scipy
 
-    return {"ers-mj": __version__, "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__,
-            "numba": numba.__version__}
+    return {
+        "ers-mj": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+    }

@@ -41,7 +41,9 @@ class Rung:
 
 @dataclass(frozen=True, eq=False)
 class ResidualMap:
-    """Rms residual (A, S) over angle and speed bins of edges (A+1,) and (S+1,), in output units; NaN where no data is."""
+    """Rms residual (A, S) over angle and speed bins of edges (A+1,) and (S+1,), in output units; NaN where no data
+    is.
+    """
 
     angle_edges: np.ndarray
     speed_edges: np.ndarray
@@ -51,7 +53,9 @@ class ResidualMap:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Everything a report draws. ``noise`` is the noise floor in output units, ``spectrum`` what the model before leaves over frequency."""
+    """Everything a report draws. ``noise`` is the noise floor in output units, ``spectrum`` what the model before
+    leaves over frequency.
+    """
 
     records: tuple[RecordView, ...]
     ladder: tuple[Rung, ...]

@@ -22,10 +22,24 @@ SHADE, GRID, INK, FAINT, DISTORTION = "#f3c64e", "#e6e9ee", "#3b4654", "#8b95a3"
 HEAT = LinearSegmentedColormap.from_list("heat", ["#f4f6f8", "#f6d9a8", "#e2893a", "#a83a1e", "#4c1512"], N=32)
 WIDE, NARROW = 9.8, 4.5  # [in]
 STYLE = {
-    "svg.fonttype": "none", "font.family": "sans-serif", "font.size": 9.5, "axes.edgecolor": "#c3cad3",
-    "axes.labelcolor": INK, "xtick.color": INK, "ytick.color": INK, "axes.grid": True, "grid.color": GRID,
-    "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False, "lines.linewidth": 1.3,
-    "legend.frameon": False, "path.simplify": True, "svg.hashsalt": "ers", "axes.titlesize": 10, "axes.titlelocation": "left",
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.size": 9.5,
+    "axes.edgecolor": "#c3cad3",
+    "axes.labelcolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.grid": True,
+    "grid.color": GRID,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+    "path.simplify": True,
+    "svg.hashsalt": "ers",
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
 }
 MOST_RUNGS = 16
 LABELS = ("measured", "model before", "model after")
@@ -51,27 +65,37 @@ def _svg(figure: Figure, described: str) -> str:
     mark = f"f{next(_serial)}-"
     text = re.sub(r'\bid="', f'id="{mark}', text)
     text = re.sub(r'href="#', f'href="#{mark}', text).replace("url(#", f"url(#{mark}")
-    text = re.sub(r'<svg [^>]*?viewBox="([^"]+)"[^>]*>', rf'<svg viewBox="\1" role="img" aria-label="{described}">', text, count=1)
+    text = re.sub(
+        r'<svg [^>]*?viewBox="([^"]+)"[^>]*>', rf'<svg viewBox="\1" role="img" aria-label="{described}">', text, count=1
+    )
     return re.sub(r"\n\s*", "\n", text)
 
 
 def margins(figure: Figure, top: float = 0.1) -> None:
-    """Room for labels about the axes, in inches: a layout that measures every text takes longer than all the drawing."""
+    """Room for labels about the axes, in inches: a layout that measures every text takes longer than all the
+    drawing.
+    """
     width, height = figure.get_size_inches()
-    figure.subplots_adjust(left=0.8 / width, right=1.0 - 0.12 / width, bottom=0.5 / height, top=1.0 - top / height, hspace=0.1)
+    figure.subplots_adjust(
+        left=0.8 / width, right=1.0 - 0.12 / width, bottom=0.5 / height, top=1.0 - top / height, hspace=0.1
+    )
     for ax in figure.axes:
         ax.yaxis.set_label_coords(-0.62 / (width - 0.92), 0.5)
 
 
 def rect(figure: Figure, left: float, bottom: float, right: float, top: float) -> tuple[float, float, float, float]:
-    """Where axes lie in a figure, from distances in inches to its left and lower edge; a negative ``right`` or ``top`` to the opposite one."""
+    """Where axes lie in a figure, from distances in inches to its left and lower edge; a negative ``right`` or ``top``
+    to the opposite one.
+    """
     width, height = figure.get_size_inches()
     right, top = right if right > 0 else width + right, top if top > 0 else height + top
     return left / width, bottom / height, (right - left) / width, (top - bottom) / height
 
 
 def decimate(t: np.ndarray, x: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """t and x (N,) thinned to the lowest and the highest value of each of points/2 spans; a span of NaN stays a hole."""
+    """t and x (N,) thinned to the lowest and the highest value of each of points/2 spans; a span of NaN stays a
+    hole.
+    """
     bins = points // 2
     if t.size <= points:
         return t, x
@@ -92,7 +116,9 @@ def decimate(t: np.ndarray, x: np.ndarray, points: int) -> tuple[np.ndarray, np.
 
 def traces(view: RecordView, evidence: Evidence, labels: tuple[str, str, str] = LABELS) -> str:
     """Measured against simulated before and after (so called in `labels`), the residual below on the same time axis."""
-    return both_widths(lambda width: _traces(view, evidence, width, None, labels), "measured and simulated output over time")
+    return both_widths(
+        lambda width: _traces(view, evidence, width, None, labels), "measured and simulated output over time"
+    )
 
 
 def close_up(view: RecordView, evidence: Evidence, labels: tuple[str, str, str] = LABELS) -> str | None:
@@ -115,7 +141,9 @@ def worst_span(view: RecordView) -> tuple[float, float] | None:
     return float(view.t[begin]), float(view.t[begin + int(1.5 * n)])
 
 
-def _traces(view: RecordView, evidence: Evidence, width: float, span: tuple[float, float] | None, labels: tuple[str, str, str]) -> Figure:
+def _traces(
+    view: RecordView, evidence: Evidence, width: float, span: tuple[float, float] | None, labels: tuple[str, str, str]
+) -> Figure:
     figure = Figure(figsize=(width, 4.9 if width == WIDE else 4.7))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
     margins(figure, top=0.35 if width == WIDE else 0.6)
@@ -123,17 +151,32 @@ def _traces(view: RecordView, evidence: Evidence, width: float, span: tuple[floa
     t, measured, before, after = (x[inside] for x in (view.t, view.measured, view.before, view.after))
     unit = shown(evidence.output_unit, _size(view.measured))
     points = 1500 if width == WIDE else 700
-    for x, colour, label, order in zip((measured, before, after), (MEASURED, BEFORE, AFTER), labels, (2, 3, 4), strict=True):
+    for x, colour, label, order in zip(
+        (measured, before, after), (MEASURED, BEFORE, AFTER), labels, (2, 3, 4), strict=True
+    ):
         if np.isfinite(x).any():
-            above.plot(*decimate(t, x * unit.factor, points), color=colour, label=label, zorder=order,
-                       linewidth=3.0 if order == 2 else 1.2)
+            above.plot(
+                *decimate(t, x * unit.factor, points),
+                color=colour,
+                label=label,
+                zorder=order,
+                linewidth=3.0 if order == 2 else 1.2,
+            )
     _residual(below, t, measured, before, after, evidence, unit, points)
     shade(above, below, view.shaded, t)
     above.set_ylabel(f"{noun(evidence.output_unit)} [{unit.label}]")
     below.set_xlabel("time [s]")
     above.margins(x=0)
     handles, labels = above.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper left", ncols=4 if width == WIDE else 2, handlelength=1.6, columnspacing=1.4, borderaxespad=0.2)
+    figure.legend(
+        handles,
+        labels,
+        loc="upper left",
+        ncols=4 if width == WIDE else 2,
+        handlelength=1.6,
+        columnspacing=1.4,
+        borderaxespad=0.2,
+    )
     return figure
 
 
@@ -159,7 +202,9 @@ def shade(above, below, spans: tuple[tuple[float, float], ...], t: np.ndarray) -
         if end < t[0] or begin > t[-1]:
             continue
         begin, end = max(begin, t[0]), min(max(end, begin + closest), t[-1])
-        above.axvspan(begin, end, color=SHADE, alpha=0.28, linewidth=0, zorder=0, label=None if labelled else "where it fails")
+        above.axvspan(
+            begin, end, color=SHADE, alpha=0.28, linewidth=0, zorder=0, label=None if labelled else "where it fails"
+        )
         below.axvspan(begin, end, color=SHADE, alpha=0.28, linewidth=0, zorder=0)
         labelled = True
 
@@ -192,13 +237,19 @@ def _size(x: np.ndarray) -> float:
 
 def residual_map(residuals: ResidualMap, evidence: Evidence) -> str:
     """Rms residual over (angle, speed), before and after on one scale of colour."""
-    return both_widths(lambda width: _map(residuals, evidence, width), "rms residual over angle and speed, before and after")
+    return both_widths(
+        lambda width: _map(residuals, evidence, width), "rms residual over angle and speed, before and after"
+    )
 
 
 def _map(residuals: ResidualMap, evidence: Evidence, width: float) -> Figure:
     wide = width == WIDE
     figure = Figure(figsize=(width, 3.5 if wide else 6.2))
-    places = ((0.8, 0.55, 4.65, -0.3), (4.85, 0.55, 8.7, -0.3)) if wide else ((0.8, 3.85, -0.12, -0.3), (0.8, 1.35, -0.12, 3.5))
+    places = (
+        ((0.8, 0.55, 4.65, -0.3), (4.85, 0.55, 8.7, -0.3))
+        if wide
+        else ((0.8, 3.85, -0.12, -0.3), (0.8, 1.35, -0.12, 3.5))
+    )
     axes = [figure.add_axes(rect(figure, *place)) for place in places]
     axes[1].sharex(axes[0])
     axes[1].sharey(axes[0])
@@ -212,8 +263,16 @@ def _map(residuals: ResidualMap, evidence: Evidence, width: float) -> Figure:
     for ax, x, title in zip(axes, values, ("before", "after"), strict=True):
         ax.set_facecolor("white")
         ax.grid(False)
-        mesh = ax.pcolormesh(residuals.angle_edges * angle.factor, residuals.speed_edges * speed.factor,
-                             np.ma.masked_invalid(x.T), cmap=HEAT, vmin=0, vmax=top, edgecolors="white", linewidth=0.4)
+        mesh = ax.pcolormesh(
+            residuals.angle_edges * angle.factor,
+            residuals.speed_edges * speed.factor,
+            np.ma.masked_invalid(x.T),
+            cmap=HEAT,
+            vmin=0,
+            vmax=top,
+            edgecolors="white",
+            linewidth=0.4,
+        )
         ax.axhline(0, color=FAINT, linewidth=0.6)
         ax.set_title(title, color=BEFORE if title == "before" else AFTER, fontweight="bold")
     for ax in axes if wide else axes[1:]:
@@ -232,22 +291,36 @@ def _map(residuals: ResidualMap, evidence: Evidence, width: float) -> Figure:
 
 
 def spectrum(found: Mismatch, evidence: Evidence) -> str:
-    """The error's amplitude over frequency with what is linear in it and what is not, and the gap between measured and simulated motion."""
-    return both_widths(lambda width: _spectrum(found, evidence, width), "the error over frequency, and measured over simulated motion")
+    """The error's amplitude over frequency with what is linear in it and what is not, and the gap between measured and
+    simulated motion.
+    """
+    return both_widths(
+        lambda width: _spectrum(found, evidence, width), "the error over frequency, and measured over simulated motion"
+    )
 
 
 def _spectrum(found: Mismatch, evidence: Evidence, width: float) -> Figure:
     wide = width == WIDE
     figure = Figure(figsize=(width, 3.5 if wide else 6.6))
-    places = ((0.8, 0.5, 4.75, -0.55), (5.75, 1.95, -0.12, -0.3), (5.75, 0.5, -0.12, 1.8)) if wide else (
-        (0.8, 4.05, -0.12, -0.55), (0.8, 1.95, -0.12, 3.2), (0.8, 0.5, -0.12, 1.8))
+    places = (
+        ((0.8, 0.5, 4.75, -0.55), (5.75, 1.95, -0.12, -0.3), (5.75, 0.5, -0.12, 1.8))
+        if wide
+        else ((0.8, 4.05, -0.12, -0.55), (0.8, 1.95, -0.12, 3.2), (0.8, 0.5, -0.12, 1.8))
+    )
     levels, size, phase = (figure.add_axes(rect(figure, *place)) for place in places)
     size.sharex(phase)
     f, step = found.f_hz, found.f_hz[1] - found.f_hz[0]
     unit = shown(evidence.output_unit, float(np.sqrt(found.error.max() * step)))
-    for x, colour, label, line in ((found.motion, MEASURED, "motion", 2.6), (found.error, BEFORE, "error", 1.6), (found.linear, AFTER, "linear in it", 1.2),
-                                   (found.distortion, DISTORTION, "distortion in it", 1.2), (found.noise, FAINT, "noise", 1.0)):
-        levels.loglog(f, unit.factor * np.sqrt(np.where(x > 0, x, np.nan) * step), color=colour, label=label, linewidth=line)
+    for x, colour, label, line in (
+        (found.motion, MEASURED, "motion", 2.6),
+        (found.error, BEFORE, "error", 1.6),
+        (found.linear, AFTER, "linear in it", 1.2),
+        (found.distortion, DISTORTION, "distortion in it", 1.2),
+        (found.noise, FAINT, "noise", 1.0),
+    ):
+        levels.loglog(
+            f, unit.factor * np.sqrt(np.where(x > 0, x, np.nan) * step), color=colour, label=label, linewidth=line
+        )
     bottom = float(np.sqrt(found.noise.min() * step)) * unit.factor
     levels.set_ylim(bottom=0.2 * bottom)
     levels.set_ylabel(f"rms in {step:.2g} Hz [{unit.label}]")
@@ -277,7 +350,9 @@ def _spectrum(found: Mismatch, evidence: Evidence, width: float) -> Figure:
 
 def ladder(rungs: tuple[Rung, ...], evidence: Evidence, baseline: float | None) -> str:
     """What each candidate scores on held-out data (or gains on the training data, where nothing is held out)."""
-    return both_widths(lambda width: _ladder(rungs[:MOST_RUNGS], evidence, baseline, width), "candidates and their evidence")
+    return both_widths(
+        lambda width: _ladder(rungs[:MOST_RUNGS], evidence, baseline, width), "candidates and their evidence"
+    )
 
 
 def rung_name(rung: Rung) -> str:
@@ -289,7 +364,11 @@ def _ladder(rungs: tuple[Rung, ...], evidence: Evidence, baseline: float | None,
     held_out = any(rung.heldout_rmse is not None for rung in rungs)
     figure = Figure(figsize=(width, 1.1 + 0.29 * len(rungs)), layout="constrained")
     ax = figure.subplots()
-    unit = shown(evidence.output_unit, max((r.heldout_rmse or 0 for r in rungs), default=0) or None) if held_out else Unit("")
+    unit = (
+        shown(evidence.output_unit, max((r.heldout_rmse or 0 for r in rungs), default=0) or None)
+        if held_out
+        else Unit("")
+    )
     start = (baseline or 0.0) * unit.factor if held_out else 0.0
     for row, rung in enumerate(rungs):
         x = rung.heldout_rmse if held_out else rung.gain
@@ -297,7 +376,13 @@ def _ladder(rungs: tuple[Rung, ...], evidence: Evidence, baseline: float | None,
         if x is None or not np.isfinite(x):
             ax.text(start, row, " not scored", va="center", color=FAINT, fontsize=8.5)
             continue
-        ax.plot([start, x * unit.factor], [row, row], color=colour, linewidth=2.4 if rung.chosen else 1.6, solid_capstyle="round")
+        ax.plot(
+            [start, x * unit.factor],
+            [row, row],
+            color=colour,
+            linewidth=2.4 if rung.chosen else 1.6,
+            solid_capstyle="round",
+        )
         ax.plot([x * unit.factor], [row], "o", color=colour, markersize=7 if rung.chosen else 5)
     _ladder_lines(ax, evidence, start, unit, held_out)
     ax.set_yticks(range(len(rungs)), [_short(rung_name(r), 44 if width == WIDE else 24) for r in rungs])
@@ -307,7 +392,9 @@ def _ladder(rungs: tuple[Rung, ...], evidence: Evidence, baseline: float | None,
     ax.set_ylim(len(rungs) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     ax.tick_params(axis="y", length=0)
-    ax.set_xlabel(f"held-out free-run error [{unit.label}]" if held_out else "gain in block cost on the training recordings")
+    ax.set_xlabel(
+        f"held-out free-run error [{unit.label}]" if held_out else "gain in block cost on the training recordings"
+    )
     return figure
 
 

@@ -1,4 +1,6 @@
-"""Frames for the report: moments of a recording on the plant in three dimensions, measured and simulated, before and after."""
+"""Frames for the report: moments of a recording on the plant in three dimensions, measured and simulated, before and
+after.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ class Frame:
 
 @dataclass(frozen=True)
 class Frames:
-    """The moments of a recording; differences from what was measured are drawn `enlarged` times. Empty where `why_not` says why."""
+    """The moments of a recording; differences from what was measured are drawn `enlarged` times. Empty where `why_not`
+    says why.
+    """
 
     name: str
     moments: tuple[Frame, ...]
@@ -79,6 +83,12 @@ def _drawn(plant: MechanicalPlant, view: RecordView, chosen: np.ndarray, enlarge
     shown = np.concatenate([measured + enlarged * (x - measured) for x in (before, after)])
     film = posed(plant, np.concatenate([t, t]), shown)
     with Painter(film.model, WIDTH, HEIGHT) as painter:
-        pictures = [jpeg_bytes(painter.draw(qpos, y)) for qpos, y in zip(film.qpos, np.concatenate([measured, measured]), strict=True)]
+        pictures = [
+            jpeg_bytes(painter.draw(qpos, y))
+            for qpos, y in zip(film.qpos, np.concatenate([measured, measured]), strict=True)
+        ]
     rows = zip(t, measured, before, after, strict=True)
-    return tuple(Frame(*map(float, row), *both) for row, both in zip(rows, zip(pictures[: t.size], pictures[t.size :]), strict=True))
+    return tuple(
+        Frame(*map(float, row), *both)
+        for row, both in zip(rows, zip(pictures[: t.size], pictures[t.size :]), strict=True)
+    )

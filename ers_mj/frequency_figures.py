@@ -1,4 +1,6 @@
-"""Pictures over frequency as inline SVG: Bode, Nyquist and Nichols of loops, sensitivities, plants, limit cycles, recordings."""
+"""Pictures over frequency as inline SVG: Bode, Nyquist and Nichols of loops, sensitivities, plants, limit cycles,
+recordings.
+"""
 
 from __future__ import annotations
 
@@ -98,7 +100,14 @@ def _planes(loops: Sequence[Loop], width: float) -> Figure:
     weakest = min(loops, key=lambda x: x.disk_margin).disk_margin
     middle, radius = _disk(weakest)
     if radius is not None:
-        nyquist.fill(middle + radius * np.cos(turn), radius * np.sin(turn), color=SHADE, alpha=0.35, linewidth=0, label="least disk margin")
+        nyquist.fill(
+            middle + radius * np.cos(turn),
+            radius * np.sin(turn),
+            color=SHADE,
+            alpha=0.35,
+            linewidth=0,
+            label="least disk margin",
+        )
     for ax in (nyquist, nichols):
         ax.plot([-1 if ax is nyquist else -180], [0], "+", color=INK, markersize=9)
     for x in loops:
@@ -121,7 +130,9 @@ def _planes(loops: Sequence[Loop], width: float) -> Figure:
 
 
 def _disk(alpha: float) -> tuple[float, float | None]:
-    """Centre and radius of the balanced disk about -1 that a loop of disk margin alpha does not enter; no radius where it is no disk."""
+    """Centre and radius of the balanced disk about -1 that a loop of disk margin alpha does not enter; no radius where
+    it is no disk.
+    """
     if alpha >= 2.0:
         return -1.0, None
     low, high = (1.0 - 0.5 * alpha) / (1.0 + 0.5 * alpha), (1.0 + 0.5 * alpha) / (1.0 - 0.5 * alpha)
@@ -155,7 +166,9 @@ def _sensitivities(loops: Sequence[Loop], width: float) -> Figure:
     axes = figure.subplots(1, 2, sharey=True) if wide else figure.subplots(2, 1)
     for ax, name in zip(axes, "ST", strict=True):
         for x in loops:
-            ax.semilogx(x.f_hz, decibels(getattr(x, name)), color=_shade(x), linestyle=_dash(x, loops), label=_label(x, loops))
+            ax.semilogx(
+                x.f_hz, decibels(getattr(x, name)), color=_shade(x), linestyle=_dash(x, loops), label=_label(x, loops)
+            )
         ax.axhline(0, color=FAINT, linewidth=0.8)
         ax.set_ylim(-50, 12)
         ax.margins(x=0)
@@ -166,7 +179,9 @@ def _sensitivities(loops: Sequence[Loop], width: float) -> Figure:
 
 
 def cycles(found: Cycles, h: float) -> str | None:
-    """The end of a loop that was let go, plant by plant, beside the sine that is predicted; None where all rest and nothing lasting is predicted."""
+    """The end of a loop that was let go, plant by plant, beside the sine that is predicted; None where all rest and
+    nothing lasting is predicted.
+    """
     lasting = next((c for c in found.predicted if c.lasting), None)
     if lasting is None and not any(found.seen.values()):
         return None
@@ -183,10 +198,22 @@ def _cycles(found: Cycles, lasting, h: float, width: float) -> Figure:
         part = np.degrees(tail[: 2 * n] - tail.mean()) if found.seen[plant] else np.degrees(tail[: 2 * n])
         up = np.flatnonzero((part[:-1] < 0) & (part[1:] >= 0))
         begin = int(up[0]) if up.size and up[0] + n <= part.size else 0
-        ax.plot(1e3 * t[: part.size - begin], part[begin : begin + n], color=MODELS[k], label=f"{plant}, seen" if found.seen[plant] else f"{plant}, at rest")
+        ax.plot(
+            1e3 * t[: part.size - begin],
+            part[begin : begin + n],
+            color=MODELS[k],
+            label=f"{plant}, seen" if found.seen[plant] else f"{plant}, at rest",
+        )
     if lasting is not None:
         fine = np.linspace(t[0], t[-1], 300)
-        ax.plot(1e3 * fine, np.degrees(lasting.amplitude) * np.sin(2 * np.pi * lasting.f_hz * fine), color=MEASURED, linewidth=2.6, zorder=1, label="predicted")
+        ax.plot(
+            1e3 * fine,
+            np.degrees(lasting.amplitude) * np.sin(2 * np.pi * lasting.f_hz * fine),
+            color=MEASURED,
+            linewidth=2.6,
+            zorder=1,
+            label="predicted",
+        )
     ax.set_xlabel("time [ms]")
     ax.set_ylabel("angle [°]")
     ax.margins(x=0)
@@ -218,9 +245,17 @@ def _recording(compared: Compared, width: float) -> Figure:
     trust.set_ylim(0, 1.05)
     unit = math.degrees(1.0)
     levels.loglog(r.f_hz, unit * r.output, color=INK, marker=".", label="output")
-    levels.loglog(r.f_hz, unit * r.noise, color=MEASURED, marker=".", label="noise and distortion" if r.periods == 1 else "noise")
+    levels.loglog(
+        r.f_hz, unit * r.noise, color=MEASURED, marker=".", label="noise and distortion" if r.periods == 1 else "noise"
+    )
     if np.isfinite(r.distortion).any():
-        levels.loglog(r.f_hz, unit * np.where(r.distortion > 0, r.distortion, np.nan), color=DISTORTION, marker=".", label="distortion")
+        levels.loglog(
+            r.f_hz,
+            unit * np.where(r.distortion > 0, r.distortion, np.nan),
+            color=DISTORTION,
+            marker=".",
+            label="distortion",
+        )
     for ax, label in ((size, "size [dB rad/V]"), (phase, "phase [°]"), (trust, "coherence"), (levels, "amplitude [°]")):
         ax.set_ylabel(label)
     levels.set_xlabel("frequency [Hz]")

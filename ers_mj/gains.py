@@ -1,7 +1,7 @@
 """The finite-time law's gains: the conditions (33)-(35) under which its proof holds, the bound (37), and a search.
 
-    gains -> m_1, m_2, m_3 (all above zero: feasible) -> bound on the settling time
-    wished settling time -> k_2, k_3 that keep it in simulation -> l, gamma_1..gamma_7 that meet the conditions
+gains -> m_1, m_2, m_3 (all above zero: feasible) -> bound on the settling time
+wished settling time -> k_2, k_3 that keep it in simulation -> l, gamma_1..gamma_7 that meet the conditions
 """
 
 from __future__ import annotations
@@ -35,34 +35,52 @@ def products(gains: Gains) -> tuple[float, float, float]:
     q, k_1, k_2 = float(gains.q), gains.k_1, gains.k_2
     two = 2.0 ** (2.0 - 2.0 * q)
     power = k_1 ** (1.0 / q - 1.0)
-    return (two * (2.0 * q - 1.0) * (1.0 + power) / q,
-            two * ((1.0 - q) / q + k_2 + (2.0 * q - 1.0) * power * k_2 / q),
-            two * (1.0 - q) * power * (1.0 + k_2) / q)
+    return (
+        two * (2.0 * q - 1.0) * (1.0 + power) / q,
+        two * ((1.0 - q) / q + k_2 + (2.0 * q - 1.0) * power * k_2 / q),
+        two * (1.0 - q) * power * (1.0 + k_2) / q,
+    )
 
 
 def m_1(gains: Gains) -> float:
     """Eq. (33), the gamma_2 term with the factor q that (23) and (30) have and the print lacks."""
     q, k_1, (g1, g2, _, _, g5, _, g7) = float(gains.q), gains.k_1, gains.gamma
     inner = g5 * 2.0 ** (2.0 - 2.0 * q) * q * k_1 ** (1.0 + 1.0 / q) + g7 * products(gains)[2]
-    return k_1 - 2.0 ** (1.0 - q) / (1.0 + q) * (g1 + g2 * q * (2.0 - q) * k_1 ** (1.0 + 1.0 / q)) - _coupling(gains) / (1.0 + q) * inner
+    return (
+        k_1
+        - 2.0 ** (1.0 - q) / (1.0 + q) * (g1 + g2 * q * (2.0 - q) * k_1 ** (1.0 + 1.0 / q))
+        - _coupling(gains) / (1.0 + q) * inner
+    )
 
 
 def m_2(gains: Gains) -> float:
     """Eq. (34), as printed."""
     q, k_1, k_2, (g1, g2, g3, g4, _, g6, _) = float(gains.q), gains.k_1, gains.k_2, gains.gamma
     two = 2.0 ** (1.0 - q)
-    return (k_2 - two * (2.0 - q) * k_1 ** (1.0 / q) - g1 ** (-1.0 / q) * two * q / (1.0 + q)
-            - (2.0 - q) / (1.0 + q) * (g2**-q * two * k_1 ** (1.0 + 1.0 / q) + g3 * two**2)
-            - _coupling(gains) / (1.0 + q) * (g4 * two**2 * q * k_1 ** (1.0 / q) + g6 * products(gains)[1]))
+    return (
+        k_2
+        - two * (2.0 - q) * k_1 ** (1.0 / q)
+        - g1 ** (-1.0 / q) * two * q / (1.0 + q)
+        - (2.0 - q) / (1.0 + q) * (g2**-q * two * k_1 ** (1.0 + 1.0 / q) + g3 * two**2)
+        - _coupling(gains) / (1.0 + q) * (g4 * two**2 * q * k_1 ** (1.0 / q) + g6 * products(gains)[1])
+    )
 
 
 def m_3(gains: Gains) -> float:
     """Eq. (35), as printed."""
-    q, k_1, l, (_, _, g3, g4, g5, g6, g7) = float(gains.q), gains.k_1, gains.l, gains.gamma  # noqa: E741  the paper's letter
+    q, k_1, l, (_, _, g3, g4, g5, g6, g7) = (
+        float(gains.q),
+        gains.k_1,
+        gains.l,
+        gains.gamma,
+    )  # noqa: E741  the paper's letter
     two, (M_1, M_2, M_3) = 2.0 ** (2.0 - 2.0 * q), products(gains)
-    return (l * gains.k_3 - g3 ** (-(2.0 - q) / (2.0 * q - 1.0)) * two * (2.0 * q - 1.0) / (1.0 + q)
-            - (g4**-q + g5**-q * k_1) * two * k_1 ** (1.0 / q) * _coupling(gains) / (1.0 + q)
-            - _coupling(gains) / q * (M_1 + (g6**-q * M_2 + g7**-q * M_3) / (1.0 + q)))
+    return (
+        l * gains.k_3
+        - g3 ** (-(2.0 - q) / (2.0 * q - 1.0)) * two * (2.0 * q - 1.0) / (1.0 + q)
+        - (g4**-q + g5**-q * k_1) * two * k_1 ** (1.0 / q) * _coupling(gains) / (1.0 + q)
+        - _coupling(gains) / q * (M_1 + (g6**-q * M_2 + g7**-q * M_3) / (1.0 + q))
+    )
 
 
 def _coupling(gains: Gains) -> float:
@@ -85,12 +103,16 @@ def lyapunov(gains: Gains, x1: float, x2: float, x3: float) -> float:
     x2d = -gains.k_1 * sig(x1, q)
     x3d = -gains.k_2 * sig(sig(x2, 1.0 / q) - sig(x2d, 1.0 / q), 2.0 * q - 1.0)
     inner = quad(lambda s: sig(sig(s, 1.0 / q) - sig(x2d, 1.0 / q), 2.0 - q), x2d, x2)[0]
-    outer = quad(lambda s: sig(sig(s, 1.0 / (2.0 * q - 1.0)) - sig(x3d, 1.0 / (2.0 * q - 1.0)), 3.0 - 2.0 * q), x3d, x3)[0]
+    outer = quad(
+        lambda s: sig(sig(s, 1.0 / (2.0 * q - 1.0)) - sig(x3d, 1.0 / (2.0 * q - 1.0)), 3.0 - 2.0 * q), x3d, x3
+    )[0]
     return 0.5 * x1**2 + inner + gains.l * outer
 
 
 def settling_bound(gains: Gains, height: float) -> float | None:
-    """The time [s] after which Lemma 3 and Eq. (37) promise rest after a step of ``height`` [rad]; None where the conditions fail or q = 1."""
+    """The time [s] after which Lemma 3 and Eq. (37) promise rest after a step of ``height`` [rad]; None where the
+    conditions fail or q = 1.
+    """
     weakest, q = min(conditions(gains)), float(gains.q)
     if weakest <= 0 or q >= 1:
         return None
@@ -111,7 +133,8 @@ class Found:
 
 
 def search(settling: float, settle: Settle, gains: Gains = Gains(), seed: int = 0) -> Found:
-    """The smallest k_2, with k_3 in Eq. (40)'s ratio to it, that settles within ``settling`` [s] and meets the conditions.
+    """The smallest k_2, with k_3 in Eq. (40)'s ratio to it, that settles within ``settling`` [s] and meets the
+    conditions.
 
     Args:
         settling: wished [s].
@@ -122,6 +145,7 @@ def search(settling: float, settle: Settle, gains: Gains = Gains(), seed: int = 
     Raises:
         InputError: no gains within reach settle so soon, or those that do meet no conditions.
     """
+
     def timed(k_2: float) -> tuple[float, Gains]:
         trial = _rounded(replace(gains, k_2=k_2, k_3=RATIO * k_2))
         time = settle(trial)
@@ -149,8 +173,10 @@ def search(settling: float, settle: Settle, gains: Gains = Gains(), seed: int = 
     feasible = freed(chosen, seed)
     m = conditions(feasible)
     if min(m) <= 0:
-        raise InputError(f"k_2 = {chosen.k_2:.4g} and k_3 = {chosen.k_3:.4g} settle in {1e3 * time:.3g} ms, but no l and gamma were found that meet "
-                         f"(33)-(35): the best leave m = {', '.join(f'{x:.3g}' for x in m)}")
+        raise InputError(
+            f"k_2 = {chosen.k_2:.4g} and k_3 = {chosen.k_3:.4g} settle in {1e3 * time:.3g} ms, but no l and gamma were"
+            f" found that meet (33)-(35): the best leave m = {', '.join(f'{x:.3g}' for x in m)}"
+        )
     return Found(feasible, m, time)
 
 
@@ -161,6 +187,7 @@ def _rounded(gains: Gains) -> Gains:
 
 def freed(gains: Gains, seed: int = 0) -> Gains:
     """The same q and k with those l and gamma that leave the smallest of m_1/k_1, m_2/k_2 and m_3/(l k_3) largest."""
+
     def with_(z: np.ndarray) -> Gains:
         l, *gamma = np.exp(np.clip(z, -40.0, 20.0)).tolist()  # noqa: E741
         return replace(gains, l=l, gamma=tuple(gamma))
@@ -175,10 +202,14 @@ def freed(gains: Gains, seed: int = 0) -> Gains:
     best, least = gains, worst(np.log([gains.l, *gains.gamma]))
     for k in range(STARTS):
         z0 = start + (random.normal(0.0, 1.0, start.size) if k else 0.0)
-        found = minimize(worst, z0, method="Nelder-Mead", options={"maxiter": 4000, "maxfev": 4000, "xatol": 1e-4, "fatol": 1e-7, "adaptive": True})
+        found = minimize(
+            worst,
+            z0,
+            method="Nelder-Mead",
+            options={"maxiter": 4000, "maxfev": 4000, "xatol": 1e-4, "fatol": 1e-7, "adaptive": True},
+        )
         if found.fun < least:
             best, least = with_(found.x), float(found.fun)
         if least < -MARGIN:
             break
     return best
-

@@ -1,8 +1,7 @@
 """Eq. (6)'s coefficients from a recording alone: where a fit starts when there is no datasheet.
-
-Weak form: Eq. (6) is multiplied by a bump that vanishes with its slope at both ends of a window, and integrated by parts,
-so that the output is never differentiated twice. What is left is linear in a_1, a_2, b, c_1, c_2 once theta_0 is given, and theta_0 is
-scanned over the travel.
+ Weak form: Eq. (6) is multiplied by a bump that vanishes with its slope at both ends of a window, and integrated by
+parts, so that the output is never differentiated twice. What is left is linear in a_1, a_2, b, c_1, c_2 once theta_0 is
+given, and theta_0 is scanned over the travel.
 """
 
 from __future__ import annotations
@@ -20,11 +19,14 @@ SHORTEST = 16
 EDGE = 0.02  # share of the travel next to its ends that is left out: a stop may act there
 PLACES = np.linspace(0.05, 0.95, 13)  # quantiles of the output at which theta_0 is tried
 SIGNED = [1, 3]  # columns whose coefficients may be negative: b and the constant
-FASTEST = 1e4  # [1/s] acceleration by the largest input over the speeds that are met: what makes more was guessed from no input at all
+# [1/s] acceleration by the largest input over the speeds that are met: what makes more was guessed from no input at all
+FASTEST = 1e4
 
 
 def _rows(trace: Trace, window: float, still: float):
-    """Weak-form rows of one trace: right side (W,), columns -y', u, -sgn(w), 1, -y (W, 5), and a maker of -sgn(y - theta_0)."""
+    """Weak-form rows of one trace: right side (W,), columns -y', u, -sgn(w), 1, -y (W, 5), and a maker of -sgn(y -
+    theta_0).
+    """
     h = trace.sample_time
     n = max(SHORTEST, int(window / h))
     if trace.t.size < 2 * n:
@@ -45,13 +47,22 @@ def _rows(trace: Trace, window: float, still: float):
     if index.shape[0] < 8:
         return None
     take = lambda f, v: (v[index] * f).sum(axis=1) * h  # noqa: E731
-    columns = np.column_stack([take(slope, y), take(bump, trace.u), -take(bump, sign), np.full(index.shape[0], bump.sum() * h),
-                               -take(bump, y)])
+    columns = np.column_stack(
+        [
+            take(slope, y),
+            take(bump, trace.u),
+            -take(bump, sign),
+            np.full(index.shape[0], bump.sum() * h),
+            -take(bump, y),
+        ]
+    )
     return take(bend, y), columns, lambda theta_0: -take(bump, np.sign(y - theta_0))
 
 
 def guesses(traces: Sequence[Trace]) -> list[dict[str, float]]:
-    """Starting values of Eq. (6), best regression first, with and without spring and preload; none of an absurd gain."""
+    """Starting values of Eq. (6), best regression first, with and without spring and preload; none of an absurd
+    gain.
+    """
     y = np.concatenate([t.y[t.valid] for t in traces])
     speed = np.concatenate([np.abs(np.diff(savgol_filter(t.y[t.valid], 9, 2))) / t.sample_time for t in traces])
     still = max(0.02 * float(np.quantile(speed, 0.98)), 1e-12)
@@ -81,12 +92,18 @@ def _solve(right, columns, rows, theta_0, spring, middle):
     weight = np.ones(right.size)
     for _ in range(4):
         x = nnls(signed * weight[:, None], right * weight)[0]
-        x[SIGNED] -= x[design.shape[1]:]
+        x[SIGNED] -= x[design.shape[1] :]
         x = x[: design.shape[1]] / size
         e = right - design @ x
         weight = 1.0 / np.sqrt(1.0 + (e / (2 * np.median(np.abs(e)) + 1e-300)) ** 2)
     a_1 = x[4] if spring else 0.0
     rest = x[3] / a_1 if a_1 > 0 else middle
-    values = {"a_1": a_1, "a_2": max(x[0], 1e-3), "b": x[1], "c_1": x[5] if theta_0 is not None else 0.0,
-              "c_2": max(x[2], 1e-3 * abs(x[1]) * 1.0), "theta_0": theta_0 if theta_0 is not None else rest}
+    values = {
+        "a_1": a_1,
+        "a_2": max(x[0], 1e-3),
+        "b": x[1],
+        "c_1": x[5] if theta_0 is not None else 0.0,
+        "c_2": max(x[2], 1e-3 * abs(x[1]) * 1.0),
+        "theta_0": theta_0 if theta_0 is not None else rest,
+    }
     return float(np.median(np.abs(e)) / np.median(np.abs(right))), values

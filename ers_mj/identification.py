@@ -1,9 +1,9 @@
 """Fit a model's parameters to recordings by simulating them.
-
-The model runs as an observer of low gain, theta_hat' = w_hat + rate (y - theta_hat), so that one late stick event does not become
-a lasting offset, while forces stay in open loop. Time is cut into blocks; each block's misfit m_b = SSE_b / (n_b sigma^2) enters
-as C = sum_b ln(1 + m_b / tau): a few blocks where stick and slip fork cannot decide everything. C is minimised by
-Levenberg-Marquardt with weights 1 / (tau + m_b) over finite differences of the event-exact simulation, which is smooth.
+ The model runs as an observer of low gain, theta_hat' = w_hat + rate (y - theta_hat), so that one late stick event does
+not become a lasting offset, while forces stay in open loop. Time is cut into blocks; each block's misfit m_b = SSE_b /
+(n_b sigma^2) enters as C = sum_b ln(1 + m_b / tau): a few blocks where stick and slip fork cannot decide everything. C
+is minimised by Levenberg-Marquardt with weights 1 / (tau + m_b) over finite differences of the event-exact simulation,
+which is smooth.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Fit:
 
 @dataclass(frozen=True)
 class Run:
-    """A model run along recordings: y - y_hat in sigmas over all traces and their channels (N,), 0 where a sample is missing, NaN where the
-    simulation ran away; and the motion (n, 4) in each trace."""
+    """A model run along recordings: y - y_hat in sigmas over all traces and their channels (N,), 0 where a sample is
+    missing, NaN where the simulation ran away; and the motion (n, 4) in each trace."""
 
     model: Model
     left: np.ndarray
@@ -82,7 +82,9 @@ def _run_in(model, trace, record, rate):
     left[0] = trace.weighed(theta)
     for channel, seen, row in zip(trace.channels, others, left[1:]):
         np.divide(channel.values - seen, channel.sigma, out=row)
-        if channel.kind == "current" and model.dead_time > 0:  # before it is over it follows a command that was not recorded
+        if (
+            channel.kind == "current" and model.dead_time > 0
+        ):  # before it is over it follows a command that was not recorded
             row[trace.t < trace.t[0] + model.dead_time] = 0.0
     left = left.ravel()
     left[trace.unseen] = 0.0
@@ -105,31 +107,58 @@ def tau_of(misfit: np.ndarray) -> float:
     return max(1.0, 0.1 * float(np.median(misfit)))
 
 
-def fit(model: Model, traces: Sequence[Trace], *, rate: float = OBSERVER_RATE, tau: float = 1.0, steps: int = 25,
-        ceiling: np.ndarray | None = None, known: Columns | None = None, renewals: float = math.inf, by_tangents: bool = True,
-        tolerance: float = LEAST_STEP) -> Fit:
-    """Minimise C over the model's free numbers, from the model's own values, until a step gains less than the ``tolerance``.
+def fit(
+    model: Model,
+    traces: Sequence[Trace],
+    *,
+    rate: float = OBSERVER_RATE,
+    tau: float = 1.0,
+    steps: int = 25,
+    ceiling: np.ndarray | None = None,
+    known: Columns | None = None,
+    renewals: float = math.inf,
+    by_tangents: bool = True,
+    tolerance: float = LEAST_STEP,
+) -> Fit:
+    """Minimise C over the model's free numbers, from the model's own values, until a step gains less than the
+    ``tolerance``.
 
-    ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a stage is
-    given up, since its start was a bad one. ``known`` are columns of a Jacobian taken near by, with which the search begins; after
-    ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further. Where their number is unlimited it does not end before one
-    that was taken where an earlier one led no further leads no further either, by finite differences if these are not dear (see jacobian_of).
+    ``ceiling`` holds the misfits (B,) of a model that is nested in this one: a search that stands above it after a
+    stage is given up, since its start was a bad one. ``known`` are columns of a Jacobian taken near by, with which the
+    search begins; after ``renewals`` Jacobians of its own it ends where the last one, updated, leads no further. Where
+    their number is unlimited it does not end before one that was taken where an earlier one led no further leads no
+    further either, by finite differences if these are not dear (see jacobian_of).
 
-    Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the geometric
-    mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for. (Their plain mean asks
-    more of a search that begins near the data: one bad block would send it back to the sum of squares.) The cost is that at ``tau``,
-    wherever the search ends.
+    Far from the data the logarithm of C has a local minimum in every block, so the search starts at a ``tau`` near the
+    geometric mean of the misfits, where C is nearly a sum of squares, and lowers it to the one that was asked for.
+    (Their plain mean asks more of a search that begins near the data: one bad block would send it back to the sum of
+    squares.) The cost is that at ``tau``, wherever the search ends.
     """
     run = _begun(model, traces, rate)
-    now, jacobian, sure, blocks = math.inf, jacobian_of(run, traces, rate, known) if known is not None else None, False, Blocks.of(traces)
+    now, jacobian, sure, blocks = (
+        math.inf,
+        jacobian_of(run, traces, rate, known) if known is not None else None,
+        False,
+        Blocks.of(traces),
+    )
     while True:
         misfit = blocks.misfit(run.left)
         sound = np.all(np.isfinite(misfit))  # a runaway has one descent to find a motion
         level = float(np.exp(np.mean(np.log(misfit + tau)))) if sound else 0.0
         now = max(tau, min(level, 0.1 * now))
         last = now <= 1.5 * tau
-        found, run, jacobian, renewals, sure = _descend(run, traces, rate, tau if last else now, steps, tolerance if last else 0.3, jacobian, renewals,
-                                                        by_tangents, sure)
+        found, run, jacobian, renewals, sure = _descend(
+            run,
+            traces,
+            rate,
+            tau if last else now,
+            steps,
+            tolerance if last else 0.3,
+            jacobian,
+            renewals,
+            by_tangents,
+            sure,
+        )
         if last:
             return found
         if ceiling is not None and score(found.misfit, now).sum() > score(ceiling, now).sum() + HOPELESS * ceiling.size:
@@ -152,14 +181,17 @@ def converged(found: Fit, rival: Fit, traces: Sequence[Trace], tau: float) -> Fi
     return min(ends, key=lambda f: f.cost)
 
 
-def hopped(found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restart: bool = False,
-           quiet: float = QUIET) -> tuple[Fit, Sequence[Trace]]:
+def hopped(
+    found: Fit, traces: Sequence[Trace], tau: float, jobs: int, *, restart: bool = False, quiet: float = QUIET
+) -> tuple[Fit, Sequence[Trace]]:
     """The fit after hops along its softest directions, as long as they pay, and the traces it belongs to.
 
-    One start leads into one dent of many (see ``converged``). A hop goes as far as the fit's own curvature prices at HOP, and
-    descends from there; ``restart`` fits the initial states again, which a wrong model has bent. Only near the noise are dents what
-    keeps a fit from its floor: beyond ROUGH the model itself is wrong, below ``quiet`` nothing is left to win.
+    One start leads into one dent of many (see ``converged``). A hop goes as far as the fit's own curvature prices at
+    HOP, and descends from there; ``restart`` fits the initial states again, which a wrong model has bent. Only near the
+    noise are dents what keeps a fit from its floor: beyond ROUGH the model itself is wrong, below ``quiet`` nothing is
+    left to win.
     """
+
     def land(start):
         begun = with_starts(start, traces) if restart else traces
         return descend(start, begun, OBSERVER_RATE, tau, 12, 0.03), begun
@@ -197,7 +229,8 @@ def is_at_observer(found: Fit) -> bool:
 def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
     """The fit carried on in free run by plain least squares, where model error and not noise decides (see POLISHED).
 
-    The free run has more than one valley, so it is reached directly and by way of slower observers; the lower one counts.
+    The free run has more than one valley, so it is reached directly and by way of slower observers; the lower one
+    counts.
     """
     if is_at_observer(found):
         return found
@@ -215,16 +248,30 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
 
 
 def descend(model: Model, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float) -> Fit:
-    """Levenberg-Marquardt on C at one ``tau``, until a step gains less than ``tolerance`` along a fresh Jacobian, or one taken where such a step was."""
+    """Levenberg-Marquardt on C at one ``tau``, until a step gains less than ``tolerance`` along a fresh Jacobian, or
+    one taken where such a step was.
+    """
     return _descend(_begun(model, traces, rate), traces, rate, tau, steps, tolerance, None, math.inf)[0]
 
 
-def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: int, tolerance: float, jacobian: np.ndarray | None,
-             renewals: float, by_tangents: bool = True, sure: bool = False) -> tuple[Fit, Run, np.ndarray | None, float, bool]:
-    """See ``descend``: the fit, its run, the Jacobian that it ended with, how many it may still take, and whether that one is ``sure``: taken where one had
-    led no further, so that the search may end on its updates (beside a bristle, where there are tangents only and they may lead astray, on none).
+def _descend(
+    run: Run,
+    traces: Sequence[Trace],
+    rate: float,
+    tau: float,
+    steps: int,
+    tolerance: float,
+    jacobian: np.ndarray | None,
+    renewals: float,
+    by_tangents: bool = True,
+    sure: bool = False,
+) -> tuple[Fit, Run, np.ndarray | None, float, bool]:
+    """See ``descend``: the fit, its run, the Jacobian that it ended with, how many it may still take, and whether that
+    one is ``sure``: taken where one had led no further, so that the search may end on its updates (beside a bristle,
+    where there are tangents only and they may lead astray, on none).
 
-    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised; ``jacobian`` is changed by it.
+    Between fresh Jacobians Broyden's update serves as long as the decrease keeps a third of what it promised;
+    ``jacobian`` is changed by it.
     """
     layout, blocks = run.model.layout(), Blocks.of(traces)
     stride = max(1, round(DENSE / max(trace.sample_time for trace in traces)))
@@ -249,7 +296,11 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
         if jacobian is None:
             if renewals <= 0:
                 break
-            jacobian, fresh, sure = jacobian_of(run, traces, rate, by_tangents=by_tangents), True, resting and final and not dear
+            jacobian, fresh, sure = (
+                jacobian_of(run, traces, rate, by_tangents=by_tangents),
+                True,
+                resting and final and not dear,
+            )
             renewals -= 1
         weight = (2.0 / ((tau + m) * blocks.counts))[blocks.index]
         some = jacobian.T[:, ::stride] * np.sqrt(weight[::stride])
@@ -276,7 +327,13 @@ def _descend(run: Run, traces: Sequence[Trace], rate: float, tau: float, steps: 
         moved, gain, was_fresh = goal - z, cost - trial[2], fresh
         promised = -(slope @ moved + 0.5 * moved @ hessian @ moved)
         if gain > 0.3 * promised and moved @ moved > 0:
-            dger(1.0 / float(moved @ moved), trial[0].left - run.left - jacobian @ moved, moved, a=jacobian, overwrite_a=1)  # in place
+            dger(
+                1.0 / float(moved @ moved),
+                trial[0].left - run.left - jacobian @ moved,
+                moved,
+                a=jacobian,
+                overwrite_a=1,
+            )  # in place
             fresh = False
         else:
             jacobian = None
@@ -299,11 +356,14 @@ def step_of(model: Model) -> float:
     return max((BY_NAME[name].step for name in model.names), default=Effect.step)
 
 
-def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns | None = None, by_tangents: bool = True) -> np.ndarray:
+def jacobian_of(
+    run: Run, traces: Sequence[Trace], rate: float, known: Columns | None = None, by_tangents: bool = True
+) -> np.ndarray:
     """Slopes (N, k) of what a run leaves by the numbers fitted of its model, but for the ``known`` ones.
 
-    By tangents of the motion where the model has them, else by finite differences of simulations. Where stick and slip fork
-    the two lead elsewhere, and either may be the better. Numbers whose effect on a motion hangs on what is finer than its samples go by differences.
+    By tangents of the motion where the model has them, else by finite differences of simulations. Where stick and slip
+    fork the two lead elsewhere, and either may be the better. Numbers whose effect on a motion hangs on what is finer
+    than its samples go by differences.
     """
     model, layout = run.model, run.model.layout()
     z = model.vector(layout)
@@ -327,14 +387,23 @@ def jacobian_of(run: Run, traces: Sequence[Trace], rate: float, known: Columns |
 def columns_of(model: Model, traces: Sequence[Trace], rate: float, by_tangents: bool = True) -> Columns:
     """The columns of a model's Jacobian, with which fits that begin near by may begin."""
     run = _begun(model, traces, rate)
-    return {f.key: column for f, column in zip(run.model.layout(), jacobian_of(run, traces, rate, by_tangents=by_tangents).T)}
+    return {
+        f.key: column
+        for f, column in zip(run.model.layout(), jacobian_of(run, traces, rate, by_tangents=by_tangents).T)
+    }
 
 
 def central_jacobian(model: Model, layout, z: np.ndarray, traces: Sequence[Trace], rate: float) -> np.ndarray:
-    """Central differences (N, k) of the residuals: tangents, good to a few per cent each, blur the directions in which their columns cancel."""
+    """Central differences (N, k) of the residuals: tangents, good to a few per cent each, blur the directions in which
+    their columns cancel.
+    """
     step = step_of(model)
-    ends = [[residuals(model.at(layout, z + way * row), traces, rate) for way in (1, -1)] for row in step * np.eye(z.size)]
-    return np.nan_to_num(np.column_stack([(ahead - behind) / (2.0 * step) for ahead, behind in ends]), nan=0.0, posinf=0.0, neginf=0.0)
+    ends = [
+        [residuals(model.at(layout, z + way * row), traces, rate) for way in (1, -1)] for row in step * np.eye(z.size)
+    ]
+    return np.nan_to_num(
+        np.column_stack([(ahead - behind) / (2.0 * step) for ahead, behind in ends]), nan=0.0, posinf=0.0, neginf=0.0
+    )
 
 
 def _prior_cost(layout, z):

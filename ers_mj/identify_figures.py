@@ -1,4 +1,6 @@
-"""Pictures of an identification as inline SVG: measured over simulated, the way to the minimum, profiles of what is weak."""
+"""Pictures of an identification as inline SVG: measured over simulated, the way to the minimum, profiles of what is
+weak.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ SHADES = (AFTER, BEFORE, "#1d4f91", "#8a6bb8", "#a83a1e", "#4c8c2b", "#5b6b7b")
 
 def compared(trace: Trace, predicted: np.ndarray, unit: str) -> str:
     """One recording: measured and simulated, and what is left, with the noise beside it."""
-    return both_widths(lambda width: _compared(trace, predicted, unit, width), f"{trace.name}: measured and simulated output over time")
+    return both_widths(
+        lambda width: _compared(trace, predicted, unit, width), f"{trace.name}: measured and simulated output over time"
+    )
 
 
 def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> Figure:
@@ -30,7 +34,12 @@ def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> F
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.8, 1.0))
     margins(figure, top=0.35)
     above.plot(*decimate(trace.t, u.factor * trace.y, POINTS[wide]), color=MEASURED, linewidth=2.6, label="measured")
-    above.plot(*decimate(trace.t, u.factor * predicted, POINTS[wide]), color=AFTER, linewidth=1.1, label="identified model, free run")
+    above.plot(
+        *decimate(trace.t, u.factor * predicted, POINTS[wide]),
+        color=AFTER,
+        linewidth=1.1,
+        label="identified model, free run",
+    )
     below.plot(*decimate(trace.t, u.factor * (trace.y - predicted), POINTS[wide]), color=INK, linewidth=0.7)
     for k, edge in enumerate((-2, 2)):
         below.axhline(edge * u.factor * trace.sigma, color=BEFORE, linewidth=1.0, label=None if k else "noise, ±2σ")
@@ -44,7 +53,10 @@ def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> F
 
 def descent(found: Identified) -> str:
     """Best fitness over evaluations of the search."""
-    return both_widths(lambda width: progress_figure({found.settings.method: [found.minimum.trace]}, width), "best fitness over evaluations")
+    return both_widths(
+        lambda width: progress_figure({found.settings.method: [found.minimum.trace]}, width),
+        "best fitness over evaluations",
+    )
 
 
 def progress_figure(traces: Mapping[str, Sequence[np.ndarray]], width: float) -> Figure:
@@ -75,7 +87,11 @@ def _power(x: float, place: int) -> str:
 
 def profiles(found: Sequence[Profile]) -> str | None:
     """How the misfit rises about what is weak; None where nothing is."""
-    return both_widths(lambda width: _profiles(found, width), "profile likelihood of the weak parameters") if found else None
+    return (
+        both_widths(lambda width: _profiles(found, width), "profile likelihood of the weak parameters")
+        if found
+        else None
+    )
 
 
 def _profiles(found: Sequence[Profile], width: float) -> Figure:

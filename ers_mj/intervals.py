@@ -1,10 +1,9 @@
 """Intervals that survive model error: a jackknife over recordings and a sandwich over blocks.
-
-What is too small to be found moves the parameters as well, further than the noise does: ``unseen_widths`` tells how far.
-
-(J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what differs between
-recordings, but a refit may rest in the dent of the cost where it begins, and then says nothing; the sandwich only sees
-the scatter within them.
+ What is too small to be found moves the parameters as well, further than the noise does: ``unseen_widths`` tells how
+far.
+ (J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what
+differs between recordings, but a refit may rest in the dent of the cost where it begins, and then says nothing; the
+sandwich only sees the scatter within them.
 """
 
 from __future__ import annotations
@@ -32,18 +31,23 @@ def slopes_of(model: Model, traces: Sequence[Trace]) -> np.ndarray:
     return central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
 
 
-def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
+def half_widths(
+    model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float, jacobian: np.ndarray | None = None
+) -> np.ndarray:
     """95 % half-widths (k,) of the model's transformed numbers: those of jackknife and sandwich, squared and added.
 
-    ``left_out`` holds the model refitted without each recording in turn; with fewer than three, or where
-    some numbers belong to one recording only, the sandwich serves alone. The ``jacobian`` is ``slopes_of`` the model, where it is known.
+    ``left_out`` holds the model refitted without each recording in turn; with fewer than three, or where some numbers
+    belong to one recording only, the sandwich serves alone. The ``jacobian`` is ``slopes_of`` the model, where it is
+    known.
     """
     layout = model.layout()
     widths = _sandwich(model, traces, tau, slopes_of(model, traces) if jacobian is None else jacobian)
     if len(left_out) >= FEWEST_RECORDS and not any(f.local for f in layout):
         z = np.array([m.vector(layout) for m in left_out])
         n = len(left_out)
-        widths = np.hypot(widths, stdtrit(n - 1, 0.975) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0)))
+        widths = np.hypot(
+            widths, stdtrit(n - 1, 0.975) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0))
+        )
     return widths
 
 
@@ -67,10 +71,12 @@ def _left(model: Model, traces: Sequence[Trace]) -> np.ndarray:
 
 
 def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
-    """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move to make up for them.
+    """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move
+    to make up for them.
 
-    Each effect's secant, at a size that would gain UNSEEN_GAIN beside the model and never larger than its start, shifts the numbers by what a fit
-    makes of it; any effect is as likely as the next, UNSEEN of them act. The ``jacobian`` is as in ``half_widths``.
+    Each effect's secant, at a size that would gain UNSEEN_GAIN beside the model and never larger than its start, shifts
+    the numbers by what a fit makes of it; any effect is as likely as the next, UNSEEN of them act. The ``jacobian`` is
+    as in ``half_widths``.
     """
     layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
     jacobian = slopes_of(model, traces) if jacobian is None else jacobian

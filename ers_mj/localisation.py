@@ -1,7 +1,7 @@
-"""Where does the refitted baseline fail? In time, angle, speed, direction, input level, frequency, and in which subsystem.
-
-The error that is located is that of a fast observer (LOCAL_RATE): it forgets within 1 / LOCAL_RATE, so that a force that was
-missing shows where it was missing and not where its effect on the angle ended.
+"""Where does the refitted baseline fail? In time, angle, speed, direction, input level, frequency, and in which
+subsystem.
+ The error that is located is that of a fast observer (LOCAL_RATE): it forgets within 1 / LOCAL_RATE, so that a force
+that was missing shows where it was missing and not where its effect on the angle ended.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ LEAST_EXCESS = 0.2  # share of error minus share of time from which a region is 
 
 @dataclass(frozen=True)
 class Samples:
-    """All valid samples of several recordings, each (N,): record, t, angle, speed, input, two squared local errors, and the first with its sign."""
+    """All valid samples of several recordings, each (N,): record, t, angle, speed, input, two squared local errors, and
+    the first with its sign.
+    """
 
     record: np.ndarray
     t: np.ndarray
@@ -41,7 +43,9 @@ class Samples:
 
 @dataclass(frozen=True)
 class Place:
-    """A region in which more of the squared error lives than its share of time (of the motion's power, on the axis of frequency)."""
+    """A region in which more of the squared error lives than its share of time (of the motion's power, on the axis of
+    frequency).
+    """
 
     axis: str
     region: tuple[float, float] | None
@@ -57,7 +61,7 @@ def smooth_speed(trace: Trace) -> np.ndarray:
     k = max(1, round(0.01 / trace.sample_time))
     y = np.interp(trace.t, trace.t[trace.valid], trace.y[trace.valid])
     padded_y, padded_t = np.pad(y, k, mode="edge"), np.pad(trace.t, k, mode="edge")
-    return (padded_y[2 * k:] - padded_y[:-2 * k]) / np.maximum(padded_t[2 * k:] - padded_t[:-2 * k], 1e-12)
+    return (padded_y[2 * k :] - padded_y[: -2 * k]) / np.maximum(padded_t[2 * k :] - padded_t[: -2 * k], 1e-12)
 
 
 def gather(before: Model, after: Model, traces: Sequence[Trace]) -> Samples:
@@ -66,7 +70,18 @@ def gather(before: Model, after: Model, traces: Sequence[Trace]) -> Samples:
     for k, trace in enumerate(traces):
         v = trace.valid
         first, second = (np.nan_to_num((trace.y - model.predict(trace, k, LOCAL_RATE))[v]) for model in (before, after))
-        parts.append((np.full(v.sum(), k), trace.t[v], trace.y[v], smooth_speed(trace)[v], trace.u[v], first**2, second**2, first))
+        parts.append(
+            (
+                np.full(v.sum(), k),
+                trace.t[v],
+                trace.y[v],
+                smooth_speed(trace)[v],
+                trace.u[v],
+                first**2,
+                second**2,
+                first,
+            )
+        )
     return Samples(*(np.concatenate(column) for column in zip(*parts)))
 
 
@@ -86,13 +101,33 @@ def _best_interval(values: np.ndarray, squares: np.ndarray, edges: np.ndarray):
     return edges[i], edges[j], float(error[i:j].sum()), float(time[i:j].sum())
 
 
-def places(samples: Samples, traces: Sequence[Trace], rounds: Sequence[Sequence[Candidate]], base_cost: float, named: Sequence[str],
-           output_unit: str, input_unit: str, spectrum: Mismatch | None = None) -> list[Place]:
-    """Regions worth telling, subsystem first (of the ``named`` effects before others), then by how much more error than time they hold."""
+def places(
+    samples: Samples,
+    traces: Sequence[Trace],
+    rounds: Sequence[Sequence[Candidate]],
+    base_cost: float,
+    named: Sequence[str],
+    output_unit: str,
+    input_unit: str,
+    spectrum: Mismatch | None = None,
+) -> list[Place]:
+    """Regions worth telling, subsystem first (of the ``named`` effects before others), then by how much more error than
+    time they hold.
+    """
     found = [*_by_value(samples, output_unit, input_unit), *_by_direction(samples), *_by_time(samples, traces)]
     found = [p for p in found if p.share_of_error - p.share_of_time >= LEAST_EXCESS]
     if spectrum is not None and spectrum.region is not None:
-        found.append(Place("frequency", spectrum.region, "Hz", spectrum.kind, spectrum.share_of_error, spectrum.share_of_motion, spectrum.sentence))
+        found.append(
+            Place(
+                "frequency",
+                spectrum.region,
+                "Hz",
+                spectrum.kind,
+                spectrum.share_of_error,
+                spectrum.share_of_motion,
+                spectrum.sentence,
+            )
+        )
     found.sort(key=lambda p: p.share_of_time - p.share_of_error)
     return [*_by_subsystem(rounds, base_cost, named), *found]
 
@@ -102,28 +137,53 @@ def _shown(value: float, unit: str) -> str:
 
 
 def _by_value(samples: Samples, output_unit: str, input_unit: str) -> list[Place]:
-    axes = (("angle", samples.angle, output_unit, "the output is"), ("speed", np.abs(samples.speed), f"{output_unit}/s", "speed is"),
-            ("input", np.abs(samples.input), input_unit, "|u| is"))
+    axes = (
+        ("angle", samples.angle, output_unit, "the output is"),
+        ("speed", np.abs(samples.speed), f"{output_unit}/s", "speed is"),
+        ("input", np.abs(samples.input), input_unit, "|u| is"),
+    )
     out = []
     for axis, values, unit, words in axes:
         low, high = np.quantile(values, [0.001, 0.999])
         if high <= low:
             continue
         a, b, error, time = _best_interval(values, samples.before, np.linspace(low, high, BINS + 1))
-        out.append(Place(axis, (float(a), float(b)), unit, None, error, time,
-                         f"{error:.0%} of the squared error lies in the {time:.0%} of the time where {words} between "
-                         f"{_shown(a, unit)} and {_shown(b, unit)}"))
+        out.append(
+            Place(
+                axis,
+                (float(a), float(b)),
+                unit,
+                None,
+                error,
+                time,
+                f"{error:.0%} of the squared error lies in the {time:.0%} of the time where {words} between "
+                f"{_shown(a, unit)} and {_shown(b, unit)}",
+            )
+        )
     return out
 
 
 def _by_direction(samples: Samples) -> list[Place]:
     still = 0.05 * float(np.quantile(np.abs(samples.speed), 0.95))
     total, out = max(samples.before.sum(), 1e-300), []
-    for label, mask in (("up", samples.speed > still), ("down", samples.speed < -still), ("at rest", np.abs(samples.speed) <= still)):
+    for label, mask in (
+        ("up", samples.speed > still),
+        ("down", samples.speed < -still),
+        ("at rest", np.abs(samples.speed) <= still),
+    ):
         error, time = float(samples.before[mask].sum() / total), float(mask.mean())
         words = "the output is at rest" if label == "at rest" else f"the output moves {label}"
-        out.append(Place("direction", None, None, label, error, time,
-                         f"{error:.0%} of the squared error lies in the {time:.0%} of the time where {words}"))
+        out.append(
+            Place(
+                "direction",
+                None,
+                None,
+                label,
+                error,
+                time,
+                f"{error:.0%} of the squared error lies in the {time:.0%} of the time where {words}",
+            )
+        )
     return out
 
 
@@ -134,17 +194,30 @@ def _by_time(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
         mask = samples.record == k
         if not mask.any():
             continue
-        a, b, error, time = _best_interval(samples.t[mask], samples.before[mask], np.linspace(trace.t[0], trace.t[-1], BINS + 1))
+        a, b, error, time = _best_interval(
+            samples.t[mask], samples.before[mask], np.linspace(trace.t[0], trace.t[-1], BINS + 1)
+        )
         part = float(samples.before[mask].sum() / max(samples.before.sum(), 1e-300))
         whole = float(mask.mean())
-        out.append(Place("time", (float(a), float(b)), "s", trace.name, part * error, whole * time,
-                         f"{part * error:.0%} of the squared error lies between {a:.2f} s and {b:.2f} s of {trace.name}, "
-                         f"{whole * time:.0%} of the time"))
+        out.append(
+            Place(
+                "time",
+                (float(a), float(b)),
+                "s",
+                trace.name,
+                part * error,
+                whole * time,
+                f"{part * error:.0%} of the squared error lies between {a:.2f} s and {b:.2f} s of {trace.name}, "
+                f"{whole * time:.0%} of the time",
+            )
+        )
     return sorted(out, key=lambda p: p.share_of_time - p.share_of_error)[:2]
 
 
 def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named: Sequence[str]) -> list[Place]:
-    """Subsystems by what their best effect explains of the baseline's cost; those of the named effects lead, in their order."""
+    """Subsystems by what their best effect explains of the baseline's cost; those of the named effects lead, in their
+    order.
+    """
     best: dict[str, tuple[float, str]] = {}
     for candidate in (c for ranked in rounds for c in ranked):
         if candidate.name in BY_NAME:
@@ -156,21 +229,26 @@ def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named
     out = []
     for subsystem in (*lead, *ranked):
         share, name = best.get(subsystem, (None, None))
-        words = (f"{share:.0%} of the misfit can be explained in the {subsystem} ({name.replace('_', ' ')})" if share is not None
-                 else f"the data itself shows it: the {subsystem}")
+        words = (
+            f"{share:.0%} of the misfit can be explained in the {subsystem} ({name.replace('_', ' ')})"
+            if share is not None
+            else f"the data itself shows it: the {subsystem}"
+        )
         out.append(Place("subsystem", None, None, subsystem, share, None if share is None else 1.0, words))
     return out
 
 
 def shaded(trace: Trace, record: int, samples: Samples) -> tuple[tuple[float, float], ...]:
-    """Spans of time [s] of one recording in which the local error is largest: those that hold two thirds of it, at most 8."""
+    """Spans of time [s] of one recording in which the local error is largest: those that hold two thirds of it, at most
+    8.
+    """
     mask = samples.record == record
     if not mask.any():
         return ()
     edges = np.linspace(trace.t[0], trace.t[-1], 81)
     error = np.bincount(np.clip(np.digitize(samples.t[mask], edges) - 1, 0, 79), samples.before[mask], 80)
     order = np.argsort(-error)
-    keep = np.sort(order[:max(1, int(np.searchsorted(np.cumsum(error[order]), 0.66 * error.sum())) + 1)])
+    keep = np.sort(order[: max(1, int(np.searchsorted(np.cumsum(error[order]), 0.66 * error.sum())) + 1)])
     spans = []
     for k in keep:
         if spans and edges[k] - spans[-1][1] < 1e-9:
@@ -186,5 +264,8 @@ def residual_map(samples: Samples) -> ResidualMap:
     edges = [np.linspace(*np.quantile(v, [0.001, 0.999]), 25) for v in (samples.angle, samples.speed)]
     count, *_ = np.histogram2d(samples.angle, samples.speed, edges)
     with np.errstate(invalid="ignore", divide="ignore"):
-        rms = [np.sqrt(np.histogram2d(samples.angle, samples.speed, edges, weights=w)[0] / count) for w in (samples.before, samples.after)]
+        rms = [
+            np.sqrt(np.histogram2d(samples.angle, samples.speed, edges, weights=w)[0] / count)
+            for w in (samples.before, samples.after)
+        ]
     return ResidualMap(edges[0], edges[1], *(np.where(count >= 5, r, np.nan) for r in rms))

@@ -1,4 +1,6 @@
-"""What a run of a loop was worth: settling, overshoot, error, voltage, energy, chatter. All of the rudder's true angle."""
+"""What a run of a loop was worth: settling, overshoot, error, voltage, energy, chatter. All of the rudder's true
+angle.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,10 @@ class Measures:
     """The measures of one run; None where there is none to give.
 
     Attributes:
-        settling_time_s: until the error stays within 2 %: the longest after any jump up to the next one, in a reference without jumps from its begin.
-        overshoot_pct: beyond the target of a jump, of its height; in a reference without jumps beyond its range, of its amplitude.
+        settling_time_s: until the error stays within 2 %: the longest after any jump up to the next one, in a reference
+            without jumps from its begin.
+        overshoot_pct: beyond the target of a jump, of its height; in a reference without jumps beyond its range, of its
+            amplitude.
         steady_state_error_rad: mean absolute error over the last 20 % of the time.
         rmse_rad: root mean square error over all of it.
         max_error_rad: the largest, over all of it.
@@ -47,17 +51,26 @@ class Measures:
 
 
 def measured(run: Run, u_max: float, ampere: float | None) -> Measures:
-    """The measures of a run under a limit of ``u_max`` [V]; ``ampere`` is the drive acceleration of 1 A [rad/s^2], None where nothing tells it."""
+    """The measures of a run under a limit of ``u_max`` [V]; ``ampere`` is the drive acceleration of 1 A [rad/s^2], None
+    where nothing tells it.
+    """
     if run.lost:
         return Measures(*[None] * 10, stable=False)
     r, u = run.reference, run.u
     error = run.theta - r.theta
     tail = slice(int((1.0 - TAIL) * r.t.size), None)
     return Measures(
-        settling_time_s=settling_time(run), overshoot_pct=overshoot(run),
-        steady_state_error_rad=float(np.abs(error[tail]).mean()), rmse_rad=float(np.sqrt(np.mean(error**2))), max_error_rad=float(np.abs(error).max()),
-        peak_u_V=float(np.abs(u).max()), rms_u_V=float(np.sqrt(np.mean(u**2))), saturated_share=float(np.mean(np.abs(u) >= u_max * (1 - 1e-9))),
-        chatter_V=float(np.abs(np.diff(u)).mean()), energy_J=energy(run, ampere))
+        settling_time_s=settling_time(run),
+        overshoot_pct=overshoot(run),
+        steady_state_error_rad=float(np.abs(error[tail]).mean()),
+        rmse_rad=float(np.sqrt(np.mean(error**2))),
+        max_error_rad=float(np.abs(error).max()),
+        peak_u_V=float(np.abs(u).max()),
+        rms_u_V=float(np.sqrt(np.mean(u**2))),
+        saturated_share=float(np.mean(np.abs(u) >= u_max * (1 - 1e-9))),
+        chatter_V=float(np.abs(np.diff(u)).mean()),
+        energy_J=energy(run, ampere),
+    )
 
 
 def _spans(run: Run) -> list[tuple[int, int, float]]:
@@ -97,7 +110,9 @@ def overshoot(run: Run) -> float | None:
 
 
 def energy(run: Run, ampere: float | None) -> float | None:
-    """Integral of u i [J], the current taken as straight over a sample; None where no inertia and torque constant give the current."""
+    """Integral of u i [J], the current taken as straight over a sample; None where no inertia and torque constant give
+    the current.
+    """
     if not ampere:
         return None
     i = 0.5 * (run.drive + run.drive_after) / ampere

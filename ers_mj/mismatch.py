@@ -1,11 +1,12 @@
-"""What a simulation leaves of recordings over frequency: where it is off beyond the noise, and whether another linear model would close that.
+"""What a simulation leaves of recordings over frequency: where it is off beyond the noise, and whether another linear
+model would close that.
 
     errors of an observer -> frames -> spectra -> linear in input and motion | distortion | noise -> Mismatch
-
-The error e of the observer is split at each frequency by its coherence with the simulated motion x and the input u together,
+ The error e of the observer is split at each frequency by its coherence with the simulated motion x and the input u
+together,
     E = A X + B U + rest,    S_ee = (linear) + (rest),    S_rest = (distortion) + (noise).
-Where friction is known, x and u tell every linear change of the dynamics beside it (a lag, a delay, a resonance), and no stick or slip that comes at another
-time. The noise is that of the sensor, and what the observer makes of it.
+Where friction is known, x and u tell every linear change of the dynamics beside it (a lag, a delay, a resonance), and
+no stick or slip that comes at another time. The noise is that of the sensor, and what the observer makes of it.
 """
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ FEWEST_LINES = 3  # off beyond the noise, or coherent, before anything is told o
 BEYOND = 7.0  # over the root of the number of frames: excess over the noise, five deviations, from which a line is off
 REGION = 2 / 3  # of the error beyond the noise that the region holds
 LINEAR, DISTORTED = 0.6, 0.4  # share of the error there that is linear, from which and up to which it is called so
-PHASE, DELAY = 2.0, 0.7  # times the size's gap that a phase's must be; share of it that a delay explains, to be told alone
+PHASE, DELAY = (
+    2.0,
+    0.7,
+)  # times the size's gap that a phase's must be; share of it that a delay explains, to be told alone
 NEIGHBOURS = 1  # lines on either side over which a linear part is straight
 RESONANT = 0.1  # ln of a peak of measured over simulated motion, from which it is called a resonance (0.9 dB)
 
@@ -39,12 +43,13 @@ class Mismatch:
     """Mean power densities over all frames, each (F,) [output unit^2 / Hz], and what they say.
 
     Attributes:
-        f_hz: frequencies [Hz], evenly spaced.
-        motion, error, linear, distortion, noise: of the measured motion, of the error, of its two parts beyond the noise, and of the noise.
-        beyond: which lines are off beyond the noise, (F,) of bool; in half of the frames at least, so that some in which stick and slip fork are not enough.
+        f_hz: frequencies [Hz], evenly spaced. motion, error, linear, distortion, noise: of the measured motion, of the
+        error, of its two parts beyond the noise, and of the noise.
+        beyond: which lines are off beyond the noise, (F,) of bool; in half of the frames at least, so that some in
+            which stick and slip fork are not enough.
         response: measured over simulated output, as in a free run.
-        region: the shortest band [Hz], in log frequency, that holds REGION of the error beyond the noise; None where fewer than FEWEST_LINES are off.
-        share_of_error, share_of_motion: of the power of either that lies in it.
+        region: the shortest band [Hz], in log frequency, that holds REGION of the error beyond the noise; None where
+        fewer than FEWEST_LINES are off. share_of_error, share_of_motion: of the power of either that lies in it.
         linear_share: of the error beyond the noise that lies in it, the part that is linear.
         kind: "linear", "distortion" or "both"; None without a region.
         sentence: all of it in words.
@@ -78,7 +83,11 @@ def mismatch(traces: Sequence[Trace], errors: Sequence[np.ndarray], rate: float)
         None where the recordings are too short.
     """
     length = float(np.median([t.t[-1] - t.t[0] for t in traces])) / FRAMES  # [s] of a frame
-    parts = [_framed(t, e, length, rate) for t, e in zip(traces, errors, strict=True) if round(length / t.sample_time) >= LEAST_SAMPLES]
+    parts = [
+        _framed(t, e, length, rate)
+        for t, e in zip(traces, errors, strict=True)
+        if round(length / t.sample_time) >= LEAST_SAMPLES
+    ]
     if sum(part[0].shape[0] for part in parts) < FEWEST_FRAMES:
         return None
     lines = min(part[0].shape[1] for part in parts)
@@ -87,7 +96,8 @@ def mismatch(traces: Sequence[Trace], errors: Sequence[np.ndarray], rate: float)
 
 
 def _framed(trace: Trace, error: np.ndarray, length: float, rate: float) -> tuple[np.ndarray, ...]:
-    """Spectra (K, F) of simulated output, input and error in Hann windows that overlap by half, and the noise's power density in each.
+    """Spectra (K, F) of simulated output, input and error in Hann windows that overlap by half, and the noise's power
+    density in each.
 
     Holes are filled straight.
     """
@@ -106,11 +116,15 @@ def _frames(x: np.ndarray, size: int, lines: int) -> np.ndarray:
     """Windowed spectra (K, lines) of x (N,), scaled so that white noise of variance s^2 has mean square 2 s^2."""
     frames = sliding_window_view(x, size)[:: size // 2] if x.size >= size else np.empty((0, size))
     window = np.hanning(size + 1)[:size]
-    return np.fft.rfft((frames - frames.mean(axis=1, keepdims=True)) * window, axis=1)[:, :lines] * math.sqrt(2.0 / np.sum(window**2))
+    return np.fft.rfft((frames - frames.mean(axis=1, keepdims=True)) * window, axis=1)[:, :lines] * math.sqrt(
+        2.0 / np.sum(window**2)
+    )
 
 
 def observed_noise(f_hz: np.ndarray, h: float, every: int, sigma: float, rate: float) -> np.ndarray:
-    """Power density (F,) of e = n - a, n white of deviation sigma: the observer's state takes some of it over every T seconds, a += g (n - a)."""
+    """Power density (F,) of e = n - a, n white of deviation sigma: the observer's state takes some of it over every T
+    seconds, a += g (n - a).
+    """
     T = every * h
     g, z = 1.0 - math.exp(-rate * T), np.exp(-2j * np.pi * f_hz * T)
     held = np.exp(-2j * np.pi * h * np.multiply.outer(f_hz, np.arange(1, every + 1))).mean(axis=1)
@@ -124,14 +138,24 @@ def _split(f_hz: np.ndarray, X: np.ndarray, U: np.ndarray, E: np.ndarray, noise:
     share = np.array([_linear_share(X, U, E, k) for k in range(f_hz.size)])
     linear, distortion = share * S_ee, np.maximum((1.0 - share) * S_ee - level, 0.0)
     beyond = np.median(np.abs(E) ** 2 / noise, axis=0) / math.log(2.0) > 1.0 + BEYOND / math.sqrt(K)
-    return f_hz, np.mean(np.abs(X + E) ** 2, axis=0), S_ee, linear, distortion, level, beyond, _response(f_hz, X, E, rate)
+    return (
+        f_hz,
+        np.mean(np.abs(X + E) ** 2, axis=0),
+        S_ee,
+        linear,
+        distortion,
+        level,
+        beyond,
+        _response(f_hz, X, E, rate),
+    )
 
 
 def _linear_share(X: np.ndarray, U: np.ndarray, E: np.ndarray, k: int) -> float:
-    """Share of the error's power about line k that A X + B U explains, A and B straight over the neighbouring lines, freed of what chance gives them.
+    """Share of the error's power about line k that A X + B U explains, A and B straight over the neighbouring lines,
+    freed of what chance gives them.
 
-    A sweep passes a line in a frame or two, which one complex number explains whatever the reason; over the neighbours it takes more.
-    The number of independent terms is told by how evenly the error's power is spread over them.
+    A sweep passes a line in a frame or two, which one complex number explains whatever the reason; over the neighbours
+    it takes more. The number of independent terms is told by how evenly the error's power is spread over them.
     """
     near = slice(max(k - NEIGHBOURS, 0), k + NEIGHBOURS + 1)
     x, u, e = X[:, near], U[:, near], E[:, near].ravel()
@@ -151,9 +175,18 @@ def _response(f_hz: np.ndarray, X: np.ndarray, E: np.ndarray, rate: float) -> Re
     S_xx, S_yy, S_xy = np.mean(np.abs(X) ** 2, axis=0), np.mean(np.abs(Y) ** 2, axis=0), np.mean(X.conj() * Y, axis=0)
     coherence = np.abs(S_xy) ** 2 / np.maximum(S_xx * S_yy, 1e-300)
     size = np.sqrt(S_yy * f_hz[0] / FIRST)
-    return Response("measured over simulated", "frames", X.shape[0], f_hz, S_xy / np.maximum(S_xx, 1e-300), coherence,
-                    np.sqrt((1.0 / np.maximum(coherence, 1e-12) - 1.0) / X.shape[0]),
-                    size * np.sqrt(np.maximum(1.0 - coherence, 0.0)), np.full(f_hz.size, np.nan), size)
+    return Response(
+        "measured over simulated",
+        "frames",
+        X.shape[0],
+        f_hz,
+        S_xy / np.maximum(S_xx, 1e-300),
+        coherence,
+        np.sqrt((1.0 / np.maximum(coherence, 1e-12) - 1.0) / X.shape[0]),
+        size * np.sqrt(np.maximum(1.0 - coherence, 0.0)),
+        np.full(f_hz.size, np.nan),
+        size,
+    )
 
 
 def _told(f_hz, motion, error, linear, distortion, noise, beyond, response) -> Mismatch:
@@ -169,25 +202,45 @@ def _told(f_hz, motion, error, linear, distortion, noise, beyond, response) -> M
     part = float(linear[inside & beyond].sum()) / max(both, 1e-300)
     kind = "linear" if part >= LINEAR else "distortion" if part <= DISTORTED else "both"
     region = float(low - half), float(high + half)
-    sentence = (f"{share:.0%} of the error beyond the noise lies at {region[0]:.2g} to {region[1]:.2g} Hz, where {moving:.0%} of the motion's power is; "
-                + (f"{1 - part:.0%} of it is a distortion, which no linear change of the model closes" if kind == "distortion" else
-                   f"{part:.0%} of it is linear{_shape(response, beyond)}" + (", the rest a distortion" if kind == "both" else "")))
+    sentence = (
+        f"{share:.0%} of the error beyond the noise lies at {region[0]:.2g} to {region[1]:.2g} Hz, where {moving:.0%}"
+        " of the motion's power is; "
+        + (
+            f"{1 - part:.0%} of it is a distortion, which no linear change of the model closes"
+            if kind == "distortion"
+            else f"{part:.0%} of it is linear{_shape(response, beyond)}"
+            + (", the rest a distortion" if kind == "both" else "")
+        )
+    )
     return Mismatch(*parts, region, share, moving, part, kind, sentence)
 
 
 def _shape(response: Response, beyond: np.ndarray) -> str:
-    """What the linear part looks like from the lines where measured and simulated motion cohere: a phase, a resonance, sizes; nothing where they are few."""
+    """What the linear part looks like from the lines where measured and simulated motion cohere: a phase, a resonance,
+    sizes; nothing where they are few.
+    """
     sure = response.sure & beyond
     found = gap(response, np.ones_like(response.g))
     if sure.sum() < FEWEST_LINES or found is None:
         return ""
     f, phase, size = response.f_hz[sure], np.unwrap(np.angle(response.g[sure])), np.log(np.abs(response.g[sure]))
     late = -float(f @ phase) / (2.0 * np.pi * float(f @ f))  # [s]
-    if phase @ phase >= PHASE * (size @ size) and np.sum((phase + 2.0 * np.pi * f * late) ** 2) <= (1.0 - DELAY) * (phase @ phase):
-        return (f": a phase that grows with frequency, to {math.degrees(abs(2 * np.pi * f[-1] * late)):.2g} deg at {f[-1]:.2g} Hz, as where the motion comes "
-                f"{1e3 * abs(late):.2g} ms {'later' if late > 0 else 'earlier'} than the model's")
+    if phase @ phase >= PHASE * (size @ size) and np.sum((phase + 2.0 * np.pi * f * late) ** 2) <= (1.0 - DELAY) * (
+        phase @ phase
+    ):
+        return (
+            f": a phase that grows with frequency, to {math.degrees(abs(2 * np.pi * f[-1] * late)):.2g} deg at"
+            f" {f[-1]:.2g} Hz, as where the motion comes {1e3 * abs(late):.2g} ms {'later' if late > 0 else 'earlier'}"
+            " than the model's"
+        )
     peak = int(np.argmax(np.abs(size)))
     if max(abs(size[0]), abs(size[-1])) < 0.5 * abs(size[peak]):
         of_what = ", as by a resonance that the model lacks" if size[peak] > RESONANT else ""
-        return f": the motion is {20 * size[peak] / math.log(10):+.2g} dB off the model's at {f[peak]:.2g} Hz and less on either side{of_what}"
-    return f": {found.rms_db:.2g} dB and {found.rms_deg:.2g} deg between measured and simulated motion (RMS over {found.lines} lines)"
+        return (
+            f": the motion is {20 * size[peak] / math.log(10):+.2g} dB off the model's at {f[peak]:.2g} Hz and less on"
+            f" either side{of_what}"
+        )
+    return (
+        f": {found.rms_db:.2g} dB and {found.rms_deg:.2g} deg between measured and simulated motion (RMS over"
+        f" {found.lines} lines)"
+    )

@@ -24,7 +24,9 @@ def read_plant(path: Path) -> mujoco.MjModel:
         InputError: no such file, no XML, no MJCF.
     """
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file" if not path.exists() else f"{path}: is a folder, a plant.xml was expected")
+        raise InputError(
+            f"{path}: there is no such file" if not path.exists() else f"{path}: is a folder, a plant.xml was expected"
+        )
     try:
         root = ElementTree.parse(path).getroot().tag
     except (ElementTree.ParseError, OSError, UnicodeError, LookupError, ValueError) as error:
@@ -39,7 +41,8 @@ def read_plant(path: Path) -> mujoco.MjModel:
 
 
 def simulated_file(model: mujoco.MjModel, t: np.ndarray, u: np.ndarray, moments: np.ndarray) -> Replay:
-    """A model of a file from its first keyframe under u (N,), on the actuator `motor` or else the first, at `moments` (F,).
+    """A model of a file from its first keyframe under u (N,), on the actuator `motor` or else the first, at `moments`
+    (F,).
 
     Raises:
         InputError: the model has no actuator, or the motion leaves all bounds.

@@ -14,17 +14,21 @@ Row = tuple[Sequence[str], str]  # cells as html, class
 def frame(title: str, kind: str, body: str) -> str:
     """The whole page as HTML: no script, no font, no address outside it."""
     style = files("ers_mj").joinpath("report.css").read_text(encoding="utf-8")
-    return (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-            f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-            f"<title>{text(title)}</title>\n<style>\n{style}</style>\n</head>\n"
-            f'<body>\n<main class="{text(kind)}">\n{body}\n</main>\n</body>\n</html>\n')
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{text(title)}</title>\n<style>\n{style}</style>\n</head>\n"
+        f'<body>\n<main class="{text(kind)}">\n{body}\n</main>\n</body>\n</html>\n'
+    )
 
 
 def header(kind: str, verdict: str, small: str, sentence: object, tiles: Iterable[tuple[str, str]]) -> str:
     """What a page begins with: a verdict, a sentence, and tiles of (label, value) as html."""
     cells = "".join(f'<div class="tile"><span>{label}</span><b>{value}</b></div>' for label, value in tiles)
-    return (f'<header class="{text(kind)}">\n<p class="verdict">{text(verdict)}<small>{text(small)}</small></p>\n'
-            f'<h1>{text(sentence)}</h1>\n<div class="tiles">{cells}</div>\n</header>')
+    return (
+        f'<header class="{text(kind)}">\n<p class="verdict">{text(verdict)}<small>{text(small)}</small></p>\n'
+        f'<h1>{text(sentence)}</h1>\n<div class="tiles">{cells}</div>\n</header>'
+    )
 
 
 def text(x: object) -> str:
@@ -50,10 +54,16 @@ def table(heads: Sequence[str], rows: Iterable[Row]) -> str:
     right = [head.startswith(">") for head in heads]
     mark = [' class="n"' if side else "" for side in right]
     head = "".join(f"<th{m}>{h.lstrip('>')}</th>" for h, m in zip(heads, mark, strict=True))
-    lines = [f'<tr class="{kind}">' + "".join(f"<td{m}>{cell}</td>" for cell, m in zip(cells, mark, strict=True)) + "</tr>"
-             for cells, kind in rows]
+    lines = [
+        f'<tr class="{kind}">' + "".join(f"<td{m}>{cell}</td>" for cell, m in zip(cells, mark, strict=True)) + "</tr>"
+        for cells, kind in rows
+    ]
     body = "\n".join(lines)
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>' if lines else ""
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+        if lines
+        else ""
+    )
 
 
 def figure(svg: str | None, caption: str = "") -> str:
@@ -78,8 +88,10 @@ def place(found: Mapping) -> str:
     sentence = text(found.get("sentence") or _region(found))
     against = "of motion" if found.get("axis") == "frequency" else "of time"
     bars = _bar("of error", found.get("share_of_error"), "error") + _bar(against, found.get("share_of_time"), "")
-    return (f'<div class="place"><span class="axis">{text(found.get("axis"))}</span><p>{sentence}</p>'
-            f'<div class="bars">{bars}</div></div>')
+    return (
+        f'<div class="place"><span class="axis">{text(found.get("axis"))}</span><p>{sentence}</p>'
+        f'<div class="bars">{bars}</div></div>'
+    )
 
 
 def _region(found: Mapping) -> str:
@@ -93,4 +105,7 @@ def _bar(label: str, x: float | None, kind: str) -> str:
     if missing(x):
         return ""
     width = 100 * min(max(x, 0.0), 1.0)
-    return f'<div class="bar {kind}"><span>{label}</span><div><i style="width:{width:.1f}%"></i></div><em>{share(x)}</em></div>'
+    return (
+        f'<div class="bar {kind}"><span>{label}</span><div><i'
+        f' style="width:{width:.1f}%"></i></div><em>{share(x)}</em></div>'
+    )

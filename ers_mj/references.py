@@ -1,7 +1,6 @@
 """What a servo is asked to follow: the paper's cases, and a user's own from a file.
-
-Each is a function of time from 0 and gives angle, speed and acceleration; where the angle jumps both derivatives are those beside the jump, as no drive
-could follow more.
+ Each is a function of time from 0 and gives angle, speed and acceleration; where the angle jumps both derivatives are
+those beside the jump, as no drive could follow more.
 """
 
 from __future__ import annotations
@@ -28,7 +27,9 @@ FASTEST_HZ, FURTHEST = 1e6, 1000.0  # sample rate and angle [rad] up to which a 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A reference, each (N,): time [s], angle [rad], speed [rad/s], acceleration [rad/s^2]; ``jumps`` are the samples at which the angle jumps."""
+    """A reference, each (N,): time [s], angle [rad], speed [rad/s], acceleration [rad/s^2]; ``jumps`` are the samples
+    at which the angle jumps.
+    """
 
     name: str
     t: np.ndarray
@@ -72,7 +73,12 @@ def chirp(t):
     return np.sin(phase), rate * np.cos(phase), sweep * np.cos(phase) - rate**2 * np.sin(phase)
 
 
-CASES: Mapping[str, tuple[Callable, float]] = {"step": (step, STEP_S), "square": (square, SQUARE_S), "ramp": (ramp, RAMP_S), "chirp": (chirp, CHIRP_S)}
+CASES: Mapping[str, tuple[Callable, float]] = {
+    "step": (step, STEP_S),
+    "square": (square, SQUARE_S),
+    "ramp": (ramp, RAMP_S),
+    "chirp": (chirp, CHIRP_S),
+}
 
 
 def named(name: str, amplitude: float, start: float, rate_hz: float) -> Reference:
@@ -94,8 +100,8 @@ def named(name: str, amplitude: float, start: float, rate_hz: float) -> Referenc
 def read_reference(path: str | os.PathLike, servo: Servo, u_max: float) -> Reference:
     """A reference of a file with the columns t_s and theta_ref_rad or theta_ref_deg, sampled as the loop shall run.
 
-    Speed and acceleration are backward differences, so that nothing of the future is in them; a difference that no motion of this servo could make
-    is a jump and has none.
+    Speed and acceleration are backward differences, so that nothing of the future is in them; a difference that no
+    motion of this servo could make is a jump and has none.
 
     Raises:
         InputError: the file is no such thing.
@@ -104,7 +110,10 @@ def read_reference(path: str | os.PathLike, servo: Servo, u_max: float) -> Refer
     table = parse_table(read_content(file), file.suffix.lower(), file.name)
     names = [name for name in ANGLES if name in table.column_names]
     if "t_s" not in table.column_names or len(names) != 1:
-        raise InputError(f"{file.name}: a reference has the column t_s and one of {listed(ANGLES)}, the columns are {listed(table.column_names)}")
+        raise InputError(
+            f"{file.name}: a reference has the column t_s and one of {listed(ANGLES)}, the columns are"
+            f" {listed(table.column_names)}"
+        )
     t, theta = numbers(table["t_s"], "t_s", file.name), numbers(table[names[0]], names[0], file.name) * ANGLES[names[0]]
     _refuse_holes(t, theta, file.name)
     t, h = t - t[0], float(t[-1] - t[0]) / (t.size - 1)
@@ -129,11 +138,16 @@ def _refuse_holes(t: np.ndarray, theta: np.ndarray, name: str) -> None:
         raise InputError(f"{name}: has {t.size} samples, 100 to {MOST_SAMPLES} were expected")
     for label, x in (("t_s", t), ("the reference", theta)):
         if not np.isfinite(x).all():
-            raise InputError(f"{name}: {label} is missing or infinite in data row {1 + int(np.argmax(~np.isfinite(x)))}, a reference has no holes")
+            raise InputError(
+                f"{name}: {label} is missing or infinite in data row {1 + int(np.argmax(~np.isfinite(x)))}, a reference"
+                " has no holes"
+            )
     h = np.diff(t)
     if h.min() <= 0 or np.ptp(h) > 0.01 * h.mean():
         raise InputError(f"{name}: its times are not evenly spaced, a loop runs at one sample rate")
     if h.mean() < 1.0 / FASTEST_HZ:
         raise InputError(f"{name}: its samples are {h.mean():.3g} s apart, {1.0 / FASTEST_HZ:g} s or more was expected")
     if np.abs(theta).max() > FURTHEST:
-        raise InputError(f"{name}: its reference reaches {np.abs(theta).max():.3g} rad, {FURTHEST:g} rad at most was expected")
+        raise InputError(
+            f"{name}: its reference reaches {np.abs(theta).max():.3g} rad, {FURTHEST:g} rad at most was expected"
+        )

@@ -1,9 +1,10 @@
-"""How much of a mismatch a model leaves, told from the noise by memory: noise forgets from sample to sample, a mismatch does not.
+"""How much of a mismatch a model leaves, told from the noise by memory: noise forgets from sample to sample, a mismatch
+does not.
 
-    what a run leaves, e(t) = noise + mismatch -> products e(t) e(t + k h), k = 1, 2, 3 -> their mean in each block is the mismatch's power there
-
-The size of the noise need not be known for that, so that a mismatch of a third of the noise shows. What a converter makes of a slow motion has a
-memory, too: that of the simulated motion read with the same step is taken off.
+    what a run leaves, e(t) = noise + mismatch -> products e(t) e(t + k h), k = 1, 2, 3 -> their mean in each block is
+    the mismatch's power there
+ The size of the noise need not be known for that, so that a mismatch of a third of the noise shows. What a converter
+makes of a slow motion has a memory, too: that of the simulated motion read with the same step is taken off.
 """
 
 from __future__ import annotations
@@ -21,15 +22,18 @@ from ers_mj.traces import BLOCK, Trace
 LAGS = (1, 2, 3)  # samples
 FEWEST = 20  # samples in a block; at low sample rates several blocks are one
 FEWEST_PAIRS = 12  # a lag, in a block that is judged
-SIGNIFICANT = 0.085  # of what is left, from which it is a mismatch (0.3 noise levels): of 100 servos without one three leave more than 0.06
+# of what is left, from which it is a mismatch (0.3 noise levels): of 100 servos without one three leave more than 0.06
+SIGNIFICANT = 0.085
 REST = 0.3  # share of what the baseline leaves that another form of the right law may leave in the output
 LEAST = -0.9  # power of a block, in those of the noise, that chance does not go below
 
 
 def left_by_sensor(model: Model, traces: Sequence[Trace]) -> dict[str, float]:
-    """What the model's observer leaves beyond the noise, by sensor ("output", and the kinds of the further channels); 0 where no block is long enough.
+    """What the model's observer leaves beyond the noise, by sensor ("output", and the kinds of the further channels); 0
+    where no block is long enough.
 
-    The mean over blocks of ln(1 + power), the power in that of the noise: a few blocks in which stick and slip fork do not decide it.
+    The mean over blocks of ln(1 + power), the power in that of the noise: a few blocks in which stick and slip fork do
+    not decide it.
     """
     told: dict[str, list[np.ndarray]] = {}
     for record, trace in enumerate(traces):
@@ -39,8 +43,8 @@ def left_by_sensor(model: Model, traces: Sequence[Trace]) -> dict[str, float]:
 
 
 def left_elsewhere(model: Model, traces: Sequence[Trace]) -> float:
-    """The same of the output in the mean over the recordings but the one in which it leaves most: what is missing from a model seldom shows in one alone, in which
-    stick and slip that fork may leave as much. 0 of one recording.
+    """The same of the output in the mean over the recordings but the one in which it leaves most: what is missing from
+    a model seldom shows in one alone, in which stick and slip that fork may leave as much. 0 of one recording.
     """
     left = sorted(max(_mean(_told(model, trace, record)["output"]), 0.0) for record, trace in enumerate(traces))
     return float(np.mean(left[:-1])) if len(left) > 1 else 0.0
@@ -66,8 +70,8 @@ def _mean(logs: np.ndarray) -> float:
 
 
 def more_is_missing(left: Mapping[str, float], without: Mapping[str, float] | None) -> bool:
-    """Whether what a model leaves is more than noise, or, of one with effects that leaves so much ``without`` them, more than another form of the
-    same law would: the mimic of an unknown effect takes a part only.
+    """Whether what a model leaves is more than noise, or, of one with effects that leaves so much ``without`` them,
+    more than another form of the same law would: the mimic of an unknown effect takes a part only.
 
     A mimic in the output is seldom one in the current, which no form of the right law leaves amiss.
     """
@@ -87,8 +91,12 @@ def remembered(e: np.ndarray, known: np.ndarray, block: np.ndarray) -> np.ndarra
     return np.where(pairs >= FEWEST_PAIRS * len(LAGS), total / np.maximum(pairs, 1.0), np.nan)
 
 
-def _converted(simulated: np.ndarray, measured: np.ndarray, sigma: float, step: float, known: np.ndarray, block: np.ndarray) -> np.ndarray:
-    """The same power (B,), in the noise's, of what a converter makes of the simulated output: noise ahead of it takes its sawtooth's waves away."""
+def _converted(
+    simulated: np.ndarray, measured: np.ndarray, sigma: float, step: float, known: np.ndarray, block: np.ndarray
+) -> np.ndarray:
+    """The same power (B,), in the noise's, of what a converter makes of the simulated output: noise ahead of it takes
+    its sawtooth's waves away.
+    """
     zero = measured[np.argmax(known)]
     sawtooth = zero + step * np.rint((simulated - zero) / step) - simulated
     noise = max(sigma**2 - step**2 / 12.0, 0.0)

@@ -19,8 +19,7 @@ MEASURED = (1.0, 0.72, 0.10, 0.50)  # of the ghost, translucent: what was measur
 INK, AMBER = (31, 42, 55), (140, 84, 0)  # of the words: simulated, measured
 INFLATED = 6e-4  # [m] by which a ghost is thicker than the rudder, so that both are seen where they coincide
 MOST_SHAPES = 2000
-INSTALL = ("install EGL (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), "
-           "or libosmesa6 and set MUJOCO_GL=osmesa")
+INSTALL = "install EGL (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), or libosmesa6 and set MUJOCO_GL=osmesa"
 
 
 class Painter:
@@ -40,7 +39,9 @@ class Painter:
             self.context.make_current()
             self.target = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
         except Exception as error:  # PyOpenGL and the drivers raise anything where a library is missing
-            raise InputError(f"pictures cannot be drawn here ({' '.join(str(error).split())[:100]}): {INSTALL}") from None
+            raise InputError(
+                f"pictures cannot be drawn here ({' '.join(str(error).split())[:100]}): {INSTALL}"
+            ) from None
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self.target)
 
     def __enter__(self) -> Painter:
@@ -51,10 +52,14 @@ class Painter:
         self.context.free()
 
     def draw(self, qpos: np.ndarray, measured: float | None = None) -> np.ndarray:
-        """The model with its joints at qpos (nq,) and a ghost of its rudder at the measured output -> (H, W, 3) uint8."""
+        """The model with its joints at qpos (nq,) and a ghost of its rudder at the measured output -> (H, W, 3)
+        uint8.
+        """
         self.data.qpos = qpos
         mujoco.mj_forward(self.model, self.data)
-        mujoco.mjv_updateScene(self.model, self.data, self.option, None, default_camera(self.model), mujoco.mjtCatBit.mjCAT_ALL, self.scene)
+        mujoco.mjv_updateScene(
+            self.model, self.data, self.option, None, default_camera(self.model), mujoco.mjtCatBit.mjCAT_ALL, self.scene
+        )
         if measured is not None:
             add_ghost(self.model, self.other, self.scene, measured)
         image, whole = np.empty((self.height, self.width, 3), np.uint8), mujoco.MjrRect(0, 0, self.width, self.height)
@@ -96,12 +101,15 @@ def add_ghost(model: mujoco.MjModel, data: mujoco.MjData, scene: mujoco.MjvScene
     for k in range(first, first + count):
         shape = scene.geoms[scene.ngeom]
         size = model.geom_size[k] + INFLATED * (model.geom_size[k] > 0)
-        mujoco.mjv_initGeom(shape, model.geom_type[k], size, data.geom_xpos[k], data.geom_xmat[k], np.array(MEASURED, np.float32))
+        mujoco.mjv_initGeom(
+            shape, model.geom_type[k], size, data.geom_xpos[k], data.geom_xmat[k], np.array(MEASURED, np.float32)
+        )
         scene.ngeom += 1
 
 
 def replay_frames(replay: Replay, width: int, height: int) -> Iterator[np.ndarray]:
-    """Every moment of a replay as (H, W, 3) uint8, labelled where there is something to tell; the ghost is what was measured.
+    """Every moment of a replay as (H, W, 3) uint8, labelled where there is something to tell; the ghost is what was
+    measured.
 
     Raises:
         InputError: this machine cannot draw without a window.
@@ -123,7 +131,9 @@ def _labelled(image: np.ndarray, replay: Replay, k: int) -> np.ndarray:
     size = max(10, image.shape[0] // 22)
     picture = Image.fromarray(image)
     for row, (text, colour) in enumerate(lines):
-        ImageDraw.Draw(picture).text((size * 0.8, size * (0.6 + 1.3 * row)), text, fill=colour, font=ImageFont.load_default(size))
+        ImageDraw.Draw(picture).text(
+            (size * 0.8, size * (0.6 + 1.3 * row)), text, fill=colour, font=ImageFont.load_default(size)
+        )
     return np.asarray(picture)
 
 
@@ -160,5 +170,7 @@ def gif_bytes(images: Sequence[np.ndarray], fps: float) -> bytes:
     frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     out = io.BytesIO()
     ends = np.round(100.0 * np.arange(len(frames) + 1) / fps).astype(int) * 10  # [ms], in GIF's steps of 10
-    frames[0].save(out, "GIF", save_all=True, append_images=frames[1:], duration=np.diff(ends).tolist(), loop=0, disposal=1)
+    frames[0].save(
+        out, "GIF", save_all=True, append_images=frames[1:], duration=np.diff(ends).tolist(), loop=0, disposal=1
+    )
     return out.getvalue()

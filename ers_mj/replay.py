@@ -1,6 +1,6 @@
 """A motion for the eye: what a plant's joints do frame by frame, and what was measured beside it.
 
-    datasheet + options -> MechanicalPlant -> motion -> Replay
+datasheet + options -> MechanicalPlant -> motion -> Replay
 """
 
 from __future__ import annotations
@@ -43,8 +43,13 @@ class Replay:
     def only(self, k: int) -> Replay:
         """One moment of it."""
         one = slice(k, k + 1)
-        return replace(self, t=self.t[one], qpos=self.qpos[one], theta=self.theta[one],
-                       measured=None if self.measured is None else self.measured[one])
+        return replace(
+            self,
+            t=self.t[one],
+            qpos=self.qpos[one],
+            theta=self.theta[one],
+            measured=None if self.measured is None else self.measured[one],
+        )
 
     def still(self) -> Replay:
         """The moment that says most: the largest difference from what was measured, the last without a measurement."""
@@ -53,7 +58,9 @@ class Replay:
         return self.only(int(np.nanargmax(np.abs(self.measured - self.theta))))
 
 
-def plant_of(datasheet: Datasheet, linkage: str = "constant", gap: float = 0.0, output_unit: str = "rad") -> MechanicalPlant:
+def plant_of(
+    datasheet: Datasheet, linkage: str = "constant", gap: float = 0.0, output_unit: str = "rad"
+) -> MechanicalPlant:
     """The MuJoCo plant of a datasheet or a model with its effects: the rudder system or one lumped joint.
 
     Args:
@@ -65,14 +72,22 @@ def plant_of(datasheet: Datasheet, linkage: str = "constant", gap: float = 0.0, 
     """
     values = datasheet.to_lumped() | {"tau_e": 0.0} | dict(datasheet.baseline)
     if "b" not in values:
-        raise InputError(f"{datasheet.name or 'the datasheet'}: cannot be shown, it needs b, or J, K_t and R from which b follows")
+        raise InputError(
+            f"{datasheet.name or 'the datasheet'}: cannot be shown, it needs b, or J, K_t and R from which b follows"
+        )
     effects, is_angle = kernel_effects(datasheet.effects, inertia_of(datasheet)), output_unit == "rad"
     shape = bodily(datasheet.parameters, is_angle, values["b"])
     return MechanicalPlant(lumped(values), effects, shape, linkage, gap, is_angle)
 
 
-def posed(plant: MechanicalPlant, t: np.ndarray, theta: np.ndarray, measured: np.ndarray | None = None,
-          theta_m: np.ndarray | None = None, output_unit: str = "rad") -> Replay:
+def posed(
+    plant: MechanicalPlant,
+    t: np.ndarray,
+    theta: np.ndarray,
+    measured: np.ndarray | None = None,
+    theta_m: np.ndarray | None = None,
+    output_unit: str = "rad",
+) -> Replay:
     """The plant put at outputs theta (F,), its drive at theta_m (F,), theta where that is not given."""
     drive = theta if theta_m is None else theta_m
     shown = theta if measured is None else np.concatenate([theta, measured])
@@ -85,11 +100,15 @@ def simulated(plant: MechanicalPlant, t: np.ndarray, u: np.ndarray, moments: np.
     """The plant from rest under u (N,) at t (N,) [s], shown at the samples `moments` (F,)."""
     motion = plant.simulate(t, u)
     _refuse_runaway(t, motion.theta)
-    return posed(plant, t[moments], motion.theta[moments], None, motion.theta_m[moments], "rad" if plant.is_angle else "m")
+    return posed(
+        plant, t[moments], motion.theta[moments], None, motion.theta_m[moments], "rad" if plant.is_angle else "m"
+    )
 
 
 def recorded(plant: MechanicalPlant, trace: Trace, moments: np.ndarray, output_unit: str = "rad") -> Replay:
-    """The plant under a recording's input, started as the recording starts, and what was measured, at `moments` (F,)."""
+    """The plant under a recording's input, started as the recording starts, and what was measured, at `moments`
+    (F,).
+    """
     cut = slice(0, int(moments[-1]) + 1)
     enable, load = (None if x is None else x[cut] for x in (trace.enable, trace.load))
     motion = plant.simulate(trace.t[cut], trace.u[cut], trace.start, enable=enable, load=load)
@@ -105,5 +124,7 @@ def moments_of(t: np.ndarray, fps: float, duration: float) -> np.ndarray:
 
 def _refuse_runaway(t: np.ndarray, theta: np.ndarray) -> None:
     if not np.isfinite(theta).all():
-        raise InputError(f"the simulation leaves all bounds at {t[int(np.argmax(~np.isfinite(theta)))]:.4g} s, "
-                         "check the model and its input")
+        raise InputError(
+            f"the simulation leaves all bounds at {t[int(np.argmax(~np.isfinite(theta)))]:.4g} s, "
+            "check the model and its input"
+        )

@@ -1,6 +1,6 @@
 """Recordings with known truth: a datasheet, effects in the units of a reader, an input, and what a sensor then shows.
 
-    datasheet + effects [SI] -> lumped model [per inertia] -> motion -> sensor -> columns of a recording
+datasheet + effects [SI] -> lumped model [per inertia] -> motion -> sensor -> columns of a recording
 """
 
 from __future__ import annotations
@@ -22,8 +22,20 @@ from ers_mj.plants.reduced import Motion, ReducedModel, lumped
 
 PER_INERTIA = {"torque": "", "damping": " s/{y}", "stiffness": "/{y}", "drag": " s^2/{y}^2", "cubic": "/{y}^3"}
 LUMPED_UNIT = {"torque": "{y}/s^2", "damping": "1/s", "stiffness": "1/s^2", "drag": "1/{y}", "cubic": "1/({y}^2 s^2)"}
-PLAIN_UNIT = {"position": "{y}", "speed": "{y}/s", "acceleration": "{y}/s^2", "input": "{u}", "time": "s",
-              "frequency": "Hz", "phase": "rad", "ratio": "-", "count": "-", "per_position": "1/{y}", "per_position_squared": "1/{y}^2", "supply": "V"}
+PLAIN_UNIT = {
+    "position": "{y}",
+    "speed": "{y}/s",
+    "acceleration": "{y}/s^2",
+    "input": "{u}",
+    "time": "s",
+    "frequency": "Hz",
+    "phase": "rad",
+    "ratio": "-",
+    "count": "-",
+    "per_position": "1/{y}",
+    "per_position_squared": "1/{y}^2",
+    "supply": "V",
+}
 FORCE = {"rad": "N m", "m": "N"}
 AFTER_NOISE = ("sensor_quantisation", "sensor_dropout")  # what the converter and the wire do to a noisy signal
 
@@ -101,15 +113,21 @@ def build_plant(
         from ers_mj.plants.mechanical import MechanicalPlant
         from ers_mj.plants.skeletons import bodily
 
-        return MechanicalPlant(c, chosen, parameters=bodily(datasheet.parameters, True, c.b), linkage=linkage, gap=gap or 0.0)
+        return MechanicalPlant(
+            c, chosen, parameters=bodily(datasheet.parameters, True, c.b), linkage=linkage, gap=gap or 0.0
+        )
     return ReducedModel(stiff_play(c, gap) if gap else c, chosen)
 
 
 def _printed(c: Coefficients, plant: str, effects: Sequence, gap: float | None) -> PrintedPlay:
     if plant != "reduced":
-        raise InputError("Eq. (4) as printed is a torque's play, which no joint has: --play printed needs --plant reduced")
+        raise InputError(
+            "Eq. (4) as printed is a torque's play, which no joint has: --play printed needs --plant reduced"
+        )
     if effects:
-        raise InputError(f"--play printed is Eq. (4) around the bare reduced model, the effect {effects[0][0]} cannot be added")
+        raise InputError(
+            f"--play printed is Eq. (4) around the bare reduced model, the effect {effects[0][0]} cannot be added"
+        )
     if not gap:
         raise InputError("--play printed needs a play, as in --gap 0.5")
     return PrintedPlay(c, printed_threshold(c, gap))
@@ -160,14 +178,18 @@ def _values(datasheet: Datasheet, inductance: bool) -> dict[str, float]:
     values = datasheet.to_lumped()
     values |= {key: datasheet.baseline[key] for key in ("tau_e", "emf_share") if key in datasheet.baseline}
     if "b" not in values:
-        raise InputError(f"{datasheet.name or 'the datasheet'}: cannot be simulated, "
-                         "it needs b, or J, K_t and R from which b follows")
+        raise InputError(
+            f"{datasheet.name or 'the datasheet'}: cannot be simulated, "
+            "it needs b, or J, K_t and R from which b follows"
+        )
     if inductance and not values.get("tau_e"):
         raise InputError(f"{datasheet.name or 'the datasheet'}: has no L and R, --inductance on needs both")
     return values if inductance else values | {"tau_e": 0.0}
 
 
-def _sensed(t: np.ndarray, theta: np.ndarray, effects: Iterable[tuple[str, np.ndarray]], noise: float, seed: int) -> np.ndarray:
+def _sensed(
+    t: np.ndarray, theta: np.ndarray, effects: Iterable[tuple[str, np.ndarray]], noise: float, seed: int
+) -> np.ndarray:
     """What the file holds of the true angle (N,) at times t (N,): the sensor, then its noise, then the converter."""
     y = theta
     for name, values in effects:
@@ -199,7 +221,9 @@ def parse_effect(text: str) -> tuple[str, dict[str, float]]:
         values[key] = _number(value, f"--effect {text}: {key}")
     _vector(effect, values, 1.0)
     if recorded := [p.name for p in effect.parameters if p.recorded and p.name in values]:
-        raise InputError(f"--effect {text}: {recorded[0]} acts through what a recording measured, of which a simulation has none")
+        raise InputError(
+            f"--effect {text}: {recorded[0]} acts through what a recording measured, of which a simulation has none"
+        )
     return effect.name, values
 
 
@@ -224,19 +248,25 @@ def _vector(effect: Effect, values: Mapping[str, float], inertia: float) -> np.n
     known = {parameter.name: parameter for parameter in effect.parameters}
     for key in values:
         if key not in known:
-            raise InputError(f"{effect.name}: there is no parameter {key[:40]!r}; {_nearest(key, known)}"
-                             f"there are {_meanings(effect.parameters)}")
+            raise InputError(
+                f"{effect.name}: there is no parameter {key[:40]!r}; {_nearest(key, known)}"
+                f"there are {_meanings(effect.parameters)}"
+            )
     needed = [p.name for p in effect.parameters if p.positive and p.absent == 0 and p.name not in values]
     if needed or not values:
         what = " and ".join(needed) or "one or more"
         raise InputError(f"{effect.name}: needs {what} of its parameters {_meanings(effect.parameters)}")
     for group in effect.needs:
         if not values.keys() & set(group):
-            raise InputError(f"{effect.name}: does nothing with {', '.join(values)} alone, expected {' or '.join(group)} too")
+            raise InputError(
+                f"{effect.name}: does nothing with {', '.join(values)} alone, expected {' or '.join(group)} too"
+            )
     for group in effect.together:
         if lacking := [key for key in group if key not in values and values.keys() & set(group)]:
-            raise InputError(f"{effect.name}: {', '.join(key for key in group if key in values)} given without {' and '.join(lacking)}, "
-                             f"expected {', '.join(group)} together")
+            raise InputError(
+                f"{effect.name}: {', '.join(key for key in group if key in values)} given without"
+                f" {' and '.join(lacking)}, expected {', '.join(group)} together"
+            )
     given = [_checked(effect, p, float(values[p.name])) if p.name in values else p.absent for p in effect.parameters]
     ends = dict(zip(known, given, strict=True))
     if ends.get("lower", -math.inf) >= ends.get("upper", math.inf):
@@ -247,9 +277,13 @@ def _vector(effect: Effect, values: Mapping[str, float], inertia: float) -> np.n
 
 def _checked(effect: Effect, parameter: Parameter, x: float) -> float:
     if parameter.positive and x <= 0:
-        raise InputError(f"{effect.name}: {parameter.name} = {x:g} is not above zero (leave the effect out for none of it)")
+        raise InputError(
+            f"{effect.name}: {parameter.name} = {x:g} is not above zero (leave the effect out for none of it)"
+        )
     if not parameter.lower <= x <= parameter.upper:
-        raise InputError(f"{effect.name}: {parameter.name} = {x:g} lies outside {parameter.lower:g} .. {parameter.upper:g}")
+        raise InputError(
+            f"{effect.name}: {parameter.name} = {x:g} lies outside {parameter.lower:g} .. {parameter.upper:g}"
+        )
     return x
 
 

@@ -1,14 +1,15 @@
 """The frequency response of a recording, with what noise and distortion leave of it, and how far a model is from it.
 
-    recording -> period of the input -> lines (periodic, as a multisine) or local polynomials (any other) -> Response;  Response, model -> Gap
-
-A periodic input excites some lines of the recording's spectrum and no others. At an excited line stands the best linear approximation; lines between
-the harmonics of the period hold noise and the decay of the first state; harmonics that are not excited hold the distortion besides. The
-decay is smooth over the lines, so that a parabola through the quiet neighbours takes it off (Pintelon and Schoukens, System Identification,
-2nd ed., chapters 4 and 7). Of one period alone noise and distortion are told together.
-
-Any other input excites neighbouring lines alike. About a line k the response and the decay are both taken as parabolas over r = -n..n (local polynomial method,
-ibid., chapter 7), fitted to Y[k + r] = (G + G_1 r + G_2 r^2) U[k + r] + T + T_1 r + T_2 r^2, which neither leaks nor smears a sweep as averaged segments do.
+    recording -> period of the input -> lines (periodic, as a multisine) or local polynomials (any other) -> Response;
+    Response, model -> Gap
+ A periodic input excites some lines of the recording's spectrum and no others. At an excited line stands the best
+linear approximation; lines between the harmonics of the period hold noise and the decay of the first state; harmonics
+that are not excited hold the distortion besides. The decay is smooth over the lines, so that a parabola through the
+quiet neighbours takes it off (Pintelon and Schoukens, System Identification, 2nd ed., chapters 4 and 7). Of one period
+alone noise and distortion are told together.
+ Any other input excites neighbouring lines alike. About a line k the response and the decay are both taken as parabolas
+over r = -n..n (local polynomial method, ibid., chapter 7), fitted to Y[k + r] = (G + G_1 r + G_2 r^2) U[k + r] + T +
+T_1 r + T_2 r^2, which neither leaks nor smears a sweep as averaged segments do.
 """
 
 from __future__ import annotations
@@ -27,8 +28,15 @@ QUIET, EXCITED = 1e-6, 1e-4  # share of the strongest line's power: most of an u
 FEW = 0.25  # share of all lines up to the highest excited one that a single period may excite and still be a multisine
 LEAST_PERIOD = 50  # samples
 NEIGHBOURS = 10  # quiet lines from which decay and noise are taken
-FIRST, LEAST_HALF, MOST_HALF, WIDTH = 2, 8, 60, 1 / 6  # lowest line; lines on either side of a local fit, at least, at most, and in shares of the frequency
-LEVERAGE = 6.0  # times what even excitation would leave of a line's uncertainty (2.25 of a parabola), beyond which a local fit only extrapolates
+FIRST, LEAST_HALF, MOST_HALF, WIDTH = (
+    2,
+    8,
+    60,
+    1 / 6,
+)  # lowest line; lines on either side of a local fit, at least, at most, and in shares of the frequency
+# times what even excitation would leave of a line's uncertainty (2.25 of a parabola), beyond which a local fit only
+# extrapolates
+LEVERAGE = 6.0
 EXACT = 0.03  # relative gap up to which nothing is missing: what leakage leaves of an exact response
 SURE = 0.95  # coherence from which a line counts
 
@@ -45,8 +53,8 @@ class Response:
         g: output over input, complex [output unit / input unit].
         coherence: share of the output's power that the input explains linearly.
         error: standard deviation of g, relative.
-        noise: standard deviation, in one period, of the output's amplitude that does not repeat [output unit]; of a single period or any other input, which
-            cannot tell them apart, with the distortion in it.
+        noise: standard deviation, in one period, of the output's amplitude that does not repeat [output unit]; of a
+            single period or any other input, which cannot tell them apart, with the distortion in it.
         distortion: the same of what repeats and is not linear; NaN where it cannot be told apart.
         output: the output's amplitude [output unit].
     """
@@ -70,9 +78,11 @@ class Response:
 
 @dataclass(frozen=True)
 class Gap:
-    """How far a model is from a response where the response is sure: [dB], [deg], and in which band [Hz] most of it lies.
+    """How far a model is from a response where the response is sure: [dB], [deg], and in which band [Hz] most of it
+    lies.
 
-    ``linear`` tells whether the gap is more than what distortion and noise leave open, so that another linear model would close it.
+    ``linear`` tells whether the gap is more than what distortion and noise leave open, so that another linear model
+    would close it.
     """
 
     lines: int
@@ -98,14 +108,19 @@ def frequency_response(recording: Recording) -> Response:
         used = (count - 1 if count > 2 else count) * period  # the first of three or more holds most of the decay
         return _of_lines(recording, u[-used:], y[-used:], used // period)
     whole = u.size if period is None else period
-    return _of_lines(recording, u[-whole:], y[-whole:], 1) if _is_sparse(u[-whole:]) else _of_neighbours(recording, u, y)
+    return (
+        _of_lines(recording, u[-whole:], y[-whole:], 1) if _is_sparse(u[-whole:]) else _of_neighbours(recording, u, y)
+    )
 
 
 def _even(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Input and output (N,) less the output's mean, holes filled straight."""
     h = np.diff(recording.t)
     if np.ptp(h) > 0.05 * h.mean():
-        raise InputError(f"{recording.name}: its samples are {1e3 * h.min():.4g} to {1e3 * h.max():.4g} ms apart, a frequency response needs even spacing")
+        raise InputError(
+            f"{recording.name}: its samples are {1e3 * h.min():.4g} to {1e3 * h.max():.4g} ms apart, a frequency"
+            " response needs even spacing"
+        )
     if np.ptp(recording.u) == 0:
         raise InputError(f"{recording.name}: its input is constant, a frequency response needs one that varies")
     y = np.interp(recording.t, recording.t[recording.valid], recording.y[recording.valid])
@@ -152,12 +167,24 @@ def _of_lines(recording: Recording, u: np.ndarray, y: np.ndarray, periods: int) 
     spread *= periods
     total = spread + np.nan_to_num(distorted)
     size = np.abs(true) ** 2
-    return Response(recording.name, "periodic", periods, lines / (n * recording.sample_time), true / U[lines], size / (size + total),
-                    np.sqrt(total / (periods * size)), np.sqrt(spread), np.sqrt(distorted), np.abs(true))
+    return Response(
+        recording.name,
+        "periodic",
+        periods,
+        lines / (n * recording.sample_time),
+        true / U[lines],
+        size / (size + total),
+        np.sqrt(total / (periods * size)),
+        np.sqrt(spread),
+        np.sqrt(distorted),
+        np.abs(true),
+    )
 
 
 def _cleaned(Y: np.ndarray, lines: np.ndarray, quiet: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Y (K,) at some lines less the decay that a parabola through the quiet lines around tells, and those lines' variance about it (K,)."""
+    """Y (K,) at some lines less the decay that a parabola through the quiet lines around tells, and those lines'
+    variance about it (K,).
+    """
     true, spread = np.empty(lines.size, complex), np.empty(lines.size)
     for i, k in enumerate(lines):
         near = quiet[_nearest(quiet, k)]
@@ -176,7 +203,9 @@ def _nearest(lines: np.ndarray, k: int) -> slice:
 
 
 def _of_neighbours(recording: Recording, u: np.ndarray, y: np.ndarray) -> Response:
-    """By local polynomials, of the output's differences from sample to sample: a servo's speed follows its input more evenly than its angle."""
+    """By local polynomials, of the output's differences from sample to sample: a servo's speed follows its input more
+    evenly than its angle.
+    """
     h, u, y = recording.sample_time, u[:-1], np.diff(y)
     U, Y = 2.0 * np.fft.rfft(u) / u.size, 2.0 * np.fft.rfft(y) / u.size
     least, found, k = EXCITED * np.max(np.abs(U) ** 2), [], FIRST
@@ -191,17 +220,32 @@ def _of_neighbours(recording: Recording, u: np.ndarray, y: np.ndarray) -> Respon
                 found.append((k, g, variance * rest, rest, power))
         k += half // 2
     if not found:
-        raise InputError(f"{recording.name}: its input excites no band of frequencies evenly, a frequency response needs a multisine, a sweep, steps or noise")
+        raise InputError(
+            f"{recording.name}: its input excites no band of frequencies evenly, a frequency response needs a"
+            " multisine, a sweep, steps or noise"
+        )
     k, g, variance, rest, power = (np.array(column) for column in zip(*found))
     f_hz = k / (u.size * h)
     differing = np.exp(2j * np.pi * f_hz * h) - 1.0
     size, rest = np.abs(g / differing) ** 2 * power, rest / np.abs(differing) ** 2
-    return Response(recording.name, "local", 1, f_hz, g / differing, size / (size + rest), np.sqrt(variance) / np.abs(g), np.sqrt(rest),
-                    np.full(f_hz.size, np.nan), np.sqrt(size + rest))
+    return Response(
+        recording.name,
+        "local",
+        1,
+        f_hz,
+        g / differing,
+        size / (size + rest),
+        np.sqrt(variance) / np.abs(g),
+        np.sqrt(rest),
+        np.full(f_hz.size, np.nan),
+        np.sqrt(size + rest),
+    )
 
 
 def _local(U: np.ndarray, Y: np.ndarray, r: np.ndarray, scale: float) -> tuple[complex, float, float]:
-    """(g, its variance over that of the rest, variance of the rest) at r = 0 of lines (K,), from parabolas of the response and of the decay."""
+    """(g, its variance over that of the rest, variance of the rest) at r = 0 of lines (K,), from parabolas of the
+    response and of the decay.
+    """
     powers = np.vander(r, 3, increasing=True)
     A = np.concatenate([U[:, None] * powers, scale * powers], axis=1)
     inverse = np.linalg.pinv(A.conj().T @ A, hermitian=True)
@@ -209,7 +253,8 @@ def _local(U: np.ndarray, Y: np.ndarray, r: np.ndarray, scale: float) -> tuple[c
     return complex(c[0]), float(inverse[0, 0].real), float(np.sum(np.abs(Y - A @ c) ** 2) / (r.size - 6))
 
 
-# -- against a model ------------------------------------------------------------------------------------------------------
+# -- against a model
+# ------------------------------------------------------------------------------------------------------
 
 
 def gap(response: Response, model: np.ndarray) -> Gap | None:
@@ -225,10 +270,18 @@ def gap(response: Response, model: np.ndarray) -> Gap | None:
     off = np.abs(ratio - 1.0) ** 2
     linear = bool(off.mean() > 4.0 * np.mean(response.error[k] ** 2) + EXACT**2)
     band = shortest_band(response.f_hz[k], off)
-    what = "more than noise and distortion leave open, its linear part is off" if linear else "no more than noise and distortion leave open"
-    sentence = (f"{response.name}: the model is {_rms(db):.2g} dB and {_rms(deg):.2g} deg off (RMS over {k.sum()} lines), most of it at {band[0]:.3g} to "
-                f"{band[1]:.3g} Hz: {what}")
-    return Gap(int(k.sum()), _rms(db), float(np.abs(db).max()), _rms(deg), float(np.abs(deg).max()), band, linear, sentence)
+    what = (
+        "more than noise and distortion leave open, its linear part is off"
+        if linear
+        else "no more than noise and distortion leave open"
+    )
+    sentence = (
+        f"{response.name}: the model is {_rms(db):.2g} dB and {_rms(deg):.2g} deg off (RMS over {k.sum()} lines), most"
+        f" of it at {band[0]:.3g} to {band[1]:.3g} Hz: {what}"
+    )
+    return Gap(
+        int(k.sum()), _rms(db), float(np.abs(db).max()), _rms(deg), float(np.abs(deg).max()), band, linear, sentence
+    )
 
 
 def shortest_band(f_hz: np.ndarray, off: np.ndarray, share: float = 0.5) -> tuple[float, float]:

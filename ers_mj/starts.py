@@ -14,13 +14,23 @@ from ers_mj.traces import Trace, start_samples, start_seen
 
 SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
 SPIKE_SAMPLES, SPIKE_TIME = 3, 0.005  # length of a spike at most, and [s]
-HELD_SIGMAS, HELD_STEPS, HELD_LEAP = 6.0, 2.0, (0.6, 1.6)  # noise levels and converter steps of a model's motion during a hold; share of it in the leap after
-MOVED, WITHIN = 0.25, 17  # [s] from the first threshold of a coarse converter, up to which it tells a start; how many places within its step are tried
+HELD_SIGMAS, HELD_STEPS, HELD_LEAP = (
+    6.0,
+    2.0,
+    (0.6, 1.6),
+)  # noise levels and converter steps of a model's motion during a hold; share of it in the leap after
+MOVED, WITHIN = (
+    0.25,
+    17,
+    # [s] from the first threshold of a coarse converter, up to which it tells a start; how many places within its step are
+    # tried
+)
 FEWEST_SPIKES = 3  # that the recordings must show by themselves before the model's error is searched
 
 
 def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
-    """The traces without the spikes and holds that only a model's motion betrays, where the recordings themselves show that their sensor has some.
+    """The traces without the spikes and holds that only a model's motion betrays, where the recordings themselves show
+    that their sensor has some.
 
     Within SPIKE_TIME a rudder's own error is smooth, but for the blows of a play or a stop, which look like a spike.
     """
@@ -39,13 +49,17 @@ def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
 
 
 def _held(trace: Trace, simulated: np.ndarray) -> list[slice]:
-    """Repeats of the output while the model moves, after which it leaps to where the model is: a rudder that sticks has no such leap."""
+    """Repeats of the output while the model moves, after which it leaps to where the model is: a rudder that sticks has
+    no such leap.
+    """
     y, out = trace.y, []
     for s in held_spans(y, 2):
-        if s.stop < y.size and trace.valid[s.start:s.stop + 1].all():
+        if s.stop < y.size and trace.valid[s.start : s.stop + 1].all():
             moved, leap = simulated[s.stop - 1] - simulated[s.start], y[s.stop] - y[s.start]
             way = simulated[s.stop] - simulated[s.start]
-            if abs(moved) > max(HELD_SIGMAS * trace.sigma, HELD_STEPS * trace.quantum) and HELD_LEAP[0] * abs(way) < leap * np.sign(way) < HELD_LEAP[1] * abs(way):
+            if abs(moved) > max(HELD_SIGMAS * trace.sigma, HELD_STEPS * trace.quantum) and HELD_LEAP[0] * abs(
+                way
+            ) < leap * np.sign(way) < HELD_LEAP[1] * abs(way):
                 out.append(slice(s.start + 1, s.stop))
     return out
 
@@ -58,7 +72,8 @@ def with_starts(model: Model, traces: Sequence[Trace]) -> list[Trace]:
 def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, float]:
     """(output, speed) at the first sample by least squares of a free run on the first 50 ms or 10 samples.
 
-    A speed is a poor excuse for a wrong model: it starts at rest unless the recording itself shows a speed, and with one that this allows (start_seen).
+    A speed is a poor excuse for a wrong model: it starts at rest unless the recording itself shows a speed, and with
+    one that this allows (start_seen).
     """
     if trace.converter is not None:
         return _start_within(model, trace, record)
@@ -70,12 +85,12 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
         return e if np.all(np.isfinite(e)) else np.full(n, 1e9)
 
     def settle(x, moving):
-        step = np.array([0.1 * trace.sigma, trace.sigma / (trace.t[n - 1] - trace.t[0])])[:1 + moving]
+        step = np.array([0.1 * trace.sigma, trace.sigma / (trace.t[n - 1] - trace.t[0])])[: 1 + moving]
         e = misses(x)
         for _ in range(6):
             j = np.column_stack([(misses(x + np.eye(2)[k] * step[k]) - e) / step[k] for k in range(1 + moving)])
             move = np.zeros(2)
-            move[:1 + moving] = -np.linalg.lstsq(j, e, rcond=1e-9)[0]
+            move[: 1 + moving] = -np.linalg.lstsq(j, e, rcond=1e-9)[0]
             trial = misses(x + move)
             if not trial @ trial < e @ e:
                 break
@@ -92,9 +107,13 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
 
 
 def _start_within(model: Model, trace: Trace, record: int) -> tuple[float, float]:
-    """The same behind a coarse converter: where within its first step the rudder was is told by when it passed the first thresholds."""
+    """The same behind a coarse converter: where within its first step the rudder was is told by when it passed the
+    first thresholds.
+    """
     passed = thresholds(trace.y)
-    head = trace.part(0, max(start_samples(trace.t), int(np.searchsorted(trace.t, trace.t[passed[0]] + MOVED)) if passed.size else 0))
+    head = trace.part(
+        0, max(start_samples(trace.t), int(np.searchsorted(trace.t, trace.t[passed[0]] + MOVED)) if passed.size else 0)
+    )
     theta, omega = trace.y[np.argmax(trace.valid)], trace.start[1]
 
     def missed(place):

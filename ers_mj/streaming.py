@@ -1,9 +1,8 @@
 """Text that arrives in pieces, in a recording's CSV format -> samples of time, input and output, checked as they come.
 
     pieces of text -> whole lines -> header: columns by role -> rows: numbers -> (t, u, y)
-
-The columns are a recording's (see recording.COLUMNS) with its units; whatever else a line holds is ignored. A missing output is NaN, a missing input
-the one before.
+ The columns are a recording's (see recording.COLUMNS) with its units; whatever else a line holds is ignored. A missing
+output is NaN, a missing input the one before.
 """
 
 from __future__ import annotations
@@ -59,8 +58,10 @@ class Stream:
         columns = [column.strip(' \t"') for column in line.split(self._delimiter)]
         if twice := [c for c in columns if columns.count(c) > 1]:
             raise InputError(f"{self.name}: the column {twice[0]} stands there more than once")
-        chosen = {COLUMNS[contract].field: (COLUMNS[contract], columns.index(column))
-                  for contract, column in choose_columns(columns, self._mapping, self.name).items()}
+        chosen = {
+            COLUMNS[contract].field: (COLUMNS[contract], columns.index(column))
+            for contract, column in choose_columns(columns, self._mapping, self.name).items()
+        }
         self._cells = [(chosen[field][1], chosen[field][0].factor, columns[chosen[field][1]]) for field in FIELDS]
         self.units, self._width = {field: chosen[field][0].unit for field in FIELDS}, len(columns)
 
@@ -74,7 +75,9 @@ class Stream:
             raise InputError(f"{self.name}: the time {self._cells[0][2]} {what} in data row {self._rows}")
         self._time, self._input = t, self._input if u != u else u
         if self._input != self._input:
-            raise InputError(f"{self.name}: {self._cells[1][2]} is missing in data row {self._rows}, before any value of it")
+            raise InputError(
+                f"{self.name}: {self._cells[1][2]} is missing in data row {self._rows}, before any value of it"
+            )
         return t, self._input, y
 
     def _number(self, cell: str, label: str) -> float:
@@ -84,7 +87,10 @@ class Stream:
         try:
             x = float(text if self._delimiter == "," else text.replace(",", "."))
         except ValueError:
-            raise InputError(f"{self.name}: the column {label} has the text {text[:40]!r} in data row {self._rows}, a number was expected") from None
+            raise InputError(
+                f"{self.name}: the column {label} has the text {text[:40]!r} in data row {self._rows}, a number was"
+                " expected"
+            ) from None
         if math.isinf(x):
             raise InputError(f"{self.name}: {label} is infinite in data row {self._rows}")
         return x

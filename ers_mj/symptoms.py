@@ -9,14 +9,35 @@ SHORTEST_HELD = 5  # samples
 FEWEST_LEVELS = 3  # distinct values below which no lattice can be told
 FEWEST_REVISITED = 0.05  # share of the distinct values that a converter shows twice or more
 COARSE = 200  # levels of travel below which even a decimal grid acts as a converter
-JUMP, CALM_CHANGES, LONGEST_EXCURSION = 8.0, 6, 50  # noise levels of a jump; changes on either side that are usual; samples
-ON_LATTICE = 0.18  # of a step by which a gap may miss a multiple of it: a coarse converter behind a fine one of a seventh of its step misses by that
+JUMP, CALM_CHANGES, LONGEST_EXCURSION = (
+    8.0,
+    6,
+    50,
+)  # noise levels of a jump; changes on either side that are usual; samples
+# of a step by which a gap may miss a multiple of it: a coarse converter behind a fine one of a seventh of its step
+# misses by that
+ON_LATTICE = 0.18
 ONE_STEP = 0.3  # of a step by which gaps of one step, seen through a finer converter, may differ
-LEAP = 3.5, 6.0, 1.5  # grid steps, noise levels beyond the usual change, and usual changes that the catching up after a held span must exceed at least
-LEAP_SIDES, LEAP_WAY = 4, (0.5, 2.0)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
-DITHER, COLOURED = 0.35, 3.0  # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may let it stay
+LEAP = (
+    3.5,
+    6.0,
+    1.5,
+    # grid steps, noise levels beyond the usual change, and usual changes that the catching up after a held span must exceed
+    # at least
+)
+LEAP_SIDES, LEAP_WAY = (
+    4,
+    (0.5, 2.0),
+)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
+DITHER, COLOURED = (
+    0.35,
+    3.0,
+    # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may let
+    # it stay
+)
 FEWEST_TURNS = 5  # of the reading within NEIGHBOURS, as noise makes them and motion does not
-FINER = 8  # steps between any two neighbouring levels, from which a lattice that all are on is chance, or a converter behind
+# steps between any two neighbouring levels, from which a lattice that all are on is chance, or a converter behind
+FINER = 8
 FLOAT32 = float(np.finfo(np.float32).eps)
 WITHIN = 1.75  # times the smallest gap between rounded levels up to which a gap is one step of the converter ahead
 REACHES = 2.5, 5.0, 10.0, 20.0  # steps up to which gaps are counted, one after the other, to know the step ahead
@@ -38,8 +59,9 @@ def frozen_spans(y: np.ndarray, grid: float) -> list[slice]:
 
 
 def unmoved_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
-    """Repeats of y (N,) longer than noise of DITHER steps and more, ``sigma`` with the converter's own, leaves a reading alone, if it is less than a step,
-    and just before or after which the reading goes to and fro: a rudder at rest may be quieter than a moving one.
+    """Repeats of y (N,) longer than noise of DITHER steps and more, ``sigma`` with the converter's own, leaves a
+    reading alone, if it is less than a step, and just before or after which the reading goes to and fro: a rudder at
+    rest may be quieter than a moving one.
     """
     noise = math.sqrt(max(sigma**2 - grid**2 / 12.0, 0.0))
     if not DITHER * grid < noise < grid:
@@ -56,15 +78,20 @@ def _turns(changes: np.ndarray) -> int:
 
 
 def leapt_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
-    """Repeats after which y (N,) leaps to where the speed before and after would have brought it meanwhile: a hold that a coarse grid or a quiet
-    sensor does not betray by its missing noise. A rudder that sticks and breaks loose has no speed before it, and a larger one after it.
+    """Repeats after which y (N,) leaps to where the speed before and after would have brought it meanwhile: a hold that
+    a coarse grid or a quiet sensor does not betray by its missing noise. A rudder that sticks and breaks loose has no
+    speed before it, and a larger one after it.
     """
     out = []
     for s in held_spans(y, 3):
         first, last = s.start - LEAP_SIDES, s.stop + LEAP_SIDES
         if first < 0 or last >= y.size:
             continue
-        leap, before, after = y[s.stop] - y[s.stop - 1], (y[s.start] - y[first]) / LEAP_SIDES, (y[last] - y[s.stop]) / LEAP_SIDES
+        leap, before, after = (
+            y[s.stop] - y[s.stop - 1],
+            (y[s.start] - y[first]) / LEAP_SIDES,
+            (y[last] - y[s.stop]) / LEAP_SIDES,
+        )
         way = (s.stop - s.start) * 0.5 * (before + after)
         usual = max(abs(before), abs(after))
         least = max(LEAP[0] * grid, LEAP[1] * sigma + usual, LEAP[2] * usual)
@@ -113,10 +140,10 @@ def _noise(y: np.ndarray) -> float:
 def converter_step(y: np.ndarray) -> float:
     """The step of the lattice that y (N,) lies on, in y's unit; 0.0 when there is none.
 
-    The differences between neighbouring distinct values must be whole multiples of one step, exactly or,
-    where values were rounded in print or by a second converter, within ON_LATTICE of it. The decimal grid of the print is a
-    lattice too: it counts only where the travel has fewer than 200 of its steps, for then it hides as
-    much as a converter would. Pass values in the unit they were printed in.
+    The differences between neighbouring distinct values must be whole multiples of one step, exactly or, where values
+    were rounded in print or by a second converter, within ON_LATTICE of it. The decimal grid of the print is a lattice
+    too: it counts only where the travel has fewer than 200 of its steps, for then it hides as much as a converter
+    would. Pass values in the unit they were printed in.
     """
     levels, counts = np.unique(y[np.isfinite(y)], return_counts=True)
     if len(levels) < FEWEST_LEVELS or np.mean(counts > 1) < FEWEST_REVISITED:
@@ -138,11 +165,15 @@ def decimal_grain(levels: np.ndarray) -> float:
 
 
 def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
-    """The largest step that nine in ten differences of the levels are multiples of, within ON_LATTICE; what two kinds of gap differ by may be it as well."""
+    """The largest step that nine in ten differences of the levels are multiples of, within ON_LATTICE; what two kinds
+    of gap differ by may be it as well.
+    """
     finest = 8 * max(grain, FLOAT32 * np.abs(levels).max())
     gaps = np.diff(levels)
     gaps = gaps[gaps > finest / 8]
-    usual = np.append(np.quantile(gaps, LATTICE_QUANTILES), np.max(gaps[gaps < WITHIN * np.min(gaps)]))  # the rarer kind, too, where there are two
+    usual = np.append(
+        np.quantile(gaps, LATTICE_QUANTILES), np.max(gaps[gaps < WITHIN * np.min(gaps)])
+    )  # the rarer kind, too, where there are two
     begun = {*usual, *np.abs(usual[:, None] - usual).ravel()}
     steps = [_refined(gaps, step) for step in begun if step >= finest]
     step = max((step for step in steps if np.mean(_on_lattice(gaps, step)) >= 0.9), default=0.0)
@@ -150,7 +181,8 @@ def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
 
 
 def _ahead(levels: np.ndarray, step: float) -> float:
-    """The step of a coarser converter ahead of the one of this ``step``, which rounds its levels: neighbours are two or three steps apart then, never one.
+    """The step of a coarser converter ahead of the one of this ``step``, which rounds its levels: neighbours are two or
+    three steps apart then, never one.
     0.0 where there is none.
     """
     gaps = np.diff(levels)
@@ -172,7 +204,9 @@ def _on_lattice(gaps: np.ndarray, step: float) -> np.ndarray:
 
 
 def _refined(gaps: np.ndarray, step: float) -> float:
-    """The step by least squares over the gaps that are multiples of it, begun with the mean of those that may be one step."""
+    """The step by least squares over the gaps that are multiples of it, begun with the mean of those that may be one
+    step.
+    """
     alike = gaps[np.abs(gaps - step) < ONE_STEP * step]
     step = float(np.mean(alike)) if alike.size else float(step)
     gaps = gaps[_on_lattice(gaps, step)]
@@ -184,19 +218,21 @@ def _refined(gaps: np.ndarray, step: float) -> float:
 
 
 def spikes(y: np.ndarray, sigma: float) -> list[slice]:
-    """Excursions, and single samples that jump: no motion goes and comes back within two, however many there are (at 5 a second and 200 Hz 4 % of the
-    changes are theirs)."""
+    """Excursions, and single samples that jump: no motion goes and comes back within two, however many there are (at 5
+    a second and 200 Hz 4 % of the changes are theirs)."""
     found = excursions(y, sigma)
     alone = excursions(y, sigma, usual=0.9, longest=1)
     return found + [s for s in alone if not any(s.start < other.stop and other.start < s.stop for other in found)]
 
 
-def excursions(y: np.ndarray, sigma: float, times: float = JUMP, usual: float = 0.98,
-               longest: int = LONGEST_EXCURSION) -> list[slice]:
+def excursions(
+    y: np.ndarray, sigma: float, times: float = JUMP, usual: float = 0.98, longest: int = LONGEST_EXCURSION
+) -> list[slice]:
     """Spans of at most ``longest`` samples in which y (N,) jumps away from its course and back again.
 
-    A jump is a change from sample to sample that differs from the usual one around it by more than ``times`` noise levels ``sigma``, and
-    as many times what a share ``usual`` of the changes in this recording stays below: quick motion.
+    A jump is a change from sample to sample that differs from the usual one around it by more than ``times`` noise
+    levels ``sigma``, and as many times what a share ``usual`` of the changes in this recording stays below: quick
+    motion.
     """
     known = np.flatnonzero(np.isfinite(y))
     change = np.diff(y[known])
@@ -210,7 +246,7 @@ def excursions(y: np.ndarray, sigma: float, times: float = JUMP, usual: float = 
     for i, k in enumerate(large):
         if k < end:
             continue
-        for back in large[i + 1:]:
+        for back in large[i + 1 :]:
             if back - k > longest:
                 break
             if abs(jump[k] + jump[back]) < 0.5 * abs(jump[k]):

@@ -1,4 +1,5 @@
-"""Files and columns: CSV or Parquet to a table of named columns, cells to numbers, and text to a file that appears whole.
+"""Files and columns: CSV or Parquet to a table of named columns, cells to numbers, and text to a file that appears
+whole.
 
 What cannot be read is refused with one sentence (`InputError`).
 """
@@ -60,7 +61,7 @@ def _csv(content: bytes, name: str) -> pa.Table:
     """The cells as text, under the names of the first line; semicolons bring decimal commas."""
     header, body = _header_and_body(content, name)
     delimiter = max(",;\t", key=header.count)
-    columns = [column.strip(" \t\"") for column in header.split(delimiter)]
+    columns = [column.strip(' \t"') for column in header.split(delimiter)]
     _refuse_twice(columns, name)
     table = _cells(body, columns, delimiter, name)
     if delimiter == ",":

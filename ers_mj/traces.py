@@ -26,7 +26,9 @@ SURE_SPEED = 3.0  # standard deviations within which a speed at the start may li
 
 @dataclass(frozen=True)
 class Channel:
-    """What another sensor saw, (N,) on the output's side of the gear: "current" [A], "speed" or "motor" angle; NaN where missing."""
+    """What another sensor saw, (N,) on the output's side of the gear: "current" [A], "speed" or "motor" angle; NaN
+    where missing.
+    """
 
     kind: str
     values: np.ndarray
@@ -35,10 +37,12 @@ class Channel:
 
 @dataclass(frozen=True)
 class Trace:
-    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the (reading, speed) it starts with, and the spans that its sensor lost.
+    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the (reading, speed) it starts with, and the
+    spans that its sensor lost.
 
-    ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output. ``supply`` is the measured one
-    [V] (N,), None where none was measured or it does not vary; ``converter`` the one whose steps are coarse for the travel, where there is one.
+    ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output.
+    ``supply`` is the measured one [V] (N,), None where none was measured or it does not vary; ``converter`` the one
+    whose steps are coarse for the travel, where there is one.
     """
 
     name: str
@@ -77,10 +81,23 @@ class Trace:
         """Samples begin..end as a trace of their own."""
         cut = slice(begin, end)
         pick = lambda a: None if a is None else a[cut]  # noqa: E731
-        made = make_trace(self.name, self.t[cut], self.u[cut], self.y[cut], self.valid[cut], pick(self.enable),
-                          pick(self.load), self.sigma, self.quantum)
-        return replace(made, channels=tuple(replace(c, values=c.values[cut]) for c in self.channels), supply=pick(self.supply),
-                       converter=self.converter)
+        made = make_trace(
+            self.name,
+            self.t[cut],
+            self.u[cut],
+            self.y[cut],
+            self.valid[cut],
+            pick(self.enable),
+            pick(self.load),
+            self.sigma,
+            self.quantum,
+        )
+        return replace(
+            made,
+            channels=tuple(replace(c, values=c.values[cut]) for c in self.channels),
+            supply=pick(self.supply),
+            converter=self.converter,
+        )
 
     def sparse(self, stride: int) -> Trace:
         """Every so many samples of a uniform trace, under the mean of what was put in between."""
@@ -90,9 +107,19 @@ class Trace:
         pick = lambda a: None if a is None else np.ascontiguousarray(a[some])  # noqa: E731
         mean = np.add.reduceat(self.u, begins) / np.diff(np.append(begins, self.t.size))
         block = self.block[some]
-        return replace(self, t=pick(self.t), u=mean, y=pick(self.y), valid=pick(self.valid), enable=pick(self.enable), load=pick(self.load), block=block,
-                       counts=np.bincount(block[self.valid[some]], minlength=block[-1] + 1).astype(float), supply=pick(self.supply),
-                       channels=tuple(replace(c, values=pick(c.values)) for c in self.channels))
+        return replace(
+            self,
+            t=pick(self.t),
+            u=mean,
+            y=pick(self.y),
+            valid=pick(self.valid),
+            enable=pick(self.enable),
+            load=pick(self.load),
+            block=block,
+            counts=np.bincount(block[self.valid[some]], minlength=block[-1] + 1).astype(float),
+            supply=pick(self.supply),
+            channels=tuple(replace(c, values=pick(c.values)) for c in self.channels),
+        )
 
     def without(self, spans: Sequence[slice]) -> Trace:
         """The trace with further spans lost."""
@@ -101,8 +128,12 @@ class Trace:
         valid = self.valid.copy()
         for span in spans:
             valid[span] = False
-        made = make_trace(self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum, self.start)
-        return replace(made, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans))
+        made = make_trace(
+            self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum, self.start
+        )
+        return replace(
+            made, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans)
+        )
 
     @cached_property
     def seen(self) -> np.ndarray:
@@ -130,7 +161,9 @@ class Trace:
 
     def plain(self, e: np.ndarray) -> np.ndarray:
         """Residuals (rows,) in sigmas as they would be without what a coarse converter's thresholds tell."""
-        return e if self.converter is None else np.concatenate([self.converter.plain(e[:self.t.size]), e[self.t.size:]])
+        return (
+            e if self.converter is None else np.concatenate([self.converter.plain(e[: self.t.size]), e[self.t.size :]])
+        )
 
     @property
     def rows(self) -> int:
@@ -139,7 +172,8 @@ class Trace:
 
 
 def trace_of(recording: Recording, inertia: float | None) -> Trace:
-    """A recording as a trace; its known load torque becomes an acceleration where the inertia [kg m^2] is known, else nothing.
+    """A recording as a trace; its known load torque becomes an acceleration where the inertia [kg m^2] is known, else
+    nothing.
 
     Spans in which the sensor shows a spike, or hangs, are no measurement of the output.
     """
@@ -150,7 +184,9 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
         stuck += [s for s in found if not at_extreme(y, s) and not _meets(s, stuck)]
     stuck += [s for s in leapt_spans(y, recording.quantum, sigma) if not _meets(s, stuck)]
     lost = (*spikes(np.where(recording.valid, y, np.nan), sigma), *stuck)
-    trace = make_trace(recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum)
+    trace = make_trace(
+        recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum
+    )
     trace = trace.without(lost)
     return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid), supply=_supply(recording))
 
@@ -165,7 +201,9 @@ def counted(traces: Sequence[Trace], travel: float) -> list[Trace]:
 
 
 def _supply(recording: Recording) -> np.ndarray | None:
-    """The measured supply [V] (N,), a missing sample between its neighbours; None where hardly any is known or it does not vary."""
+    """The measured supply [V] (N,), a missing sample between its neighbours; None where hardly any is known or it does
+    not vary.
+    """
     if recording.vin is None or (known := np.isfinite(recording.vin)).mean() < KNOWN:
         return None
     supply = np.interp(recording.t, recording.t[known], recording.vin[known])
@@ -176,7 +214,8 @@ def _supply(recording: Recording) -> np.ndarray | None:
 def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
     """The current, the speed and the motor's angle where a recording holds them and they vary.
 
-    The motor's angle is brought to the output's side of the gear by a straight line through both, so that ratio and zero are not judged.
+    The motor's angle is brought to the output's side of the gear by a straight line through both, so that ratio and
+    zero are not judged.
     """
     found = []
     for kind, values in (("current", recording.current), ("speed", recording.omega), ("motor", recording.theta_m)):
@@ -191,29 +230,39 @@ def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
             both = known & valid
             slope, zero = np.polyfit(recording.y[both], values[both], 1)
             values = (values - zero) / slope
-        found.append(Channel(kind, np.ascontiguousarray(values), noise_sigma(values[known], converter_step(values[known]))))
+        found.append(
+            Channel(kind, np.ascontiguousarray(values), noise_sigma(values[known], converter_step(values[known])))
+        )
     return tuple(found)
 
 
 def _integrates(recording: Recording, omega: np.ndarray) -> bool:
-    """Whether a speed is that of the output at the same time: its integral over 0.1 s is the way made, within three times the noise.
+    """Whether a speed is that of the output at the same time: its integral over 0.1 s is the way made, within three
+    times the noise.
 
-    What a drive reports as speed is often an older, filtered difference of the angle, which tells nothing new and that late.
+    What a drive reports as speed is often an older, filtered difference of the angle, which tells nothing new and that
+    late.
     """
     t, n = recording.t, max(1, round(0.1 / recording.sample_time))
     way = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
     miss = (way[n:] - way[:-n] - recording.y[n:] + recording.y[:-n])[::n]
     miss, known = miss[np.isfinite(miss)], np.isfinite(omega)
-    noise = math.hypot(noise_sigma(recording.y[recording.valid], recording.quantum) * math.sqrt(2.0),
-                       noise_sigma(omega[known], converter_step(omega[known])) * math.sqrt(n) * recording.sample_time)
+    noise = math.hypot(
+        noise_sigma(recording.y[recording.valid], recording.quantum) * math.sqrt(2.0),
+        noise_sigma(omega[known], converter_step(omega[known])) * math.sqrt(n) * recording.sample_time,
+    )
     return bool(miss.size) and float(np.sqrt(np.mean(miss**2))) < 3.0 * noise
 
 
 def make_trace(name, t, u, y, valid, enable, load, sigma, quantum, start: tuple[float, float] | None = None) -> Trace:
-    """A trace with its blocks of BLOCK seconds and its initial state, where that is not known as the samples show it."""
+    """A trace with its blocks of BLOCK seconds and its initial state, where that is not known as the samples show
+    it.
+    """
     block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
     counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
-    trace = Trace(name, t, u, np.where(valid, y, np.nan), valid, enable, load, sigma, quantum, start or (0.0, 0.0), block, counts)
+    trace = Trace(
+        name, t, u, np.where(valid, y, np.nan), valid, enable, load, sigma, quantum, start or (0.0, 0.0), block, counts
+    )
     return trace if start else replace(trace, start=_started(trace))
 
 
@@ -231,11 +280,12 @@ def start_samples(t: np.ndarray) -> int:
 
 
 def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float]:
-    """The least and the largest speed at the first of the samples (N,) that they allow, without a model: both 0 where rest is allowed.
+    """The least and the largest speed at the first of the samples (N,) that they allow, without a model: both 0 where
+    rest is allowed.
 
-    Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no more than their noise; the best one
-    where none does. A speed against which the very first samples go, or the whole head without one sample that goes along, is none: it is how a
-    polynomial meets a rudder that is thrown from rest.
+    Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no
+    more than their noise; the best one where none does. A speed against which the very first samples go, or the whole
+    head without one sample that goes along, is none: it is how a polynomial meets a rudder that is thrown from rest.
     """
     known = np.isfinite(y)
     t, y = t[known] - t[0], y[known]
@@ -248,16 +298,22 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
             coefficient, *_ = np.linalg.lstsq(design, y[:n], rcond=None)
             missed = math.sqrt(float(np.sum((y[:n] - design @ coefficient) ** 2)) / (n - degree - 1)) / sigma
             reach = SURE_SPEED * max(missed, 1.0) * sigma * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
-            found.append((missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1]))
+            found.append(
+                (missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1])
+            )
     enough = max(1.0, min(missed for missed, *_ in found))
-    low, high = (pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:]))
+    low, high = (
+        pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:])
+    )
     along, seen = np.sign(low) * (y - y[0]), SURE_SPEED * math.sqrt(2.0) * sigma
-    thrown = -np.min(along[1:1 + FIRST]) > seen or -along[-1] > seen >= np.max(along)
+    thrown = -np.min(along[1 : 1 + FIRST]) > seen or -along[-1] > seen >= np.max(along)
     return (0.0, 0.0) if low <= 0.0 <= high or thrown else (float(low), float(high))
 
 
 def noise_sigma(y: np.ndarray, quantum: float) -> float:
-    """Noise of a record (N,): third differences over sqrt(20), their median (or trimmed rms on a lattice), at least q / sqrt(12)."""
+    """Noise of a record (N,): third differences over sqrt(20), their median (or trimmed rms on a lattice), at least q /
+    sqrt(12).
+    """
     d = np.abs(np.diff(y, 3))
     d = d[np.isfinite(d)]
     if d.size == 0:
@@ -279,7 +335,10 @@ class Blocks:
     def of(traces: Sequence[Trace]) -> Blocks:
         index, counts, base = [], [], 0
         for trace in traces:
-            every = [trace.counts, *(np.bincount(trace.block[np.isfinite(c.values)], minlength=trace.counts.size) for c in trace.channels)]
+            every = [
+                trace.counts,
+                *(np.bincount(trace.block[np.isfinite(c.values)], minlength=trace.counts.size) for c in trace.channels),
+            ]
             for count in every:
                 index.append(trace.block + base)
                 counts.append(count)

@@ -1,15 +1,16 @@
-"""Eq. (6)'s parameters from a stream, and whether the model still explains it: moving-horizon estimation on the event-exact model.
+"""Eq. (6)'s parameters from a stream, and whether the model still explains it: moving-horizon estimation on the
+event-exact model.
 
 Every HOP seconds the parameters p and the state (theta, w) in which the window began are fitted to the last L seconds,
 
     minimise  sum_b n_b (1 + TAU) / 2 ln((TAU + m_b) / (1 + TAU)) + |(z - z_0) / DRIFT|^2 / 2,    z = ln p,
-
-m_b the mean squared residual [sigma^2] of a short block of n_b samples: least squares near the noise, where a block beyond it counts ever
-less. Stick and slip are inside the simulation and its tangents, so that nothing is smoothed. z_0 is what was last believed, so that what
-the window does not excite stays. L grows to LONGEST as long as one set of parameters explains the window; then a single Newton step a hop
-is enough. Where none explains it, the window is cut to its last SHORTEST seconds: either other parameters explain these, and a change of
-parameters is announced, or for PATIENCE seconds none do, and the model is no longer the servo's. No parameter can adapt to such data,
-so that the test outlives adaptation.
+ m_b the mean squared residual [sigma^2] of a short block of n_b samples: least squares near the noise, where a block
+beyond it counts ever less. Stick and slip are inside the simulation and its tangents, so that nothing is smoothed. z_0
+is what was last believed, so that what the window does not excite stays. L grows to LONGEST as long as one set of
+parameters explains the window; then a single Newton step a hop is enough. Where none explains it, the window is cut to
+its last SHORTEST seconds: either other parameters explain these, and a change of parameters is announced, or for
+PATIENCE seconds none do, and the model is no longer the servo's. No parameter can adapt to such data, so that the test
+outlives adaptation.
 """
 
 from __future__ import annotations
@@ -45,7 +46,10 @@ SPEED = 0.3  # standard deviation of the window's first speed about what was bel
 NUDGE = 1e-3  # of the scales of the first state: step of its differences
 STEPS, TRIALS = 12, 4  # of a fit, and lengths that each is tried at
 TOLERANCE = 0.05, 0.01  # of cost, and share of it: a step's gain at which a fit goes on to the next TAU or ends
-SURE, LEAST_CHANGE = 4.0, 0.05  # standard deviations, and share, by which a parameter must move for its change to be announced
+SURE, LEAST_CHANGE = (
+    4.0,
+    0.05,
+)  # standard deviations, and share, by which a parameter must move for its change to be announced
 RUNAWAY = 1e12  # misfit of a simulation that leaves all bounds
 
 
@@ -78,11 +82,16 @@ class Estimate:
 def is_moving(u: np.ndarray, y: np.ndarray) -> bool:
     """Whether the output (N,) moves beyond its noise under an input (N,) that changes."""
     known = y[np.isfinite(y)]
-    return known.size > FEWEST // 2 and np.ptp(u) > 0 and float(np.ptp(known)) > MOVING * noise_sigma(known, converter_step(known))
+    return (
+        known.size > FEWEST // 2
+        and np.ptp(u) > 0
+        and float(np.ptp(known)) > MOVING * noise_sigma(known, converter_step(known))
+    )
 
 
 def opening(t: np.ndarray, u: np.ndarray, y: np.ndarray, datasheet: Datasheet | None, is_angle: bool) -> Model:
-    """A model to begin with, fitted to the stream's first seconds: the datasheet's with its effects, or without one the best of a search from scratch.
+    """A model to begin with, fitted to the stream's first seconds: the datasheet's with its effects, or without one the
+    best of a search from scratch.
 
     Args:
         t, u, y: the first OPENING or UNKNOWN_OPENING seconds (N,) of the stream, in which it ``is_moving``.
@@ -121,7 +130,9 @@ class Tracker:
     def _restart(self) -> None:
         """Forget the stream, not the parameters."""
         self._t, self._u, self._y = np.zeros(0), np.zeros(0), np.zeros(0)
-        self._due = self._begin = self._fine = math.nan  # the next estimate, the window's begin, and the last estimate that explained it
+        self._due = self._begin = self._fine = (
+            math.nan
+        )  # the next estimate, the window's begin, and the last estimate that explained it
         self._last: _Window | None = None
         self._before: _Window | None = None  # what was believed before the stream had to be explained anew
         self._told: set[str] = set()
@@ -167,11 +178,22 @@ class Tracker:
             self._begin, self._unexplained = now + HOP - self._shortest, now - self._fine
         self._last = window
         values = {f.name: self._model.values[f.name] for f in window.layout}
-        return Estimate(now, values, dict(self._spread), window.length, window.misfit, sigma, changed, self._unexplained,
-                        self._unexplained > self._patience)
+        return Estimate(
+            now,
+            values,
+            dict(self._spread),
+            window.length,
+            window.misfit,
+            sigma,
+            changed,
+            self._unexplained,
+            self._unexplained > self._patience,
+        )
 
     def _changes(self, window: _Window) -> dict[str, tuple[float, float]]:
-        """What has moved beyond chance since the stream had to be explained anew; each is told once, until the window is long again."""
+        """What has moved beyond chance since the stream had to be explained anew; each is told once, until the window
+        is long again.
+        """
         if self._before is None:
             return {}
         out, was = {}, self._before
@@ -184,7 +206,9 @@ class Tracker:
         return out
 
     def _fit(self, begin: float, sigma: float) -> _Window:
-        """The stream from ``begin`` on, from the parameters believed last; the state there as the last window has it, if it explains it."""
+        """The stream from ``begin`` on, from the parameters believed last; the state there as the last window has it,
+        if it explains it.
+        """
         first = int(np.searchsorted(self._t, begin - 1e-9))
         trace = _trace(self._t[first:], self._u[first:], self._y[first:], sigma)
         known = self._last.state_at(trace.t[0]) if self._last is not None and self._last.misfit <= EXPLAINED else None
@@ -214,7 +238,11 @@ class _Window:
     def state_at(self, t: float) -> tuple[float, float] | None:
         """(theta, w) of the motion at a sample's time, None where it has none."""
         k = int(np.searchsorted(self.trace.t, t - 1e-9))
-        return (float(self.motion[k, 0]), float(self.motion[k, 1])) if k < self.trace.t.size and self.trace.t[0] <= t + 1e-9 else None
+        return (
+            (float(self.motion[k, 0]), float(self.motion[k, 1]))
+            if k < self.trace.t.size and self.trace.t[0] <= t + 1e-9
+            else None
+        )
 
 
 def _trace(t: np.ndarray, u: np.ndarray, y: np.ndarray, sigma: float) -> Trace:
@@ -229,8 +257,8 @@ def _trace(t: np.ndarray, u: np.ndarray, y: np.ndarray, sigma: float) -> Trace:
 def fitted(model: Model, trace: Trace) -> _Window:
     """The model's free numbers and the window's first state, fitted from the model's own values and the trace's start.
 
-    Levenberg-Marquardt, from afar first at a TAU near the misfits' geometric mean (see identification.fit). What begins near gets one step: the
-    next hop brings the next one.
+    Levenberg-Marquardt, from afar first at a TAU near the misfits' geometric mean (see identification.fit). What begins
+    near gets one step: the next hop brings the next one.
     """
     layout, blocks = model.layout(), Blocks.of([trace])
     z_0 = model.vector(layout)
@@ -239,7 +267,9 @@ def fitted(model: Model, trace: Trace) -> _Window:
 
     def at(x):
         theta, omega = trace.start
-        return model.at(layout, z_0 + DRIFT * x[:-2]), replace(trace, start=(theta + x[-2] * scale[-2], omega + x[-1] * scale[-1]))
+        return model.at(layout, z_0 + DRIFT * x[:-2]), replace(
+            trace, start=(theta + x[-2] * scale[-2], omega + x[-1] * scale[-1])
+        )
 
     def evaluate(x):
         moved, begun = at(x)
@@ -259,7 +289,12 @@ def fitted(model: Model, trace: Trace) -> _Window:
     for _ in range(1 if is_near else STEPS):
         jacobian = _slopes(at, evaluate, x, e, motion)
         weighted = jacobian * ((1 + tau) / (tau + m))[blocks.index][:, None]
-        hessian, slope, now, gain = weighted.T @ jacobian + np.diag(stiff), weighted.T @ e + stiff * x, cost(x, m, tau), 0.0
+        hessian, slope, now, gain = (
+            weighted.T @ jacobian + np.diag(stiff),
+            weighted.T @ e + stiff * x,
+            cost(x, m, tau),
+            0.0,
+        )
         for _ in range(TRIALS):
             step = np.clip(-np.linalg.solve(hessian + damping * np.diag(np.diag(hessian) + 1e-9), slope), -3.0, 3.0)
             trial = evaluate(x + step)
@@ -286,7 +321,9 @@ def _misfit(m: np.ndarray, counts: np.ndarray) -> float:
 
 
 def _slopes(at: Callable, evaluate: Callable, x: np.ndarray, e: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Slopes (N, k + 2) of the residuals e (N,) by x: tangents of the motion for the parameters, differences for the first state."""
+    """Slopes (N, k + 2) of the residuals e (N,) by x: tangents of the motion for the parameters, differences for the
+    first state.
+    """
     model, trace = at(x)
     columns = [DRIFT * jacobian_of(Run(model, e, (motion,)), [trace], OBSERVER_RATE)]
     for k in (-2, -1):

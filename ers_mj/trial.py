@@ -1,6 +1,6 @@
 """Trials: every controller on every plant over every reference, under the same conditions.
-
-    datasheet -> plant, sampled;  datasheet (or another) -> Servo -> controller;  reference -> closed loop -> run -> measures
+ datasheet -> plant, sampled;  datasheet (or another) -> Servo -> controller;  reference -> closed loop -> run ->
+measures
 """
 
 from __future__ import annotations
@@ -46,9 +46,18 @@ class Conditions:
 
     def as_document(self) -> dict:
         """As the key `conditions`."""
-        plain = asdict(self) | {"gains": self.gains.as_document(), "pid": self.pid.as_document(),
-                                "effects": [{"name": name, "parameters": dict(values)} for name, values in self.effects]}
-        units = {"amplitude": "amplitude_rad", "start": "start_rad", "u_max": "u_max_V", "gap": "gap_rad", "noise": "noise_rad"}
+        plain = asdict(self) | {
+            "gains": self.gains.as_document(),
+            "pid": self.pid.as_document(),
+            "effects": [{"name": name, "parameters": dict(values)} for name, values in self.effects],
+        }
+        units = {
+            "amplitude": "amplitude_rad",
+            "start": "start_rad",
+            "u_max": "u_max_V",
+            "gap": "gap_rad",
+            "noise": "noise_rad",
+        }
         return {units.get(key, key): x for key, x in plain.items()}
 
 
@@ -87,7 +96,9 @@ def refuse_late(plant: Plant, rate_hz: float, most: int) -> None:
     """Raise InputError where the plant's dead time is more than ``most`` samples."""
     late = sum(float(values[0]) for name, values in plant.effects if name == "input_delay")
     if late * rate_hz > most:
-        raise InputError(f"a dead time of {late:g} s is {late * rate_hz:.3g} samples at {rate_hz:g} Hz, {most} at most were expected")
+        raise InputError(
+            f"a dead time of {late:g} s is {late * rate_hz:.3g} samples at {rate_hz:g} Hz, {most} at most were expected"
+        )
 
 
 def references(cases: Sequence[str], servo: Servo, conditions: Conditions) -> list[Reference]:
@@ -96,16 +107,32 @@ def references(cases: Sequence[str], servo: Servo, conditions: Conditions) -> li
     Raises:
         InputError: a file is no reference, or two references have one name.
     """
-    found = [named(case, conditions.amplitude, conditions.start, conditions.rate_hz) if case in CASES else read_reference(case, servo, conditions.u_max)
-             for case in cases]
+    found = [
+        (
+            named(case, conditions.amplitude, conditions.start, conditions.rate_hz)
+            if case in CASES
+            else read_reference(case, servo, conditions.u_max)
+        )
+        for case in cases
+    ]
     names = [reference.name for reference in found]
     if len(set(names)) < len(names):
-        raise InputError(f"two references are called {next(n for n in names if names.count(n) > 1)}, a name for each was expected")
+        raise InputError(
+            f"two references are called {next(n for n in names if names.count(n) > 1)}, a name for each was expected"
+        )
     return found
 
 
-def try_out(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[str], cases: Sequence[str], conditions: Conditions = Conditions(), *,
-            design: Datasheet | None = None, progress: Progress = lambda text, fraction: None) -> list[Trial]:
+def try_out(
+    datasheet: Datasheet,
+    controllers: Sequence[str],
+    plants: Sequence[str],
+    cases: Sequence[str],
+    conditions: Conditions = Conditions(),
+    *,
+    design: Datasheet | None = None,
+    progress: Progress = lambda text, fraction: None,
+) -> list[Trial]:
     """Run every combination.
 
     Args:
@@ -120,9 +147,23 @@ def try_out(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[s
     """
     known = Servo.of(design or datasheet)
     ampere = datasheet.to_lumped().get("ampere")
-    built = {name: build_plant(datasheet, plant=name, effects=conditions.effects, gap=conditions.gap, inductance=conditions.inductance,
-                               linkage=conditions.linkage if name == "mujoco" else "constant") for name in plants}
-    wanted = [(aim, plant, controller) for aim in references(cases, known, conditions) for plant in plants for controller in controllers]
+    built = {
+        name: build_plant(
+            datasheet,
+            plant=name,
+            effects=conditions.effects,
+            gap=conditions.gap,
+            inductance=conditions.inductance,
+            linkage=conditions.linkage if name == "mujoco" else "constant",
+        )
+        for name in plants
+    }
+    wanted = [
+        (aim, plant, controller)
+        for aim in references(cases, known, conditions)
+        for plant in plants
+        for controller in controllers
+    ]
     trials = []
     for k, (aim, plant, controller) in enumerate(wanted):
         progress(f"{controller} on the {plant} plant, {aim.name}", k / len(wanted))
@@ -143,7 +184,13 @@ def run_once(plant: Plant, controller: str, known: Servo, aim: Reference, condit
     law = make_controller(controller, known, aim.rate_hz, conditions)
     start = conditions.start if aim.name in CASES else float(aim.theta[0])
     law.reset(start)
-    return close(law, sampled(plant, aim.rate_hz, (start, 0.0)), Sensor(plant.effects, aim.t, conditions.noise, conditions.seed), aim, plant.terminal)
+    return close(
+        law,
+        sampled(plant, aim.rate_hz, (start, 0.0)),
+        Sensor(plant.effects, aim.t, conditions.noise, conditions.seed),
+        aim,
+        plant.terminal,
+    )
 
 
 def needed(aim: Reference, known: Servo) -> float:

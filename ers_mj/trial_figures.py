@@ -11,7 +11,14 @@ from ers_mj.figures import AFTER, BEFORE, INK, MEASURED, WIDE, both_widths, deci
 from ers_mj.robustness import Spread
 from ers_mj.trial import Trial
 
-COLOURS = {"ftrc": AFTER, "ftrc-literal": "#7cc2bb", "pid": BEFORE, "pid-ff": "#a83a1e", "hinf": "#8a6bb8", "time-optimal": "#1d4f91"}
+COLOURS = {
+    "ftrc": AFTER,
+    "ftrc-literal": "#7cc2bb",
+    "pid": BEFORE,
+    "pid-ff": "#a83a1e",
+    "hinf": "#8a6bb8",
+    "time-optimal": "#1d4f91",
+}
 MORE = ("#4c8c2b", "#b8336a", "#5b6b7b")
 POINTS = {True: 700, False: 350}
 CLOSE = {"step": (0.0, 0.15), "square": (0.49, 0.64), "ramp": (0.45, 0.6), "chirp": (4.7, 5.0)}  # [s]
@@ -34,7 +41,9 @@ def close_up(trials: Sequence[Trial]) -> str:
 
 
 def span(trials: Sequence[Trial]) -> tuple[float, float]:
-    """The span [s] of the close-up: the case's own, else a tenth of the time about the largest error of the first trial."""
+    """The span [s] of the close-up: the case's own, else a tenth of the time about the largest error of the first
+    trial.
+    """
     first = trials[0]
     if first.case in CLOSE:
         return CLOSE[first.case]
@@ -51,12 +60,24 @@ def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | N
     reference = trials[0].run.reference
     inside = slice(None) if over is None else slice(*np.searchsorted(reference.t, over))
     t, points = reference.t[inside], POINTS[wide]
-    angle.plot(*decimate(t, np.degrees(reference.theta[inside]), points), color=MEASURED, linewidth=3.0, label="reference", zorder=2)
+    angle.plot(
+        *decimate(t, np.degrees(reference.theta[inside]), points),
+        color=MEASURED,
+        linewidth=3.0,
+        label="reference",
+        zorder=2,
+    )
     largest = []
     for k, trial in enumerate(trials):
         shade = colour(trial.controller, k)
         off = np.degrees(trial.run.theta - reference.theta)[inside]
-        angle.plot(*decimate(t, np.degrees(trial.run.theta[inside]), points), color=shade, linewidth=1.2, label=trial.controller, zorder=3)
+        angle.plot(
+            *decimate(t, np.degrees(trial.run.theta[inside]), points),
+            color=shade,
+            linewidth=1.2,
+            label=trial.controller,
+            zorder=3,
+        )
         error.plot(*decimate(t, off, points), color=shade, linewidth=1.0)
         voltage.plot(*decimate(t, trial.run.u[inside], points), color=shade, linewidth=0.8)
         if np.isfinite(off).any():
@@ -72,7 +93,9 @@ def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | N
         ax.margins(x=0)
     voltage.set_xlabel("time [s]")
     handles, labels = angle.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=7 if wide else 3, handlelength=1.6, columnspacing=1.2)
+    figure.legend(
+        handles, labels, loc="outside upper left", ncols=7 if wide else 3, handlelength=1.6, columnspacing=1.2
+    )
     return figure
 
 
@@ -88,7 +111,7 @@ def _spreads(found: Sequence[Spread], width: float) -> Figure:
     lines = -(-len(groups) // columns)
     figure = Figure(figsize=(width, lines * (0.9 + 0.3 * rows)), layout="constrained")
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
-    for ax in axes[len(groups):]:
+    for ax in axes[len(groups) :]:
         ax.set_visible(False)
     for ax, (case, plant) in zip(axes, groups, strict=False):
         group = [s for s in found if (s.case, s.plant) == (case, plant)]

@@ -19,8 +19,14 @@ from ers_mj.plants.mechanical import simulate_many
 from ers_mj.simulation import build_plant, finite
 
 GAPS, LINKAGES, INDUCTANCES = (0.0, float(np.radians(0.5))), ("constant", "rod"), (False, True)  # [rad] of play
-AMPLITUDES, FREQUENCIES_HZ = (1.1, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0), (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # of the maps' sines; in breakaways
-MAP_GAPS_DEG, MAP_L_FACTORS = (0.0, 0.1, 0.25, 0.5, 1.0), (0.0, 0.5, 1.0, 2.0, 4.0)  # play, and L in units of the datasheet's
+AMPLITUDES, FREQUENCIES_HZ = (
+    (1.1, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0),
+    (0.5, 1.0, 2.0, 4.0, 8.0, 16.0),
+)  # of the maps' sines; in breakaways
+MAP_GAPS_DEG, MAP_L_FACTORS = (
+    (0.0, 0.1, 0.25, 0.5, 1.0),
+    (0.0, 0.5, 1.0, 2.0, 4.0),
+)  # play, and L in units of the datasheet's
 SINE_S, PLAY_S = 2.0, 3.0  # [s] of a run of either map
 MOST_TRAVEL = np.radians(60)  # about theta_0, beyond which a sine's cell is left empty
 STILL = 1e-4  # [rad] of motion below which nothing is told relative to it
@@ -44,9 +50,9 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One input under one condition: angles (N,) [rad] at t (N,) [s] of MuJoCo, of the reduced model, of Eq. (5) with L = 0,
-    and (where there is play and the linkage constant) of the reduced model with the play put in; the ratio n of MuJoCo's
-    linkage at the lowest angle, at zero, at the highest."""
+    """One input under one condition: angles (N,) [rad] at t (N,) [s] of MuJoCo, of the reduced model, of Eq. (5) with L
+    = 0, and (where there is play and the linkage constant) of the reduced model with the play put in; the ratio n of
+    MuJoCo's linkage at the lowest angle, at zero, at the highest."""
 
     input: str
     condition: Condition
@@ -81,16 +87,25 @@ class Case:
     def as_document(self) -> dict:
         """The case under the keys of `ers validate --json`."""
         c = self.condition
-        return {"input": self.input, "gap_rad": c.gap, "linkage": c.linkage, "inductance": c.inductance, "rms_rad": self.rms,
-                "max_rad": float(np.abs(self.error).max()), "motion_rms_rad": self.motion, "rms_eq5_rad": rms(self.error_eq_5),
-                "rms_with_play_rad": None if self.with_play is None else rms(self.mujoco - self.with_play)}
+        return {
+            "input": self.input,
+            "gap_rad": c.gap,
+            "linkage": c.linkage,
+            "inductance": c.inductance,
+            "rms_rad": self.rms,
+            "max_rad": float(np.abs(self.error).max()),
+            "motion_rms_rad": self.motion,
+            "rms_eq5_rad": rms(self.error_eq_5),
+            "rms_with_play_rad": None if self.with_play is None else rms(self.mujoco - self.with_play),
+        }
 
 
 @dataclass(frozen=True, eq=False)
 class ValidityMap:
     """Deviation of Eq. (5) from MuJoCo: rms and motion (X, Y) [rad], NaN where not run.
 
-    x (X,) and y (Y,) are amplitude [V] and frequency [Hz] of a sine under a condition, or play [rad] and L [H] under no other.
+    x (X,) and y (Y,) are amplitude [V] and frequency [Hz] of a sine under a condition, or play [rad] and L [H] under no
+    other.
     """
 
     condition: Condition | None
@@ -121,7 +136,9 @@ def rms(x: np.ndarray) -> float:
 
 
 def possible(datasheet: Datasheet) -> tuple[tuple[float, ...], tuple[str, ...], tuple[bool, ...], list[str]]:
-    """Gaps [rad], linkages and inductances of the default run that this datasheet can make, and what it cannot in words."""
+    """Gaps [rad], linkages and inductances of the default run that this datasheet can make, and what it cannot in
+    words.
+    """
     p, left_out = datasheet.parameters, []
     gaps, linkages, inductances = GAPS, LINKAGES, INDUCTANCES
     if _has_play(datasheet):
@@ -140,9 +157,17 @@ def _has_play(datasheet: Datasheet) -> bool:
     return any(name == "backlash" for name, _ in datasheet.effects)
 
 
-def validate(datasheet: Datasheet, gaps: Sequence[float] = GAPS, linkages: Sequence[str] = LINKAGES,
-             inductances: Sequence[bool] = INDUCTANCES, *, maps: bool = True, jobs: int = 0, duration: float = DURATION,
-             progress: Progress = lambda text, fraction: None) -> Validation:
+def validate(
+    datasheet: Datasheet,
+    gaps: Sequence[float] = GAPS,
+    linkages: Sequence[str] = LINKAGES,
+    inductances: Sequence[bool] = INDUCTANCES,
+    *,
+    maps: bool = True,
+    jobs: int = 0,
+    duration: float = DURATION,
+    progress: Progress = lambda text, fraction: None,
+) -> Validation:
     """Every combination of gap [rad], linkage and inductance under every named input, both plants.
 
     Args:
@@ -166,7 +191,11 @@ def validate(datasheet: Datasheet, gaps: Sequence[float] = GAPS, linkages: Seque
         cases += _cases(datasheet, condition, t, inputs, jobs)
     if not maps:
         return Validation(tuple(cases), datasheet.to_lumped())
-    return Validation(tuple(cases), datasheet.to_lumped(), *_maps(datasheet, conditions, jobs, lambda text, x: progress(text, share + MAP_SHARE * x)))
+    return Validation(
+        tuple(cases),
+        datasheet.to_lumped(),
+        *_maps(datasheet, conditions, jobs, lambda text, x: progress(text, share + MAP_SHARE * x)),
+    )
 
 
 def spoken(condition: Condition) -> str:
@@ -179,23 +208,35 @@ def _mujoco(datasheet: Datasheet, c: Condition):
     return build_plant(datasheet, plant="mujoco", gap=c.gap, linkage=c.linkage, inductance=c.inductance)
 
 
-def _cases(datasheet: Datasheet, c: Condition, t: np.ndarray, inputs: Mapping[str, np.ndarray], jobs: int) -> list[Case]:
+def _cases(
+    datasheet: Datasheet, c: Condition, t: np.ndarray, inputs: Mapping[str, np.ndarray], jobs: int
+) -> list[Case]:
     eq_5, reduced = build_plant(datasheet), build_plant(datasheet, inductance=c.inductance)
     repaired = build_plant(datasheet, gap=c.gap, inductance=c.inductance) if c.gap and c.linkage == "constant" else None
     plant = _mujoco(datasheet, c)
     motions = simulate_many([plant], t, np.array(list(inputs.values())), jobs)
-    return [Case(name, c, t, u, finite(t, motion.theta), finite(t, reduced.simulate(t, u).theta), eq_5.simulate(t, u).theta,
-                 repaired.simulate(t, u).theta if repaired else None,
-                 tuple(plant.ratio(x) for x in (motion.theta.min(), 0.0, motion.theta.max())))
-            for (name, u), motion in zip(inputs.items(), motions, strict=True)]
+    return [
+        Case(
+            name,
+            c,
+            t,
+            u,
+            finite(t, motion.theta),
+            finite(t, reduced.simulate(t, u).theta),
+            eq_5.simulate(t, u).theta,
+            repaired.simulate(t, u).theta if repaired else None,
+            tuple(plant.ratio(x) for x in (motion.theta.min(), 0.0, motion.theta.max())),
+        )
+        for (name, u), motion in zip(inputs.items(), motions, strict=True)
+    ]
 
 
 # -- maps --------------------------------------------------------------------------------------------------------
 
 
 def mapped(conditions: Sequence[Condition]) -> list[Condition]:
-    """Which of the conditions get a map over sines: the widest play, the rod, the inductance, each alone; where none stands
-    alone, the first that departs from Eq. (5)."""
+    """Which of the conditions get a map over sines: the widest play, the rod, the inductance, each alone; where none
+    stands alone, the first that departs from Eq. (5)."""
     single = [c for c in conditions if c.departures == 1]
     widest = max((c.gap for c in single), default=0.0)
     return [c for c in single if c.gap == widest or not c.gap] or [c for c in conditions if c.departures][:1]
@@ -204,8 +245,11 @@ def mapped(conditions: Sequence[Condition]) -> list[Condition]:
 def _maps(datasheet: Datasheet, conditions: Sequence[Condition], jobs: int, progress: Progress):
     """(maps over sines, map over play and L or None)."""
     chosen = mapped(conditions)
-    over_play = (any(c.gap or c.inductance for c in conditions) and datasheet.parameters.get("L", 0.0) > 0.0
-                 and not _has_play(datasheet))
+    over_play = (
+        any(c.gap or c.inductance for c in conditions)
+        and datasheet.parameters.get("L", 0.0) > 0.0
+        and not _has_play(datasheet)
+    )
     sines = []
     for k, condition in enumerate(chosen):
         progress(f"mapping {spoken(condition)}", k / (len(chosen) + over_play))
@@ -243,9 +287,16 @@ def _play_map(datasheet: Datasheet, jobs: int) -> ValidityMap:
     inductances = tuple(factor * L for factor in MAP_L_FACTORS)
     eq_5 = build_plant(datasheet).simulate(t, u).theta
     gaps = tuple(np.radians(MAP_GAPS_DEG).tolist())
-    plants = [_mujoco(replace(datasheet, parameters={**datasheet.parameters, "L": x}), Condition(gap, "constant", x > 0))
-              for gap, x in product(gaps, inductances)]
+    plants = [
+        _mujoco(replace(datasheet, parameters={**datasheet.parameters, "L": x}), Condition(gap, "constant", x > 0))
+        for gap, x in product(gaps, inductances)
+    ]
     runs = simulate_many(plants, t, u, jobs)
     shape = len(gaps), len(inductances)
-    return ValidityMap(None, gaps, inductances, np.reshape([rms(run.theta - eq_5) for run in runs], shape),
-                       np.reshape([run.theta.std() for run in runs], shape))
+    return ValidityMap(
+        None,
+        gaps,
+        inductances,
+        np.reshape([rms(run.theta - eq_5) for run in runs], shape),
+        np.reshape([run.theta.std() for run in runs], shape),
+    )

@@ -1,6 +1,6 @@
 """The report of a validation: where the reduced model holds, where it stops, and why.
 
-    sentence -> table -> each departure: where, curves, map -> map over play and inductance -> how it was made
+sentence -> table -> each departure: where, curves, map -> map over play and inductance -> how it was made
 """
 
 from __future__ import annotations
@@ -31,8 +31,20 @@ def validation_page(validation: Validation, about: Mapping[str, str]) -> str:
 
 def _header(validation: Validation, found: list[Departure], kind: str) -> str:
     plain = [case for case in validation.cases if not case.condition.departures]
-    tiles = [("no play, no rod, no inductance: at most", f'<span class="a">{degrees(max(case.rms for case in plain))}</span>')] if plain else []
-    tiles += [(f"{page.text(called(d.condition))}: up to", f'<span class="b">{degrees(rms(d.worst.error_eq_5))}</span>') for d in found[:4]]
+    tiles = (
+        [
+            (
+                "no play, no rod, no inductance: at most",
+                f'<span class="a">{degrees(max(case.rms for case in plain))}</span>',
+            )
+        ]
+        if plain
+        else []
+    )
+    tiles += [
+        (f"{page.text(called(d.condition))}: up to", f'<span class="b">{degrees(rms(d.worst.error_eq_5))}</span>')
+        for d in found[:4]
+    ]
     return page.header(kind, "Where the reduced model holds", "ers validate", headline(validation), tiles)
 
 
@@ -42,15 +54,23 @@ def _table(validation: Validation) -> str:
     for condition in dict.fromkeys(case.condition for case in validation.cases):
         cases = {case.input: case for case in validation.cases if case.condition == condition}
         rows.append(((page.text(spoken(condition)), *(_cell(cases[name]) for name in inputs)), ""))
-    lead = (f"RMS deviation of the angle [°] under the same voltages, and what that is of the motion; <b>bold</b> above {100 * VALID:.0f} %. The reduced model "
-            "is Eq. (6), or Eq. (1) where the inductance is on; it never has the play or the rod.")
-    return page.section("Reduced model against MuJoCo", lead, page.table(["MuJoCo has", *(f">{name}" for name in inputs)], rows))
+    lead = (
+        "RMS deviation of the angle [°] under the same voltages, and what that is of the motion; <b>bold</b> above"
+        f" {100 * VALID:.0f} %. The reduced model is Eq. (6), or Eq. (1) where the inductance is on; it never has the"
+        " play or the rod."
+    )
+    return page.section(
+        "Reduced model against MuJoCo", lead, page.table(["MuJoCo has", *(f">{name}" for name in inputs)], rows)
+    )
 
 
 def _cell(case: Case) -> str:
     share = case.rms / case.motion if case.motion else float("nan")
     size = degrees(case.rms)
-    return f"{f'<b>{size}</b>' if share > VALID else size}<br><span class=\"why\">{per_cent(share) if np.isfinite(share) else NONE}</span>"
+    return (
+        f"{f'<b>{size}</b>' if share > VALID else size}<br><span"
+        f' class="why">{per_cent(share) if np.isfinite(share) else NONE}</span>'
+    )
 
 
 def _departure(departure: Departure) -> str:
@@ -63,9 +83,11 @@ def _departure(departure: Departure) -> str:
     drawn = page.figure(figures.traces(view, NO_EVIDENCE, labels))
     drawn += page.figure(figures.close_up(view, NO_EVIDENCE, labels), caption)
     if departure.sines is not None:
-        drawn += page.figure(maps.sine_map(departure.sines, VALID),
-                             f"Sines of 2 s. Framed: within {100 * VALID:.0f} % of the motion. Empty: Eq. (6) would turn more than "
-                             f"{np.degrees(MOST_TRAVEL):.0f}° from θ₀, or nothing moves.")
+        drawn += page.figure(
+            maps.sine_map(departure.sines, VALID),
+            f"Sines of 2 s. Framed: within {100 * VALID:.0f} % of the motion. Empty: Eq. (6) would turn more than "
+            f"{np.degrees(MOST_TRAVEL):.0f}° from θ₀, or nothing moves.",
+        )
     title = called(departure.condition)
     return page.section(page.text(title[0].upper() + title[1:]), "", places + drawn)
 

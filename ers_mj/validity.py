@@ -1,6 +1,6 @@
 """Where and why the reduced model stops being valid: sentences with numbers, from the cases and maps of a validation.
 
-    cases of one condition -> size, reason, angle, rest;  its map over sines -> amplitude, frequency
+cases of one condition -> size, reason, angle, rest;  its map over sines -> amplitude, frequency
 """
 
 from __future__ import annotations
@@ -58,8 +58,12 @@ def departures(validation: Validation) -> list[Departure]:
     found = []
     for condition in chosen:
         cases = tuple(case for case in validation.cases if case.condition == condition)
-        findings = [_size(condition, cases), _reason(condition, cases, validation), *_where(cases, validation.lumped.get("theta_0", 0.0)),
-                    *(_over_sines(maps[condition], validation) if condition in maps else ())]
+        findings = [
+            _size(condition, cases),
+            _reason(condition, cases, validation),
+            *_where(cases, validation.lumped.get("theta_0", 0.0)),
+            *(_over_sines(maps[condition], validation) if condition in maps else ()),
+        ]
         found.append(Departure(condition, cases, maps.get(condition), tuple(findings)))
     return found
 
@@ -67,22 +71,39 @@ def departures(validation: Validation) -> list[Departure]:
 def headline(validation: Validation) -> str:
     """The validation in one sentence."""
     plain = [case for case in validation.cases if not case.condition.departures]
-    off = [f"with {called(d.condition)} by up to {degrees(rms(d.worst.error_eq_5))} ({d.worst.input})" for d in departures(validation)]
+    off = [
+        f"with {called(d.condition)} by up to {degrees(rms(d.worst.error_eq_5))} ({d.worst.input})"
+        for d in departures(validation)
+    ]
     if not plain:
         return f"Eq. (6) is off {', '.join(off)}."
-    holds = f"With no play, a constant linkage and no inductance Eq. (6) follows MuJoCo to {degrees(max(case.rms for case in plain))} RMS."
+    holds = (
+        "With no play, a constant linkage and no inductance Eq. (6) follows MuJoCo to"
+        f" {degrees(max(case.rms for case in plain))} RMS."
+    )
     return f"{holds} It is off {', '.join(off)}." if off else holds
 
 
 def as_document(validation: Validation) -> dict:
     """What `ers validate --json` prints."""
     where = [_keys(d.condition) | finding.as_document() for d in departures(validation) for finding in d.findings]
-    sines = [_keys(m.condition) | {"amplitude_V": m.x, "frequency_hz": m.y, "rms_rad": m.rms, "motion_rms_rad": m.motion}
-             for m in validation.sines]
-    play = validation.play and {"input": "multisine", "gap_rad": validation.play.x, "L_H": validation.play.y, "rms_rad": validation.play.rms,
-                                "motion_rms_rad": validation.play.motion}
-    return {"sentence": headline(validation), "cases": [case.as_document() for case in validation.cases], "where": where,
-            "maps": {"sines": sines, "play": play}}
+    sines = [
+        _keys(m.condition) | {"amplitude_V": m.x, "frequency_hz": m.y, "rms_rad": m.rms, "motion_rms_rad": m.motion}
+        for m in validation.sines
+    ]
+    play = validation.play and {
+        "input": "multisine",
+        "gap_rad": validation.play.x,
+        "L_H": validation.play.y,
+        "rms_rad": validation.play.rms,
+        "motion_rms_rad": validation.play.motion,
+    }
+    return {
+        "sentence": headline(validation),
+        "cases": [case.as_document() for case in validation.cases],
+        "where": where,
+        "maps": {"sines": sines, "play": play},
+    }
 
 
 def _keys(c: Condition) -> dict:
@@ -91,7 +112,11 @@ def _keys(c: Condition) -> dict:
 
 def called(c: Condition) -> str:
     """What departs, in words."""
-    parts = [f"play of ±{np.degrees(c.gap):.3g}°"] * bool(c.gap) + ["the rod linkage"] * (c.linkage == "rod") + ["the inductance"] * c.inductance
+    parts = (
+        [f"play of ±{np.degrees(c.gap):.3g}°"] * bool(c.gap)
+        + ["the rod linkage"] * (c.linkage == "rod")
+        + ["the inductance"] * c.inductance
+    )
     return " and ".join(parts) or "no departure"
 
 
@@ -127,18 +152,27 @@ def _reason(condition: Condition, cases: Sequence[Case], validation: Validation)
         case = max(cases, key=lambda case: rms(case.error_eq_5))
         moving = np.abs(case.error_eq_5)[np.abs(_speed(case)) > REST]
         wide = degrees(2 * condition.gap)
-        told.append(f"Each time the torque changes sign the motor crosses the play, {wide} wide, alone and meets the rudder with a running start; on the "
-                    f"{case.input} the deviation is {degrees(float(np.median(moving)))} in the median while it moves." if moving.size
-                    else f"The motor never gets across the play, {wide} wide, and the rudder stands still.")
+        told.append(
+            f"Each time the torque changes sign the motor crosses the play, {wide} wide, alone and meets the rudder"
+            f" with a running start; on the {case.input} the deviation is {degrees(float(np.median(moving)))} in the"
+            " median while it moves."
+            if moving.size
+            else f"The motor never gets across the play, {wide} wide, and the rudder stands still."
+        )
     if condition.linkage == "rod":
         low, high = (min(cases, key=lambda case: case.mujoco.min()), max(cases, key=lambda case: case.mujoco.max()))
-        told.append(f"The rod's ratio is {low.ratio[1]:.1f} at zero, {low.ratio[0]:.1f} at {np.degrees(low.mujoco.min()):.0f}° and "
-                    f"{high.ratio[2]:.1f} at {np.degrees(high.mujoco.max()):.0f}°: the further out, the less torque a volt gives.".replace("-", "−"))
+        told.append(
+            f"The rod's ratio is {low.ratio[1]:.1f} at zero, {low.ratio[0]:.1f} at {np.degrees(low.mujoco.min()):.0f}°"
+            f" and {high.ratio[2]:.1f} at {np.degrees(high.mujoco.max()):.0f}°: the further out, the less torque a volt"
+            " gives.".replace("-", "−")
+        )
     if condition.inductance and "tau_e" in validation.lumped:
         lag, case = validation.lumped["tau_e"], max(cases, key=lambda case: rms(case.error_eq_5))
         speed = rms(_speed(case))
-        told.append(f"The current lags by L/R = {1e3 * lag:.2f} ms; on the {case.input}, at {np.degrees(speed):.0f} °/s RMS, a lag of that much "
-                    f"alone would be {degrees(lag * speed)}.")
+        told.append(
+            f"The current lags by L/R = {1e3 * lag:.2f} ms; on the {case.input}, at {np.degrees(speed):.0f} °/s RMS, a"
+            f" lag of that much alone would be {degrees(lag * speed)}."
+        )
     return Finding("reason", " ".join(told))
 
 
@@ -156,9 +190,15 @@ def _where(cases: Sequence[Case], theta_0: float) -> list[Finding]:
         words = "Spread over the travel as the time is: {} of the squared error beyond {}° from θ₀, in {} of the time."
     at_rest = float(error[rest].sum() / total), float(rest.mean())
     persists = "It persists at rest" if at_rest[0] > at_rest[1] else "It is made in motion more than at rest"
-    return [Finding("angle", words.format(per_cent(in_error), angle, per_cent(in_time)), in_error, in_time),
-            Finding("rest", f"{persists}: {per_cent(at_rest[0])} of the squared error falls where the rudder stands still, {per_cent(at_rest[1])} of the time.",
-                    *at_rest)]
+    return [
+        Finding("angle", words.format(per_cent(in_error), angle, per_cent(in_time)), in_error, in_time),
+        Finding(
+            "rest",
+            f"{persists}: {per_cent(at_rest[0])} of the squared error falls where the rudder stands still,"
+            f" {per_cent(at_rest[1])} of the time.",
+            *at_rest,
+        ),
+    ]
 
 
 def _speed(case: Case) -> np.ndarray:
@@ -175,13 +215,23 @@ def _over_sines(sines: ValidityMap, validation: Validation) -> list[Finding]:
     whole_y, whole_x = np.flatnonzero(np.isfinite(share).all(axis=0)), np.flatnonzero(np.isfinite(share).all(axis=1))
     if whole_y.size and len(sines.x) > 1:
         ends = np.median(share[:, whole_y], axis=1)[[0, -1]]
-        found.append(Finding("amplitude", f"On a sine of {sines.x[0]:.3g} V (breakaway takes {breakaway(validation.lumped):.3g} V) the deviation is "
-                             f"{per_cent(ends[0])} of the motion, of {sines.x[-1]:.3g} V {per_cent(ends[1])} (medians over "
-                             f"{_span(sines.y, whole_y)} Hz)."))
+        found.append(
+            Finding(
+                "amplitude",
+                f"On a sine of {sines.x[0]:.3g} V (breakaway takes {breakaway(validation.lumped):.3g} V) the deviation"
+                f" is {per_cent(ends[0])} of the motion, of {sines.x[-1]:.3g} V {per_cent(ends[1])} (medians over"
+                f" {_span(sines.y, whole_y)} Hz).",
+            )
+        )
     if whole_x.size and len(sines.y) > 1:
         ends = np.median(share[whole_x], axis=0)[[0, -1]]
-        found.append(Finding("frequency", f"At {sines.y[0]:.3g} Hz it is {per_cent(ends[0])} of the motion, at {sines.y[-1]:.3g} Hz {per_cent(ends[1])} "
-                             f"(medians over {_span(sines.x, whole_x)} V). {_valid_cells(sines)}"))
+        found.append(
+            Finding(
+                "frequency",
+                f"At {sines.y[0]:.3g} Hz it is {per_cent(ends[0])} of the motion, at {sines.y[-1]:.3g} Hz"
+                f" {per_cent(ends[1])} (medians over {_span(sines.x, whole_x)} V). {_valid_cells(sines)}",
+            )
+        )
     return found
 
 
@@ -194,5 +244,8 @@ def _valid_cells(sines: ValidityMap) -> str:
     share = sines.relative
     run = int(np.isfinite(share).sum())
     i, j = np.unravel_index(np.nanargmax(share), share.shape)
-    return (f"Within {100 * VALID:.0f} % of the motion on {int((share <= VALID).sum())} of {run} sines; worst at {sines.x[i]:.3g} V and {sines.y[j]:.3g} Hz: "
-            f"{degrees(sines.rms[i, j])}, {per_cent(share[i, j])} of the motion.")
+    return (
+        f"Within {100 * VALID:.0f} % of the motion on {int((share <= VALID).sum())} of {run} sines; worst at"
+        f" {sines.x[i]:.3g} V and {sines.y[j]:.3g} Hz: {degrees(sines.rms[i, j])}, {per_cent(share[i, j])} of the"
+        " motion."
+    )

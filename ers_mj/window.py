@@ -48,7 +48,9 @@ def open_window(replay: Replay) -> None:
         else:
             _repeat(replay)
     except (ImportError, mujoco.FatalError, RuntimeError) as error:
-        raise InputError(f"MuJoCo's viewer cannot open a window here ({' '.join(str(error).split())[:100]}), {INSTEAD}") from None
+        raise InputError(
+            f"MuJoCo's viewer cannot open a window here ({' '.join(str(error).split())[:100]}), {INSTEAD}"
+        ) from None
 
 
 def _repeat(replay: Replay) -> None:

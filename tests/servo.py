@@ -18,7 +18,9 @@ NAMES = "multisine", "steps", "chirp"
 def trace(name, laws=(), sensor=lambda y: y, gain=1.0, seed=0, values=TRUTH) -> Trace:
     """Three seconds of the servo under these laws, at 1 kHz, with ``gain`` times this input, seen by this sensor."""
     u = gain * INPUTS[name](T)
-    y = ReducedModel(lumped(values), laws).simulate(T, u).measured + NOISE * np.random.default_rng(seed).standard_normal(T.size)
+    y = ReducedModel(lumped(values), laws).simulate(T, u).measured + NOISE * np.random.default_rng(
+        seed
+    ).standard_normal(T.size)
     return trace_of(from_arrays(T, u, sensor(y), name=name), None)
 
 

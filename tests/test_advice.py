@@ -22,7 +22,16 @@ from ers_mj.recording import from_arrays
 from ers_mj.traces import make_trace, trace_of
 
 T = np.arange(0.0, 3.0, 1e-3)
-TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625, "tau_e": 9e-4, "emf_share": 0.94}
+TRUTH = {
+    "a_1": 25.0,
+    "a_2": 50.0,
+    "b": 70.0,
+    "c_1": 135.0,
+    "c_2": 115.0,
+    "theta_0": 0.2625,
+    "tau_e": 9e-4,
+    "emf_share": 0.94,
+}
 NOISE = 3e-4
 
 
@@ -31,31 +40,48 @@ def traces_of(effects, names=("ramp", "steps")):
     out = []
     for k, name in enumerate(names):
         u = INPUTS[name](T)
-        y = ReducedModel(lumped(TRUTH), effects).simulate(T, u).measured + NOISE * np.random.default_rng(k).standard_normal(T.size)
+        y = ReducedModel(lumped(TRUTH), effects).simulate(T, u).measured + NOISE * np.random.default_rng(
+            k
+        ).standard_normal(T.size)
         out.append(trace_of(from_arrays(T, u, y, name=name), None))
     return out
 
 
 def explained(traces, *starts):
-    """The traces, at rest when they begin, and the best fit of each effect begun at a start and carried on to its valley's floor, beside the baseline's letters and beside the servo's own."""
-    sheet = Datasheet(lumped={k: TRUTH[k] for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")},
-                      baseline={k: TRUTH[k] for k in ("tau_e", "emf_share")})
+    """The traces, at rest when they begin, and the best fit of each effect begun at a start and carried on to its
+    valley's floor, beside the baseline's letters and beside the servo's own.
+    """
+    sheet = Datasheet(
+        lumped={k: TRUTH[k] for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")},
+        baseline={k: TRUTH[k] for k in ("tau_e", "emf_share")},
+    )
     start = baseline(traces, sheet, True, 1)
     traces = [replace(t, start=(TRUTH["theta_0"], 0.0)) for t in start.traces]
     base = start.fit.model
     models = base, replace(base, values={**base.values, **{k: TRUTH[k] for k in sheet.lumped}})
-    ends = {name: min((fit(m.with_effect(name, np.array(at)), traces, steps=40) for m in models), key=lambda found: found.cost) for name, *at in starts}
+    ends = {
+        name: min(
+            (fit(m.with_effect(name, np.array(at)), traces, steps=40) for m in models), key=lambda found: found.cost
+        )
+        for name, *at in starts
+    }
     return traces, {name: descend(found.model, traces, OBSERVER_RATE, 1.0, 40, 1e-4) for name, found in ends.items()}
 
 
 @pytest.fixture(scope="module")
 def late():
-    return explained(traces_of([("sensor_lag", np.array([1.5e-3, np.inf]))]), ("input_delay", 1.5e-3), ("sensor_lag", 1.5e-3, np.inf))
+    return explained(
+        traces_of([("sensor_lag", np.array([1.5e-3, np.inf]))]), ("input_delay", 1.5e-3), ("sensor_lag", 1.5e-3, np.inf)
+    )
 
 
 @pytest.fixture(scope="module")
 def pushed():
-    return explained(traces_of([("bias_torque", np.array([8.0]))], ("multisine", "steps", "chirp")), ("bias_torque", 6.0), ("asymmetric_friction", -6.0, 0.01, np.inf, np.inf))
+    return explained(
+        traces_of([("bias_torque", np.array([8.0]))], ("multisine", "steps", "chirp")),
+        ("bias_torque", 6.0),
+        ("asymmetric_friction", -6.0, 0.01, np.inf, np.inf),
+    )
 
 
 def advised(case, leader, *rivals):
@@ -110,7 +136,11 @@ def test_delay_and_lag_are_told_apart_by_a_band_that_reaches_high_frequencies(la
     at_hand = isolability(fits["input_delay"], [fits["sensor_lag"]], traces)[0]
     advice = advised(late, "input_delay", "sensor_lag")
     excitation, against = advice["excitation"], advice["checked"]["against"]["sensor_lag"]
-    assert excitation["kind"] in ("multisine", "chirp") and excitation["to_hz"] >= 30.0 or excitation.get("period_s", 1.0) < 0.1
+    assert (
+        excitation["kind"] in ("multisine", "chirp")
+        and excitation["to_hz"] >= 30.0
+        or excitation.get("period_s", 1.0) < 0.1
+    )
     assert against["rms_sigma"] > 2 * at_hand.sigmas and against["cost"] > 2 * abs(at_hand.cost)
     assert advice["separates"] == ["input_delay", "sensor_lag"]
 
@@ -122,7 +152,9 @@ def test_what_is_advised_settles_it(late):
     promised = advice["checked"]["against"]["sensor_lag"]["cost"]
     t, u = signal(advice["excitation"])
     for true, wrong in (("input_delay", "sensor_lag"), ("sensor_lag", "input_delay")):
-        y = fits[true].model.plant().theta(t, u, (advice["excitation"]["start"], 0.0)) + NOISE * np.random.default_rng(9).standard_normal(t.size)
+        y = fits[true].model.plant().theta(t, u, (advice["excitation"]["start"], 0.0)) + NOISE * np.random.default_rng(
+            9
+        ).standard_normal(t.size)
         new = make_trace("next", t, u, y, np.ones(t.size, bool), None, None, traces[0].sigma, 0.0)
         both = [*traces, *with_starts(fits[true].model, [new])]
         again = {name: fit(found.model, both, steps=15) for name, found in fits.items()}
@@ -140,8 +172,25 @@ def test_a_constant_torque_and_coulomb_asymmetry_are_said_to_be_one(pushed):
 
 def test_a_wider_travel_is_told_with_what_to_record_there():
     limits = SimpleNamespace(low=-0.2, high=0.3)
-    found = SimpleNamespace(cost=8.0, excitation={"kind": "chirp", "from_hz": 1.0, "to_hz": 9.0, "amplitude": 6.0, "offset": 0.0, "duration_s": 7.0, "rate_hz": 500.0})
-    told = _widened("backlash", ["shaft_compliance", "gravity_imbalance"], {"shaft_compliance": found}, limits, {"input_unit": "V", "output_unit": "rad"})
+    found = SimpleNamespace(
+        cost=8.0,
+        excitation={
+            "kind": "chirp",
+            "from_hz": 1.0,
+            "to_hz": 9.0,
+            "amplitude": 6.0,
+            "offset": 0.0,
+            "duration_s": 7.0,
+            "rate_hz": 500.0,
+        },
+    )
+    told = _widened(
+        "backlash",
+        ["shaft_compliance", "gravity_imbalance"],
+        {"shaft_compliance": found},
+        limits,
+        {"input_unit": "V", "output_unit": "rad"},
+    )
     assert "record a chirp from 1 to 9 Hz" in told[0] and "at 4 sigmas" in told[0]
     assert told[1] == "Only a change of the rig can tell backlash and gravity imbalance apart."
 

@@ -1,4 +1,6 @@
-"""What current, speed and motor angle add to the output: parameters that the output alone cannot tell, and where an effect sits."""
+"""What current, speed and motor angle add to the output: parameters that the output alone cannot tell, and where an
+effect sits.
+"""
 
 import numpy as np
 import pytest
@@ -14,7 +16,16 @@ from ers_mj.recording import from_arrays
 from ers_mj.traces import Blocks, trace_of
 
 T = np.arange(0.0, 4.0, 1e-3)
-TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625, "tau_e": 1.1e-3, "emf_share": 0.9}
+TRUTH = {
+    "a_1": 25.0,
+    "a_2": 50.0,
+    "b": 70.0,
+    "c_1": 135.0,
+    "c_2": 115.0,
+    "theta_0": 0.2625,
+    "tau_e": 1.1e-3,
+    "emf_share": 0.9,
+}
 AMPERE = 110.0  # n K_t / J [rad/s^2 per A]
 NOISE = {"theta": 1.5e-4, "current": 0.02, "speed": 0.05, "motor": 3e-3}
 RATIO, ZERO = 22.26, 0.7  # of the motor's encoder
@@ -29,7 +40,11 @@ def recordings(effects=(), *channels):
         seen = {"current": motion.drive / AMPERE, "speed": motion.omega, "motor": RATIO * motion.theta_m + ZERO}
         noisy = {kind: seen[kind] + NOISE[kind] * rng.standard_normal(T.size) for kind in channels}
         fields = {{"speed": "omega", "motor": "theta_m"}.get(kind, kind): x for kind, x in noisy.items()}
-        out.append(from_arrays(T, u, motion.measured + NOISE["theta"] * rng.standard_normal(T.size), name=f"{name}.csv", **fields))
+        out.append(
+            from_arrays(
+                T, u, motion.measured + NOISE["theta"] * rng.standard_normal(T.size), name=f"{name}.csv", **fields
+            )
+        )
     return out
 
 
@@ -49,7 +64,9 @@ def test_every_channel_is_explained_to_its_noise():
     assert np.median(misfit) == pytest.approx(1.0, abs=0.1) and misfit.max() < 2.0
 
 
-@pytest.mark.parametrize("name, size", [("sensor_lag", [1.5e-3, np.inf]), ("sensor_lag", [1e-4, 3e-3]), ("input_delay", [1.5e-3])])
+@pytest.mark.parametrize(
+    "name, size", [("sensor_lag", [1.5e-3, np.inf]), ("sensor_lag", [1e-4, 3e-3]), ("input_delay", [1.5e-3])]
+)
 def test_the_current_says_on_which_side_of_the_motor_a_delay_lies(name, size):
     document = diagnose(recordings([(name, np.array(size))], "current"), read_datasheet("table1")).document
     assert document["missing"][0]["effect"] == name
@@ -61,19 +78,25 @@ def test_the_current_of_a_command_that_was_not_recorded_is_no_evidence():
     """Of a dead time, the first of which follows what was asked for before the recording began."""
     trace = trace_of(recordings((), "current")[1], None)
     model = baseline([trace], read_datasheet("table1"), True).fit.model.with_effect("input_delay", np.array([0.0205]))
-    left = residuals(model, [trace], OBSERVER_RATE)[T.size:]
+    left = residuals(model, [trace], OBSERVER_RATE)[T.size :]
     assert not left[:21].any() and np.all(left[21:] != 0.0)
 
 
 def sagging(told):
-    """Three recordings of a servo whose supply sinks with what it draws and with time; ``told`` is what is written down as the input and the supply."""
+    """Three recordings of a servo whose supply sinks with what it draws and with time; ``told`` is what is written down
+    as the input and the supply.
+    """
     out = []
     for k, name in enumerate(("multisine", "steps", "chirp")):
         u, rng = np.round(INPUTS[name](T), 4), np.random.default_rng(k)
         supply = 1.0 - 0.02 * np.abs(u) / np.max(np.abs(u)) - 0.01 * T - 0.02 * (np.sin(3.0 * T + k) > 0.3)
         motion = ReducedModel(lumped(TRUTH)).simulate(T, u * supply)
         u, vin = told(u, 24.0 * supply + 0.02 * rng.standard_normal(T.size))
-        out.append(from_arrays(T, u, motion.measured + NOISE["theta"] * rng.standard_normal(T.size), name=f"{name}.csv", vin=vin))
+        out.append(
+            from_arrays(
+                T, u, motion.measured + NOISE["theta"] * rng.standard_normal(T.size), name=f"{name}.csv", vin=vin
+            )
+        )
     return out
 
 
@@ -94,6 +117,13 @@ def test_a_supply_that_the_input_holds_already_is_no_effect():
 def test_a_supply_that_is_steady_or_hardly_known_is_left_out():
     t, u = T, INPUTS["multisine"](T)
     steady, holed = 24.0 + 0.01 * np.sin(t), np.where(np.sin(9.0 * t) > 0.0, np.nan, 24.0 + np.sin(t))
-    assert all(trace_of(from_arrays(t, u, np.sin(t), vin=vin), None).supply is None for vin in (steady, holed, -24.0 + np.sin(t)))
+    assert all(
+        trace_of(from_arrays(t, u, np.sin(t), vin=vin), None).supply is None
+        for vin in (steady, holed, -24.0 + np.sin(t))
+    )
     seen = trace_of(from_arrays(t, u, np.sin(t), vin=np.where(t == 1.0, np.nan, 24.0 + np.sin(t))), None)
-    assert np.isfinite(seen.supply).all() and seen.part(10, 90).supply.size == 80 and seen.without([slice(3, 5)]).supply is seen.supply
+    assert (
+        np.isfinite(seen.supply).all()
+        and seen.part(10, 90).supply.size == 80
+        and seen.without([slice(3, 5)]).supply is seen.supply
+    )

@@ -37,85 +37,214 @@ def with_cell(column: str, row: int, text: str) -> dict:
 GOOD = csv(columns())
 SHEET = "[parameters]\nJ = 0.0031\nR = 1.55\nK_t = 0.0175\n"
 FILES = {
-    "good.csv": GOOD, "second.csv": csv(columns(0.3)), "copy.csv": GOOD, "good.toml": SHEET, "folder/x.txt": "kept",
-    "empty.csv": "", "blank.csv": "\n\n", "header.csv": "t_s,u_V,theta_rad\n", "short.csv": "\n".join(GOOD.split("\n")[:50]),
-    "text.csv": csv(with_cell("theta_rad", 7, "hello")), "text_time.csv": csv(with_cell("t_s", 7, "noon")),
-    "infinite.csv": csv(with_cell("u_V", 7, "inf")), "repeats.csv": csv(with_cell("t_s", 7, "0.06")),
-    "backwards.csv": csv(with_cell("t_s", 7, "0.01")), "ragged.csv": GOOD + "1,2\n", "binary.csv": "\0\1\2,\n\0",
-    "constant.csv": csv(columns() | {"theta_rad": np.ones(N)}), "hole_time.csv": csv(with_cell("t_s", 9, "")),
+    "good.csv": GOOD,
+    "second.csv": csv(columns(0.3)),
+    "copy.csv": GOOD,
+    "good.toml": SHEET,
+    "folder/x.txt": "kept",
+    "empty.csv": "",
+    "blank.csv": "\n\n",
+    "header.csv": "t_s,u_V,theta_rad\n",
+    "short.csv": "\n".join(GOOD.split("\n")[:50]),
+    "text.csv": csv(with_cell("theta_rad", 7, "hello")),
+    "text_time.csv": csv(with_cell("t_s", 7, "noon")),
+    "infinite.csv": csv(with_cell("u_V", 7, "inf")),
+    "repeats.csv": csv(with_cell("t_s", 7, "0.06")),
+    "backwards.csv": csv(with_cell("t_s", 7, "0.01")),
+    "ragged.csv": GOOD + "1,2\n",
+    "binary.csv": "\0\1\2,\n\0",
+    "constant.csv": csv(columns() | {"theta_rad": np.ones(N)}),
+    "hole_time.csv": csv(with_cell("t_s", 9, "")),
     "mostly_nan.csv": csv(columns() | {"theta_rad": ["nan" if k % 2 else k for k in range(N)]}),
     "no_output.csv": csv({k: v for k, v in columns().items() if k != "theta_rad"}),
     "no_input.csv": csv({k: v for k, v in columns().items() if k != "u_V"}),
     "no_time.csv": csv({k: v for k, v in columns().items() if k != "t_s"}),
-    "turns.csv": GOOD.replace("theta_rad", "theta_turns"), "amps.csv": GOOD.replace("u_V", "u_A"),
-    "metres.csv": GOOD.replace("theta_rad", "x_m"), "duty.csv": GOOD.replace("u_V", "u_duty_pct"),
-    "twice.csv": GOOD.replace("theta_rad", "u_V"), "two_outputs.csv": csv(columns() | {"theta_deg": np.degrees(columns()["theta_rad"])}),
-    "notes.txt": GOOD, "fake.parquet": GOOD, "bad.toml": "[parameters", "unknown.toml": "[parameters]\nJJ = 1\n",
-    "negative.toml": "[parameters]\nJ = -1\n", "nan.toml": "[parameters]\nJ = nan\n", "word.toml": '[parameters]\nJ = "big"\n',
-    "section.toml": "[servo]\nJ = 1\n", "both.toml": SHEET + "[lumped]\nb = 1\n", "nothing.toml": "", "lumped.toml": "[lumped]\nb = 80\na_2 = 50\nc_2 = 100\n", "no_b.toml": "[parameters]\nk_s = 1\n",
-    "strange.toml": SHEET + '[[effect]]\nname = "magic"\n', "volts.csv": csv({"t_s": T, "u_V": 8 * np.sin(3 * T)}),
-    "volts_text.csv": csv({"t_s": T, "u_V": ["x"] * N}), "volts_hole.csv": csv({"t_s": T, "u_V": [""] + [1] * (N - 1)}),
-    "volts_back.csv": csv({"t_s": T[::-1], "u_V": T}), "volts_one.csv": "t_s,u_V\n0,1\n", "exists.csv": "kept",
+    "turns.csv": GOOD.replace("theta_rad", "theta_turns"),
+    "amps.csv": GOOD.replace("u_V", "u_A"),
+    "metres.csv": GOOD.replace("theta_rad", "x_m"),
+    "duty.csv": GOOD.replace("u_V", "u_duty_pct"),
+    "twice.csv": GOOD.replace("theta_rad", "u_V"),
+    "two_outputs.csv": csv(columns() | {"theta_deg": np.degrees(columns()["theta_rad"])}),
+    "notes.txt": GOOD,
+    "fake.parquet": GOOD,
+    "bad.toml": "[parameters",
+    "unknown.toml": "[parameters]\nJJ = 1\n",
+    "negative.toml": "[parameters]\nJ = -1\n",
+    "nan.toml": "[parameters]\nJ = nan\n",
+    "word.toml": '[parameters]\nJ = "big"\n',
+    "section.toml": "[servo]\nJ = 1\n",
+    "both.toml": SHEET + "[lumped]\nb = 1\n",
+    "nothing.toml": "",
+    "lumped.toml": "[lumped]\nb = 80\na_2 = 50\nc_2 = 100\n",
+    "no_b.toml": "[parameters]\nk_s = 1\n",
+    "strange.toml": SHEET + '[[effect]]\nname = "magic"\n',
+    "volts.csv": csv({"t_s": T, "u_V": 8 * np.sin(3 * T)}),
+    "volts_text.csv": csv({"t_s": T, "u_V": ["x"] * N}),
+    "volts_hole.csv": csv({"t_s": T, "u_V": [""] + [1] * (N - 1)}),
+    "volts_back.csv": csv({"t_s": T[::-1], "u_V": T}),
+    "volts_one.csv": "t_s,u_V\n0,1\n",
+    "exists.csv": "kept",
 }
 
 DIAGNOSE = {
-    "no recording": "", "no such file": "missing.csv", "a folder": "folder", "empty": "empty.csv", "blank": "blank.csv",
-    "header only": "header.csv", "too short": "short.csv", "text": "text.csv", "text in time": "text_time.csv",
-    "infinite": "infinite.csv", "time repeats": "repeats.csv", "time backwards": "backwards.csv", "ragged": "ragged.csv",
-    "binary": "binary.csv", "constant output": "constant.csv", "time missing": "hole_time.csv", "mostly missing": "mostly_nan.csv",
-    "no output": "no_output.csv", "no input": "no_input.csv", "no time": "no_time.csv", "unknown output unit": "turns.csv",
-    "unknown input unit": "amps.csv", "column twice": "twice.csv", "two outputs": "two_outputs.csv", "suffix": "notes.txt",
-    "no parquet": "fake.parquet", "no run": "good.csv#run=3", "second file bad": "good.csv empty.csv",
-    "held-out file bad": "good.csv --holdout empty.csv", "held-out file absent": "good.csv --holdout missing.csv",
-    "no datasheet": "good.csv --datasheet missing.toml", "bad toml": "good.csv --datasheet bad.toml",
-    "unknown key": "good.csv --datasheet unknown.toml", "negative": "good.csv --datasheet negative.toml",
-    "nan": "good.csv --datasheet nan.toml", "word": "good.csv --datasheet word.toml", "section": "good.csv --datasheet section.toml",
-    "both": "good.csv --datasheet both.toml", "nothing": "good.csv --datasheet nothing.toml", "csv as datasheet": "good.csv --datasheet good.csv",
+    "no recording": "",
+    "no such file": "missing.csv",
+    "a folder": "folder",
+    "empty": "empty.csv",
+    "blank": "blank.csv",
+    "header only": "header.csv",
+    "too short": "short.csv",
+    "text": "text.csv",
+    "text in time": "text_time.csv",
+    "infinite": "infinite.csv",
+    "time repeats": "repeats.csv",
+    "time backwards": "backwards.csv",
+    "ragged": "ragged.csv",
+    "binary": "binary.csv",
+    "constant output": "constant.csv",
+    "time missing": "hole_time.csv",
+    "mostly missing": "mostly_nan.csv",
+    "no output": "no_output.csv",
+    "no input": "no_input.csv",
+    "no time": "no_time.csv",
+    "unknown output unit": "turns.csv",
+    "unknown input unit": "amps.csv",
+    "column twice": "twice.csv",
+    "two outputs": "two_outputs.csv",
+    "suffix": "notes.txt",
+    "no parquet": "fake.parquet",
+    "no run": "good.csv#run=3",
+    "second file bad": "good.csv empty.csv",
+    "held-out file bad": "good.csv --holdout empty.csv",
+    "held-out file absent": "good.csv --holdout missing.csv",
+    "no datasheet": "good.csv --datasheet missing.toml",
+    "bad toml": "good.csv --datasheet bad.toml",
+    "unknown key": "good.csv --datasheet unknown.toml",
+    "negative": "good.csv --datasheet negative.toml",
+    "nan": "good.csv --datasheet nan.toml",
+    "word": "good.csv --datasheet word.toml",
+    "section": "good.csv --datasheet section.toml",
+    "both": "good.csv --datasheet both.toml",
+    "nothing": "good.csv --datasheet nothing.toml",
+    "csv as datasheet": "good.csv --datasheet good.csv",
     "empty datasheet name": ["good.csv", "--datasheet", ""],
-    "same file twice": "good.csv copy.csv", "trained and held out": "good.csv second.csv --holdout copy.csv",
-    "held out twice": "second.csv --holdout good.csv copy.csv", "output units": "good.csv metres.csv", "input units": "good.csv --holdout duty.csv",
-    "folder holds files": "good.csv --out folder", "out is a file": "good.csv --out exists.csv", "out under a file": "good.csv --out exists.csv/deep",
-    "out empty": ["good.csv", "--out", ""], "out without value": "good.csv --out", "json and full folder": "good.csv --json --out folder",
-    "map form": "good.csv --map t_s", "map name": "good.csv --map time=t_s", "map column": "good.csv --map t_s=Time",
-    "map twice": "good.csv --map t_s=a --map t_s=b", "seed": "good.csv --seed x", "negative seed": "good.csv --seed -1",
-    "jobs": "good.csv --jobs 0", "fraction of jobs": "good.csv --jobs 1.5", "unknown option": "good.csv --fast", "holdout without value": "good.csv --holdout",
+    "same file twice": "good.csv copy.csv",
+    "trained and held out": "good.csv second.csv --holdout copy.csv",
+    "held out twice": "second.csv --holdout good.csv copy.csv",
+    "output units": "good.csv metres.csv",
+    "input units": "good.csv --holdout duty.csv",
+    "folder holds files": "good.csv --out folder",
+    "out is a file": "good.csv --out exists.csv",
+    "out under a file": "good.csv --out exists.csv/deep",
+    "out empty": ["good.csv", "--out", ""],
+    "out without value": "good.csv --out",
+    "json and full folder": "good.csv --json --out folder",
+    "map form": "good.csv --map t_s",
+    "map name": "good.csv --map time=t_s",
+    "map column": "good.csv --map t_s=Time",
+    "map twice": "good.csv --map t_s=a --map t_s=b",
+    "seed": "good.csv --seed x",
+    "negative seed": "good.csv --seed -1",
+    "jobs": "good.csv --jobs 0",
+    "fraction of jobs": "good.csv --jobs 1.5",
+    "unknown option": "good.csv --fast",
+    "holdout without value": "good.csv --holdout",
 }
 STEPS = "--plant reduced --input steps --out new.csv"
 SIMULATE = {
-    "no input": "--out new.csv", "no out": "--input steps", "input name": "--input stepz --out new.csv", "input file": "--input missing.csv --out new.csv",
-    "input without u": "--input no_input.csv --out new.csv", "input text": "--input volts_text.csv --out new.csv", "input holes": "--input volts_hole.csv --out new.csv",
-    "input backwards": "--input volts_back.csv --out new.csv", "input of one": "--input volts_one.csv --out new.csv", "input empty": "--input empty.csv --out new.csv",
-    "rate of a file": "--input volts.csv --rate-hz 100 --out new.csv", "plant": "--plant real --input steps --out new.csv",
+    "no input": "--out new.csv",
+    "no out": "--input steps",
+    "input name": "--input stepz --out new.csv",
+    "input file": "--input missing.csv --out new.csv",
+    "input without u": "--input no_input.csv --out new.csv",
+    "input text": "--input volts_text.csv --out new.csv",
+    "input holes": "--input volts_hole.csv --out new.csv",
+    "input backwards": "--input volts_back.csv --out new.csv",
+    "input of one": "--input volts_one.csv --out new.csv",
+    "input empty": "--input empty.csv --out new.csv",
+    "rate of a file": "--input volts.csv --rate-hz 100 --out new.csv",
+    "plant": "--plant real --input steps --out new.csv",
     "plants": "--plant reduced,mujoco --input steps --out new.csv",
-    "linkage of the reduced": f"{STEPS} --linkage rod", "rod of a joint": f"lumped.toml {STEPS} --linkage rod --plant mujoco",
-    "play twice": f"{STEPS} --gap 1 --effect backlash:gap=0.01", "printed without gap": f"{STEPS} --play printed",
-    "printed in mujoco": f"{STEPS} --play printed --gap 1 --plant mujoco", "printed with effect": f"{STEPS} --play printed --gap 1 --effect bias_torque:tau_0=0.1",
-    "play": f"{STEPS} --play loose", "linkage": f"{STEPS} --linkage rope", "inductance": f"{STEPS} --inductance maybe",
-    "effect": f"{STEPS} --effect magic", "near effect": f"{STEPS} --effect stribek:dF_s=1", "effect key": f"{STEPS} --effect stribeck:F=1,v_s=1",
-    "effect word": f"{STEPS} --effect stribeck:dF_s=big,v_s=1", "effect nan": f"{STEPS} --effect stribeck:dF_s=nan,v_s=1",
-    "effect form": f"{STEPS} --effect stribeck:dF_s", "effect key twice": f"{STEPS} --effect bias_torque:tau_0=1,tau_0=2",
-    "effect needs": f"{STEPS} --effect stribeck:dF_s=1", "effect without": f"{STEPS} --effect bias_torque", "effect sign": f"{STEPS} --effect input_delay:T_d=-1",
-    "effect bounds": f"{STEPS} --effect load_dependent_friction:mu=2", "effect twice": f"{STEPS} --effect bias_torque:tau_0=1 --effect bias_torque:tau_0=2",
-    "stops crossed": f"{STEPS} --effect end_stop:lower=1,upper=0", "gap and backlash": f"{STEPS} --gap 1 --effect backlash:gap=0.01",
+    "linkage of the reduced": f"{STEPS} --linkage rod",
+    "rod of a joint": f"lumped.toml {STEPS} --linkage rod --plant mujoco",
+    "play twice": f"{STEPS} --gap 1 --effect backlash:gap=0.01",
+    "printed without gap": f"{STEPS} --play printed",
+    "printed in mujoco": f"{STEPS} --play printed --gap 1 --plant mujoco",
+    "printed with effect": f"{STEPS} --play printed --gap 1 --effect bias_torque:tau_0=0.1",
+    "play": f"{STEPS} --play loose",
+    "linkage": f"{STEPS} --linkage rope",
+    "inductance": f"{STEPS} --inductance maybe",
+    "effect": f"{STEPS} --effect magic",
+    "near effect": f"{STEPS} --effect stribek:dF_s=1",
+    "effect key": f"{STEPS} --effect stribeck:F=1,v_s=1",
+    "effect word": f"{STEPS} --effect stribeck:dF_s=big,v_s=1",
+    "effect nan": f"{STEPS} --effect stribeck:dF_s=nan,v_s=1",
+    "effect form": f"{STEPS} --effect stribeck:dF_s",
+    "effect key twice": f"{STEPS} --effect bias_torque:tau_0=1,tau_0=2",
+    "effect needs": f"{STEPS} --effect stribeck:dF_s=1",
+    "effect without": f"{STEPS} --effect bias_torque",
+    "effect sign": f"{STEPS} --effect input_delay:T_d=-1",
+    "effect bounds": f"{STEPS} --effect load_dependent_friction:mu=2",
+    "effect twice": f"{STEPS} --effect bias_torque:tau_0=1 --effect bias_torque:tau_0=2",
+    "stops crossed": f"{STEPS} --effect end_stop:lower=1,upper=0",
+    "gap and backlash": f"{STEPS} --gap 1 --effect backlash:gap=0.01",
     "effect empty": [*STEPS.split(), "--effect", ""],
-    "noise": f"{STEPS} --noise-deg -1", "noise word": f"{STEPS} --noise-deg loud", "gap": f"{STEPS} --gap -1", "gap inf": f"{STEPS} --gap inf",
-    "rate": f"{STEPS} --rate-hz 0", "rate huge": f"{STEPS} --rate-hz 1e12", "duration": f"{STEPS} --duration -3", "seed": f"{STEPS} --seed 1.5",
-    "model": f"missing.toml {STEPS}", "model bad": f"bad.toml {STEPS}", "model too little": f"no_b.toml {STEPS}", "model magic": f"strange.toml {STEPS}",
-    "inductance without L": f"good.toml {STEPS} --inductance on", "out exists": "--input steps --out exists.csv", "out folder": "--input steps --out folder",
-    "out parquet": "--input steps --out new.parquet", "out under file": "--input steps --out exists.csv/new.csv", "two models": f"good.toml both.toml {STEPS}",
+    "noise": f"{STEPS} --noise-deg -1",
+    "noise word": f"{STEPS} --noise-deg loud",
+    "gap": f"{STEPS} --gap -1",
+    "gap inf": f"{STEPS} --gap inf",
+    "rate": f"{STEPS} --rate-hz 0",
+    "rate huge": f"{STEPS} --rate-hz 1e12",
+    "duration": f"{STEPS} --duration -3",
+    "seed": f"{STEPS} --seed 1.5",
+    "model": f"missing.toml {STEPS}",
+    "model bad": f"bad.toml {STEPS}",
+    "model too little": f"no_b.toml {STEPS}",
+    "model magic": f"strange.toml {STEPS}",
+    "inductance without L": f"good.toml {STEPS} --inductance on",
+    "out exists": "--input steps --out exists.csv",
+    "out folder": "--input steps --out folder",
+    "out parquet": "--input steps --out new.parquet",
+    "out under file": "--input steps --out exists.csv/new.csv",
+    "two models": f"good.toml both.toml {STEPS}",
 }
 VALIDATE = {
-    "gap word": "--gap wide", "gap negative": "--gap -0.5", "gap inf": "--gap 0,inf", "gap twice": "--gap 0.5,0.50", "gap open list": "--gap 0.5,", "gap without value": "--gap",
-    "linkage": "--linkage rope", "linkages": "--linkage constant,rope", "linkage twice": "--linkage rod,rod", "inductance": "--inductance 1",
-    "no datasheet": "--datasheet missing.toml", "bad datasheet": "--datasheet bad.toml", "too little": "--datasheet no_b.toml", "empty datasheet name": ["--datasheet", ""],
-    "rod of a joint": "--datasheet lumped.toml --linkage rod", "no inductance": "--datasheet lumped.toml --inductance off,on",
-    "jobs": "--jobs 0", "folder holds files": "--out folder", "out is a file": "--out exists.csv", "file given": "good.csv", "unknown option": "--quick",
+    "gap word": "--gap wide",
+    "gap negative": "--gap -0.5",
+    "gap inf": "--gap 0,inf",
+    "gap twice": "--gap 0.5,0.50",
+    "gap open list": "--gap 0.5,",
+    "gap without value": "--gap",
+    "linkage": "--linkage rope",
+    "linkages": "--linkage constant,rope",
+    "linkage twice": "--linkage rod,rod",
+    "inductance": "--inductance 1",
+    "no datasheet": "--datasheet missing.toml",
+    "bad datasheet": "--datasheet bad.toml",
+    "too little": "--datasheet no_b.toml",
+    "empty datasheet name": ["--datasheet", ""],
+    "rod of a joint": "--datasheet lumped.toml --linkage rod",
+    "no inductance": "--datasheet lumped.toml --inductance off,on",
+    "jobs": "--jobs 0",
+    "folder holds files": "--out folder",
+    "out is a file": "--out exists.csv",
+    "file given": "good.csv",
+    "unknown option": "--quick",
 }
-OTHERS = {"no command": [], "unknown command": ["diagnoze"], "unknown option": ["--quick"], "demo with a file": ["demo", "good.csv"],
-          "demo seed": ["demo", "--seed", "x"], "demo into files": ["demo", "--out", "folder"]}
-SPLIT = {**{f"diagnose {k}": ["diagnose", *(v if isinstance(v, list) else v.split())] for k, v in DIAGNOSE.items()},
-         **{f"simulate {k}": ["simulate", *(v if isinstance(v, list) else v.split())] for k, v in SIMULATE.items()},
-         **{f"validate {k}": ["validate", *(v if isinstance(v, list) else v.split())] for k, v in VALIDATE.items()}, **OTHERS}
+OTHERS = {
+    "no command": [],
+    "unknown command": ["diagnoze"],
+    "unknown option": ["--quick"],
+    "demo with a file": ["demo", "good.csv"],
+    "demo seed": ["demo", "--seed", "x"],
+    "demo into files": ["demo", "--out", "folder"],
+}
+SPLIT = {
+    **{f"diagnose {k}": ["diagnose", *(v if isinstance(v, list) else v.split())] for k, v in DIAGNOSE.items()},
+    **{f"simulate {k}": ["simulate", *(v if isinstance(v, list) else v.split())] for k, v in SIMULATE.items()},
+    **{f"validate {k}": ["validate", *(v if isinstance(v, list) else v.split())] for k, v in VALIDATE.items()},
+    **OTHERS,
+}
 
 
 @pytest.fixture
@@ -142,10 +271,28 @@ def stub(monkeypatch, **changes) -> list:
         progress("fitting", 0.5)
         if "raises" in changes:
             raise changes["raises"]
-        document = {"version": 1, "verdict": "parameters_only", "sentence": "Only the parameters were off.", "missing": [], "where": [],
-                    "fit": {"heldout_rmse_before_rad": np.float64(0.1), "heldout_rmse_after_rad": float("nan")}, "seed": seed,
-                    "data": {"output_unit": "rad", "input_unit": "V", "files": [r.name for r in recordings], "sha256": [], "problems": []}}
-        return SimpleNamespace(document=document, evidence=Evidence((), (), None, 1e-3, "rad", "V"), plant=SimpleNamespace(xml=lambda: "<mujoco/>"), model=changes.get("model", Datasheet(lumped={"b": 1.0})))
+        document = {
+            "version": 1,
+            "verdict": "parameters_only",
+            "sentence": "Only the parameters were off.",
+            "missing": [],
+            "where": [],
+            "fit": {"heldout_rmse_before_rad": np.float64(0.1), "heldout_rmse_after_rad": float("nan")},
+            "seed": seed,
+            "data": {
+                "output_unit": "rad",
+                "input_unit": "V",
+                "files": [r.name for r in recordings],
+                "sha256": [],
+                "problems": [],
+            },
+        }
+        return SimpleNamespace(
+            document=document,
+            evidence=Evidence((), (), None, 1e-3, "rad", "V"),
+            plant=SimpleNamespace(xml=lambda: "<mujoco/>"),
+            model=changes.get("model", Datasheet(lumped={"b": 1.0})),
+        )
 
     monkeypatch.setitem(sys.modules, "ers_mj.diagnosis", SimpleNamespace(diagnose=diagnose))
     import ers_mj
@@ -165,21 +312,30 @@ def test_bad_input_is_one_sentence_code_2_and_nothing_written(argv, place, monke
     assert contents(place) == before
 
 
-@pytest.mark.parametrize(("argv", "words"), [
-    ("simulate --input steps --out n.csv --effect stribek:dF_s=1", "did you mean stribeck?"),
-    ("simulate --input steps --out n.csv --effect bias_torque:tau=1", "tau_0 (constant torque"),
-    ("simulate --input stepz --out n.csv", "multisine, chirp, ramp, steps, square"),
-    ("simulate --input steps --out n.csv --linkage rod", "a rod linkage needs --plant mujoco"),
-    ("simulate lumped.toml --input steps --out n.csv --plant mujoco --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
-    ("simulate --input steps --out n.csv --gap 1 --effect backlash:gap=0.01", "the play is given twice"),
-    ("diagnoze", "did you mean diagnose? there are demo, diagnose, identify, simulate, validate, view"),
-    ("validate --linkage constant,rope", "there is no 'rope'; there are constant, rod"),
-    ("validate --datasheet lumped.toml --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
-    ("diagnose good.csv --map t_s=Time", "the columns are t_s, u_V, theta_rad"),
-    ("diagnose good.csv metres.csv", "in m and that of good.csv in rad"),
-    ("diagnose good.csv --holdout copy.csv", "copy.csv: is held out and also among the training recordings (as good.csv)"),
-    ("diagnose good.csv --out folder", "give --force"),
-])
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        ("simulate --input steps --out n.csv --effect stribek:dF_s=1", "did you mean stribeck?"),
+        ("simulate --input steps --out n.csv --effect bias_torque:tau=1", "tau_0 (constant torque"),
+        ("simulate --input stepz --out n.csv", "multisine, chirp, ramp, steps, square"),
+        ("simulate --input steps --out n.csv --linkage rod", "a rod linkage needs --plant mujoco"),
+        (
+            "simulate lumped.toml --input steps --out n.csv --plant mujoco --linkage rod",
+            "a rod linkage needs a datasheet with J, n and K_t",
+        ),
+        ("simulate --input steps --out n.csv --gap 1 --effect backlash:gap=0.01", "the play is given twice"),
+        ("diagnoze", "did you mean diagnose? there are demo, diagnose, identify, simulate, validate, view"),
+        ("validate --linkage constant,rope", "there is no 'rope'; there are constant, rod"),
+        ("validate --datasheet lumped.toml --linkage rod", "a rod linkage needs a datasheet with J, n and K_t"),
+        ("diagnose good.csv --map t_s=Time", "the columns are t_s, u_V, theta_rad"),
+        ("diagnose good.csv metres.csv", "in m and that of good.csv in rad"),
+        (
+            "diagnose good.csv --holdout copy.csv",
+            "copy.csv: is held out and also among the training recordings (as good.csv)",
+        ),
+        ("diagnose good.csv --out folder", "give --force"),
+    ],
+)
 def test_the_sentence_says_what_exists(argv, words, place, monkeypatch, capsys):
     stub(monkeypatch)
     assert cli.main(argv.split()) == 2
@@ -191,15 +347,25 @@ def test_the_sentence_says_what_exists(argv, words, place, monkeypatch, capsys):
 
 def test_diagnose_writes_its_files_and_tells(place, monkeypatch, capsys):
     calls = stub(monkeypatch)
-    assert cli.main("diagnose good.csv --holdout second.csv --datasheet good.toml --seed 5 --jobs 2 --out res".split()) == 0
+    assert (
+        cli.main("diagnose good.csv --holdout second.csv --datasheet good.toml --seed 5 --jobs 2 --out res".split())
+        == 0
+    )
     out, err = capsys.readouterr()
-    assert sorted(p.name for p in (place / "res").iterdir()) == ["diagnosis.json", "model.toml", "plant.xml", "report.html"]
+    assert sorted(p.name for p in (place / "res").iterdir()) == [
+        "diagnosis.json",
+        "model.toml",
+        "plant.xml",
+        "report.html",
+    ]
     document = json.loads((place / "res/diagnosis.json").read_text())
     assert document["fit"]["heldout_rmse_after_rad"] is None and document["seed"] == 5
     assert read_datasheet(place / "res/model.toml").lumped["b"] == 1.0
     assert "PARAMETERS_ONLY" in out and "parameters_only" in out and "report.html" in out and err == ""
     (call,) = calls
-    assert [r.name for r in call.holdout] == ["second.csv"] and call.jobs == 2 and call.datasheet.parameters["J"] == 0.0031
+    assert (
+        [r.name for r in call.holdout] == ["second.csv"] and call.jobs == 2 and call.datasheet.parameters["J"] == 0.0031
+    )
 
 
 def test_json_without_out_writes_nothing(place, monkeypatch, capsys):
@@ -225,14 +391,17 @@ def test_the_default_folder_may_be_overwritten_a_named_one_needs_force(place, mo
     assert (place / "folder/x.txt").read_text() == "kept" and (place / "folder/model.toml").exists()
 
 
-@pytest.mark.parametrize(("argv", "trained", "held"), [
-    ("good.csv --holdout second.csv", ["good.csv"], ["second.csv"]),
-    ("good.csv --holdout second.csv third.csv", ["good.csv"], ["second.csv", "third.csv"]),
-    ("good.csv --holdout second.csv --holdout third.csv", ["good.csv"], ["second.csv", "third.csv"]),
-    ("--holdout second.csv good.csv third.csv", ["good.csv", "third.csv"], ["second.csv"]),
-    ("--holdout second.csv good.csv --seed 3", ["good.csv"], ["second.csv"]),
-    ("--seed 3 good.csv third.csv", ["good.csv", "third.csv"], []),
-])
+@pytest.mark.parametrize(
+    ("argv", "trained", "held"),
+    [
+        ("good.csv --holdout second.csv", ["good.csv"], ["second.csv"]),
+        ("good.csv --holdout second.csv third.csv", ["good.csv"], ["second.csv", "third.csv"]),
+        ("good.csv --holdout second.csv --holdout third.csv", ["good.csv"], ["second.csv", "third.csv"]),
+        ("--holdout second.csv good.csv third.csv", ["good.csv", "third.csv"], ["second.csv"]),
+        ("--holdout second.csv good.csv --seed 3", ["good.csv"], ["second.csv"]),
+        ("--seed 3 good.csv third.csv", ["good.csv", "third.csv"], []),
+    ],
+)
 def test_holdout_may_be_repeated_listed_or_come_first(argv, trained, held, place, monkeypatch):
     (place / "third.csv").write_text(csv(columns(0.7)))
     calls = stub(monkeypatch)
@@ -284,14 +453,25 @@ def test_demo_diagnoses_what_the_package_ships(place, monkeypatch):
 
 
 def test_simulate_writes_a_recording_in_the_contracts_format(place, capsys):
-    assert cli.main("simulate --plant reduced --input multisine --rate-hz 500 --duration 4 --noise-deg 0.01 --seed 3 --out new.csv --json".split()) == 0
+    assert (
+        cli.main(
+            "simulate --plant reduced --input multisine --rate-hz 500 --duration 4 --noise-deg 0.01 --seed 3 --out"
+            " new.csv --json".split()
+        )
+        == 0
+    )
     summary = json.loads(capsys.readouterr().out)
     recording = read_recording(place / "new.csv")
     assert (place / "new.csv").read_text().startswith("t_s,u_V,theta_rad\n")
     assert recording.t.size == summary["samples"] == 2000 and recording.rate_hz == pytest.approx(500)
     assert np.degrees(recording.y.std()) > 2
     first = (place / "new.csv").read_bytes()
-    assert cli.main("simulate --input multisine --rate-hz 500 --duration 4 --noise-deg 0.01 --seed 3 --out new.csv --force".split()) == 0
+    assert (
+        cli.main(
+            "simulate --input multisine --rate-hz 500 --duration 4 --noise-deg 0.01 --seed 3 --out new.csv --force".split()
+        )
+        == 0
+    )
     assert (place / "new.csv").read_bytes() == first
 
 
@@ -328,7 +508,10 @@ def test_mujoco_simulates_rods_lumped_models_and_effects(place):
     assert rms_deg(simulated(place, f"{short} --linkage rod") - simulated(place, short)) > 0.1
     lumped = simulated(place, f"lumped.toml {short}"), simulated(place, "lumped.toml --duration 1")
     assert rms_deg(lumped[0] - lumped[1]) < 0.01
-    stopped = [simulated(place, f"--duration 1 {plant} --effect end_stop:upper=0.6,f_stop=80") for plant in ("", "--plant mujoco")]
+    stopped = [
+        simulated(place, f"--duration 1 {plant} --effect end_stop:upper=0.6,f_stop=80")
+        for plant in ("", "--plant mujoco")
+    ]
     assert stopped[0].max() < 0.7 and rms_deg(stopped[0] - stopped[1]) < 0.02
 
 
@@ -354,7 +537,9 @@ def test_effects_act_in_si(place):
 
 
 def test_a_model_simulates_with_its_own_effects(place):
-    (place / "model.toml").write_text(read_text_of_table1() + '[[effect]]\nname = "end_stop"\n[effect.parameters]\nupper = 0.6\n')
+    (place / "model.toml").write_text(
+        read_text_of_table1() + '[[effect]]\nname = "end_stop"\n[effect.parameters]\nupper = 0.6\n'
+    )
     assert cli.main("simulate model.toml --input steps --out new.csv".split()) == 0
     assert read_recording(place / "new.csv").y.max() < 0.7
 
@@ -374,8 +559,10 @@ def test_help_has_an_example(command, capsys):
 
 
 def test_help_is_quick_and_loads_nothing_heavy():
-    code = ("import sys; from ers_mj import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass\n"
-            "print([m for m in ('numpy', 'numba', 'pyarrow', 'matplotlib', 'scipy') if m in sys.modules], file=sys.stderr)")
+    code = (
+        "import sys; from ers_mj import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass\n"
+        "print([m for m in ('numpy', 'numba', 'pyarrow', 'matplotlib', 'scipy') if m in sys.modules], file=sys.stderr)"
+    )
     begin = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]" and time.perf_counter() - begin < 2.0
@@ -388,4 +575,7 @@ def test_progress_is_silent_in_a_pipe(capsys):
 
 
 def test_json_has_no_nan():
-    assert json.loads(output.as_json({"a": np.array([1.0, np.nan]), "b": (np.int64(2), float("inf"))})) == {"a": [1.0, None], "b": [2, None]}
+    assert json.loads(output.as_json({"a": np.array([1.0, np.nan]), "b": (np.int64(2), float("inf"))})) == {
+        "a": [1.0, None],
+        "b": [2, None],
+    }

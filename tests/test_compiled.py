@@ -11,8 +11,14 @@ ROOT = Path(__file__).resolve().parent.parent
 def imported(home, **more):
     """What importing the plants prints on stderr, with kept code in ``home`` and nothing compiled in earnest."""
     environment = {**os.environ, "XDG_CACHE_HOME": str(home), "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(ROOT), **more}
-    done = subprocess.run([sys.executable, "-c", "import ers_mj.plants.events"],
-                          env=environment, cwd=home, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", "import ers_mj.plants.events"],
+        env=environment,
+        cwd=home,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 0, done.stderr
     return done.stderr
 

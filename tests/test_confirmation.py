@@ -28,7 +28,7 @@ def plain():
 def holding(y, begins, length=12):
     y = y.copy()
     for begin in begins:
-        y[begin:begin + length] = y[begin]
+        y[begin : begin + length] = y[begin]
     return y
 
 
@@ -38,17 +38,24 @@ def test_a_hold_behind_a_coarse_converter_is_betrayed_by_the_model(plain):
     coarse = trace("multisine", sensor=lambda y: step * np.round(holding(y, begins) / step))
     found = without_spikes(plain.fit.model, [coarse])[0]
     moving = [b for b in begins if abs(coarse.y[b + 12] - coarse.y[b]) > 6 * step]
-    masked = [b for b in moving if not found.valid[b + 1:b + 12].any()]
+    masked = [b for b in moving if not found.valid[b + 1 : b + 12].any()]
     assert len(coarse.lost) >= 3 and len(moving) >= 8 and len(masked) >= 0.8 * len(moving)
 
 
 def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
-    """A wave of less than half a step along the travel is the converter's, where it makes the noise; a larger one is not, nor any beside a finer converter."""
+    """A wave of less than half a step along the travel is the converter's, where it makes the noise; a larger one is
+    not, nor any beside a finer converter.
+    """
     step = 0.016
     coarse, fine = ([trace("multisine", sensor=lambda y: s * np.round(y / s))] for s in (step, NOISE))
-    small, large = (plain.fit.model.with_effect("sensor_nonlinearity", np.array([np.inf, np.inf, size * step, 0.043, 0.3])) for size in (0.3, 0.8))
+    small, large = (
+        plain.fit.model.with_effect("sensor_nonlinearity", np.array([np.inf, np.inf, size * step, 0.043, 0.3]))
+        for size in (0.3, 0.8)
+    )
     assert _is_a_converters("sensor_nonlinearity", small, coarse)
-    assert not _is_a_converters("sensor_nonlinearity", large, coarse) and not _is_a_converters("sensor_nonlinearity", small, fine)
+    assert not _is_a_converters("sensor_nonlinearity", large, coarse) and not _is_a_converters(
+        "sensor_nonlinearity", small, fine
+    )
     assert not _is_a_converters("bias_torque", small, coarse)
 
 
@@ -60,7 +67,10 @@ def test_a_rudder_that_sticks_is_not_held(plain):
 
 def test_what_cannot_be_scaled_is_refitted_from_all_its_starts(plain):
     peak = max(float(np.abs(t.u).max()) for t in plain.traces)
-    clipped = [trace(name, [("voltage_saturation", np.array([0.93 * peak, np.inf]))], seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))]
+    clipped = [
+        trace(name, [("voltage_saturation", np.array([0.93 * peak, np.inf]))], seed=k)
+        for k, name in enumerate(("multisine", "steps", "chirp"))
+    ]
     start = started(clipped)
     best, *others = candidates(start.fit, start.traces, 1.0, 1, ())
     clip = next(c for c in (best, *others) if c.name == "voltage_saturation")
@@ -73,7 +83,11 @@ def test_an_effect_that_one_recording_shows_is_judged_within_it():
     upper = float(np.nanquantile(wide.y, 0.97))
     stop = np.array([-math.inf, upper, 3e5, 50.0])
     assert np.nanmax(calm.y) < upper
-    traces = [trace("multisine", [("end_stop", stop)], gain=0.5), trace("steps", gain=0.5, seed=1), trace("multisine", [("end_stop", stop)], seed=2)]
+    traces = [
+        trace("multisine", [("end_stop", stop)], gain=0.5),
+        trace("steps", gain=0.5, seed=1),
+        trace("multisine", [("end_stop", stop)], seed=2),
+    ]
     start = started(traces)
     chosen = fit(start.fit.model.with_effect("end_stop", stop), start.traces)
     parts, _ = folds(start.traces, [])
@@ -91,7 +105,12 @@ def test_an_effect_that_one_recording_shows_is_judged_within_it():
 
 
 def test_what_is_too_small_to_be_found_widens_the_intervals(plain):
-    faint = started([trace(name, [("quadratic_drag", np.array([0.02, np.inf]))], seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
+    faint = started(
+        [
+            trace(name, [("quadratic_drag", np.array([0.02, np.inf]))], seed=k)
+            for k, name in enumerate(("multisine", "steps", "chirp"))
+        ]
+    )
     model, layout = faint.fit.model, faint.fit.model.layout()
     noise, unseen = half_widths(model, faint.traces, (), 1.0), unseen_widths(model, faint.traces, 1.0)
     off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))
@@ -99,9 +118,18 @@ def test_what_is_too_small_to_be_found_widens_the_intervals(plain):
 
 
 def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out():
-    """Of a recording where few samples bear it, or while its start is read; within one the interval of what moves a rudder that sticks tells little."""
+    """Of a recording where few samples bear it, or while its start is read; within one the interval of what moves a
+    rudder that sticks tells little.
+    """
     quiet = [trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))]
-    for begun, knocked, none in ((2.9, False, True), (-0.28, True, True), (0.03, True, True), (1.0, False, False), (1.0, True, False), (2.6, True, False)):
+    for begun, knocked, none in (
+        (2.9, False, True),
+        (-0.28, True, True),
+        (0.03, True, True),
+        (1.0, False, False),
+        (1.0, True, False),
+        (2.6, True, False),
+    ):
         knock = np.array([40.0, begun, 0.3, 1.0, np.inf])
         traces = [quiet[0], trace("steps", [("load_disturbance", knock)], seed=1) if knocked else quiet[1], quiet[2]]
         start = started(traces)
@@ -113,18 +141,24 @@ def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks():
     score = lambda *rmse: [Score(e**2, 1, np.ones(1)) for e in rmse]  # noqa: E731
     assert _no_closer(score(1.2), score(1.0), 0.04) and not _no_closer(score(1.2), score(1.0), 1e-6)
     assert _no_closer(score(1.4), score(1.0), 1e-6) and not _no_closer(score(0.9), score(1.0), 0.04)
-    assert not _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 1e-6) and _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 0.04)
+    assert not _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 1e-6) and _no_closer(
+        score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 0.04
+    )
     assert _no_closer(score(0.9, 0.9, 9.0), score(1.0, 1.0, 5.0), 1e-6)
 
 
 def test_a_wave_of_many_that_does_not_pay_for_its_numbers_is_any_wave(plain):
-    """Three numbers among a hundred blocks cost 6.9 of C; a limit, or a bent sensor's wave of few periods, is judged by its p-value alone."""
+    """Three numbers among a hundred blocks cost 6.9 of C; a limit, or a bent sensor's wave of few periods, is judged by
+    its p-value alone.
+    """
     model = plain.fit.model
     for name in ("cogging", "transmission_ripple", "periodic_gust", "sensor_nonlinearity", "voltage_saturation"):
         model = model.with_effect(name, BY_NAME[name].starts(model.scales)[-1])
     left, little, much = (Score(1.0, 1, np.full(100, math.expm1(c / 100) + 0.5)) for c in (20.0, 14.0, 8.0))
     any_wave = {name: [_is_any_wave(name, model, [after], [left]) for after in (little, much)] for name in model.names}
-    assert any_wave == {name: [name in ("cogging", "transmission_ripple", "periodic_gust"), False] for name in model.names}
+    assert any_wave == {
+        name: [name in ("cogging", "transmission_ripple", "periodic_gust"), False] for name in model.names
+    }
 
 
 @pytest.mark.parametrize("training, most", [(None, HELD_SECONDS), ((), LEFT_OUT_SECONDS)])
@@ -135,4 +169,7 @@ def test_mujoco_runs_a_few_seconds_of_what_was_held_out(training, most):
 
     (long,) = run_in_mujoco([held(12.0), held(2.0)])
     assert long.name == "12.0 s" and long.t[-1] == pytest.approx(most, abs=0.011)
-    assert [trace.name for trace in run_in_mujoco([held(0.4 * most), held(0.5 * most), held(0.4 * most)])] == [f"{0.4 * most} s", f"{0.5 * most} s"]
+    assert [trace.name for trace in run_in_mujoco([held(0.4 * most), held(0.5 * most), held(0.4 * most)])] == [
+        f"{0.4 * most} s",
+        f"{0.5 * most} s",
+    ]

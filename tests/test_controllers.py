@@ -50,6 +50,7 @@ def test_a_law_that_is_reset_begins_anew(name):
 @pytest.mark.parametrize("name", LAWS)
 def test_no_law_sees_what_comes(name):
     """Two references that part at sample 30 bring the same voltages until then."""
+
     def told(after):
         law = CONTROLLERS[name](SERVO, 1000.0)
         law.reset(HOME)
@@ -124,8 +125,17 @@ def test_the_observer_follows_through_stick_and_slip():
     assert np.sqrt(np.mean((speed - run.omega) ** 2)) < 0.08  # differences of the readings: 0.25
 
 
-@pytest.mark.parametrize(("text", "says"), [("k_9=3", "there is no gain 'k_9'"), ("q=1/0", "a number or a fraction"), ("q=1/2", "outside"),
-                                            ("k_1=-1", "not above zero"), ("gamma_3=0", "seven values above zero"), ("q", "a number or a fraction")])
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("k_9=3", "there is no gain 'k_9'"),
+        ("q=1/0", "a number or a fraction"),
+        ("q=1/2", "outside"),
+        ("k_1=-1", "not above zero"),
+        ("gamma_3=0", "seven values above zero"),
+        ("q", "a number or a fraction"),
+    ],
+)
 def test_gains_that_cannot_be_are_refused(text, says):
     with pytest.raises(InputError, match=says):
         parse_gains(text)

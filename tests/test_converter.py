@@ -31,7 +31,9 @@ def recorded(effects=(), name="multisine", seed=0):
     """A recording behind a converter of half a degree, begun off the middle of a step."""
     truth = {**TRUTH, "theta_0": STEP * round(TRUTH["theta_0"] / STEP) + OFF}
     u = INPUTS[name](T)
-    y = ReducedModel(lumped(truth), effects).simulate(T, u).theta + NOISE * np.random.default_rng(seed).standard_normal(T.size)
+    y = ReducedModel(lumped(truth), effects).simulate(T, u).theta + NOISE * np.random.default_rng(seed).standard_normal(
+        T.size
+    )
     return trace_of(from_arrays(T, u, STEP * np.round(y / STEP), name=name), None), truth
 
 
@@ -49,7 +51,9 @@ def test_deviations_are_weighed_and_weighed_back():
     inside = np.abs(x) < 0.5 * STEP
     assert np.abs(e[inside]).max() < 0.2 and np.abs(e[np.abs(x) > 0.6 * STEP]).min() > 10.0
     smooth = np.abs(np.abs(0.5 * (x[1:] + x[:-1])) - 0.5 * STEP) > 0.01 * STEP
-    assert np.allclose((np.diff(e) / np.diff(x) * converter.sigma)[smooth], converter.slope(0.5 * (x[1:] + x[:-1]))[smooth])
+    assert np.allclose(
+        (np.diff(e) / np.diff(x) * converter.sigma)[smooth], converter.slope(0.5 * (x[1:] + x[:-1]))[smooth]
+    )
 
 
 def test_the_noise_that_is_sure_is_that_of_noise_ahead():
@@ -78,7 +82,7 @@ def test_a_missing_sample_is_no_threshold():
 
 def test_the_first_thresholds_tell_where_within_a_step_it_began():
     trace, truth = recorded()
-    coarse, = with_starts(model(truth), counted([trace], float(np.ptp(trace.y))))
+    (coarse,) = with_starts(model(truth), counted([trace], float(np.ptp(trace.y))))
     assert abs(trace.start[0] - truth["theta_0"]) == pytest.approx(OFF, rel=0.01)
     assert abs(coarse.start[0] - truth["theta_0"]) < 0.1 * STEP
 
@@ -114,7 +118,9 @@ def test_what_is_smaller_than_a_step_shows():
 
 @pytest.mark.parametrize("torque, wrong", [(0.0, False), (8.0, True)])
 def test_a_model_further_from_the_readings_than_their_rounding_is_wrong(torque, wrong):
-    """Where no screening would tell, the sweep begins: not of a finer converter, nor beside what is simulated slowly."""
+    """Where no screening would tell, the sweep begins: not of a finer converter, nor beside what is simulated
+    slowly.
+    """
     trace, truth = recorded([("bias_torque", np.array([torque]))] if torque else ())
     coarse = counted([trace], float(np.ptp(trace.y)))
     found = fit(model(truth), with_starts(model(truth), coarse))
@@ -130,7 +136,10 @@ def test_a_baseline_that_is_far_is_not_led_astray():
     travel = float(np.ptp(trace.y))
     sharp = sharpened(start, travel)
     assert sharpened(start, 301 * trace.quantum) is start
-    assert abs(sharp.fit.model.values["b"] / truth["b"] - 1.0) < 0.01 and abs(sharp.fit.model.values["c_2"] / truth["c_2"] - 1.0) < 0.02
+    assert (
+        abs(sharp.fit.model.values["b"] / truth["b"] - 1.0) < 0.01
+        and abs(sharp.fit.model.values["c_2"] / truth["c_2"] - 1.0) < 0.02
+    )
     assert np.mean(sharp.fit.misfit) < 1.5
 
 
@@ -157,7 +166,11 @@ def test_what_moves_the_reading_by_less_than_half_a_coarse_step_is_nothing_to_na
     """Of a finer converter, which is not counted, the smallest torque stays a candidate."""
     fine, truth = recorded()
     coarse = counted([fine], float(np.ptp(fine.y)))
-    model = Model({**truth, "tau_e": 0.0, "emf_share": 0.0, "ampere": 1.0}, FREE, scales=SCALES).with_effect("bias_torque", np.array([torque]))
+    model = Model({**truth, "tau_e": 0.0, "emf_share": 0.0, "ampere": 1.0}, FREE, scales=SCALES).with_effect(
+        "bias_torque", np.array([torque])
+    )
     candidate = Candidate("bias_torque", replace(fit(model, coarse, steps=1), model=model), 10.0, 3.0, 0.0, 1.0)
     assert _is_within_a_step(candidate, coarse) is within and not _is_within_a_step(candidate, [fine])
-    assert not _is_within_a_step(replace(candidate, gain=90.0), coarse)  # many thresholds tell together what is much smaller than a step
+    assert not _is_within_a_step(
+        replace(candidate, gain=90.0), coarse
+    )  # many thresholds tell together what is much smaller than a step

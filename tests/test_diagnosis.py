@@ -17,7 +17,16 @@ from ers_mj.recording import from_arrays
 from ers_mj.traces import trace_of
 
 T = np.arange(0.0, 4.0, 1e-3)
-TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625, "tau_e": 9e-4, "emf_share": 0.94}
+TRUTH = {
+    "a_1": 25.0,
+    "a_2": 50.0,
+    "b": 70.0,
+    "c_1": 135.0,
+    "c_2": 115.0,
+    "theta_0": 0.2625,
+    "tau_e": 9e-4,
+    "emf_share": 0.94,
+}
 NOISE = 1.5e-4
 
 
@@ -49,8 +58,21 @@ def test_a_concealed_dead_zone_is_named_and_measured(dead_zone):
 
 
 def test_the_document_is_whole_and_is_json(dead_zone):
-    keys = {"version", "verdict", "sentence", "where", "missing", "remainder", "record_state", "fit", "parameters", "next_recording", "data",
-            "seed", "versions"}
+    keys = {
+        "version",
+        "verdict",
+        "sentence",
+        "where",
+        "missing",
+        "remainder",
+        "record_state",
+        "fit",
+        "parameters",
+        "next_recording",
+        "data",
+        "seed",
+        "versions",
+    }
     assert keys <= set(json.loads(json.dumps(plain(dead_zone.document), allow_nan=False)))
     assert {"a_1", "a_2", "b", "c_1", "c_2", "theta_0"} <= set(dead_zone.document["parameters"])
     assert dead_zone.document["parameters"]["J"]["value"] is None
@@ -91,11 +113,22 @@ def test_a_coarse_sensor_is_told_from_the_data():
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
 
 
-@pytest.mark.parametrize("degrees, travel, unit, told", [(0.041, 0.5, "rad", True), (0.029, 0.5, "rad", False), (0.0879, 1.9, "rad", False), (0.041, 0.5, "V", False),
-                                                            (0.041, 0.2, "V", True)])
+@pytest.mark.parametrize(
+    "degrees, travel, unit, told",
+    [
+        (0.041, 0.5, "rad", True),
+        (0.029, 0.5, "rad", False),
+        (0.0879, 1.9, "rad", False),
+        (0.041, 0.5, "V", False),
+        (0.041, 0.2, "V", True),
+    ],
+)
 def test_a_step_is_an_effect_where_rudders_converters_are_finer_or_the_travel_has_few(degrees, travel, unit, told):
     step = np.radians(degrees)
-    y = np.round((0.5 * travel * np.sin(5.0 * T) + 1e-4 * np.random.default_rng(2).standard_normal(T.size)) / step) * step
+    y = (
+        np.round((0.5 * travel * np.sin(5.0 * T) + 1e-4 * np.random.default_rng(2).standard_normal(T.size)) / step)
+        * step
+    )
     r = from_arrays(T, np.zeros(T.size), y, output_unit=unit)
     found = _symptoms([r], [trace_of(r, None)], travel)
     assert found == ({"sensor_quantisation": pytest.approx([step], rel=1e-3)} if told else {})
@@ -103,7 +136,9 @@ def test_a_step_is_an_effect_where_rudders_converters_are_finer_or_the_travel_ha
 
 @pytest.mark.parametrize("step", [0.0, np.radians(0.6)])
 def test_what_the_library_has_no_name_for_is_unexplained(step):
-    """A torque that hops between two values at random times is no effect of the library; a coarse sensor is told beside it."""
+    """A torque that hops between two values at random times is no effect of the library; a coarse sensor is told beside
+    it.
+    """
     rng = np.random.default_rng(4)
     out = []
     for k, r in enumerate(recordings()):
@@ -117,11 +152,16 @@ def test_what_the_library_has_no_name_for_is_unexplained(step):
 
 
 def test_a_mimic_is_not_named_where_a_law_without_a_name_explains_more(dead_zone):
-    """A motor whose iron saturates is no sagging supply, which takes two thirds of it; a dead zone is no form of such a law."""
+    """A motor whose iron saturates is no sagging supply, which takes two thirds of it; a dead zone is no form of such a
+    law.
+    """
     document = diagnose(recordings([("torque_saturation", np.array([0.15, 24.0]))]), read_datasheet("table1")).document
     assert (document["verdict"], document["missing"]) == ("unexplained", [])
     assert [s["effect"] for s in document["suspects"][:2]] == ["torque_saturation", "supply_sag"]
-    assert document["remainder"]["significant"] and "acts like a torque that is not in proportion to the current" in document["sentence"]
+    assert (
+        document["remainder"]["significant"]
+        and "acts like a torque that is not in proportion to the current" in document["sentence"]
+    )
     assert [*document["next_recording"]["checked"]["against"]] == ["supply_sag"]
     assert "suspects" not in dead_zone.document
 
@@ -161,24 +201,31 @@ def test_dropouts_are_found_in_the_data_and_left_out(lose):
     def sensor(y):
         y, random = y.copy(), np.random.default_rng(int(1e6 * y[-1]) % 1000)
         for k in random.choice(np.arange(100, y.size - 100), 12, replace=False):
-            y[k:k + (1 if lose == "spikes" else 40)] = y[k] + 0.03 if lose == "spikes" else y[k - 1]
+            y[k : k + (1 if lose == "spikes" else 40)] = y[k] + 0.03 if lose == "spikes" else y[k - 1]
         return y
 
     document = diagnose(recordings(sensor=sensor), read_datasheet("table1")).document
     assert [m["effect"] for m in document["missing"]] == ["sensor_dropout"]
-    assert document["fit"]["heldout_rmse_before_rad"] < (3 if lose == "spikes" else 10) * NOISE  # a hold at rest may pass unseen
+    assert (
+        document["fit"]["heldout_rmse_before_rad"] < (3 if lose == "spikes" else 10) * NOISE
+    )  # a hold at rest may pass unseen
 
 
 @pytest.mark.parametrize("errors, lost", [((0.5, 0.4), True), ((0.5, 0.002), False)])
 def test_where_every_free_run_is_lost_the_parameters_are_not_all_that_was_off(errors, lost):
     n = 100
-    trace = trace_of(from_arrays(np.arange(n) / 1e3, np.zeros(n), 1e-3 * np.random.default_rng(0).standard_normal(n)), None)
+    trace = trace_of(
+        from_arrays(np.arange(n) / 1e3, np.zeros(n), 1e-3 * np.random.default_rng(0).standard_normal(n)), None
+    )
     scores = [Score(n * e**2, n, np.ones(1)) for e in errors]
     case = SimpleNamespace(confirmed=SimpleNamespace(before=scores, parts=[Fold(trace, None)] * len(errors)))
     assert Case._astray(case) is lost
 
 
-@pytest.mark.parametrize("lost, left, explained", [((60.0, 80.0), 0.5, 0.99), ((20.0, 25.0), 0.5, 0.495), ((20.0, 25.0), 0.0, 0.99), ((7.0, 5.0), 0.0, 0.745)])
+@pytest.mark.parametrize(
+    "lost, left, explained",
+    [((60.0, 80.0), 0.5, 0.99), ((20.0, 25.0), 0.5, 0.495), ((20.0, 25.0), 0.0, 0.99), ((7.0, 5.0), 0.0, 0.745)],
+)
 def test_a_free_run_that_is_lost_with_and_without_the_effects_tells_nothing(lost, left, explained):
     n = 100
     shown = [(*(Score(n * e**2, n, np.ones(1)) for e in ends), 1.0) for ends in ((10.0, np.sqrt(1.99)), lost)]
@@ -192,16 +239,24 @@ def test_where_all_free_runs_fork_the_observer_tells_what_is_explained():
     assert Case._explained_each(case) == pytest.approx(0.875)
 
 
-@pytest.mark.parametrize("before, after, named", [((90.0, 60.0), (4.0, 6.0), True), ((90.0, 60.0), (40.0, 20.0), False), ((3.0, 2.0), (0.1, 0.1), False)])
+@pytest.mark.parametrize(
+    "before, after, named",
+    [((90.0, 60.0), (4.0, 6.0), True), ((90.0, 60.0), (40.0, 20.0), False), ((3.0, 2.0), (0.1, 0.1), False)],
+)
 def test_what_nearly_all_of_a_large_misfit_asks_for_is_named_though_its_free_runs_fork(before, after, named):
     scores = ([Score(1.0, 1, np.exp(np.full(20, c / 20.0)) - 1.0) for c in costs] for costs in (before, after))
     case = SimpleNamespace(confirmed=SimpleNamespace(**dict(zip(("before", "after"), scores))))
     assert Case._goes_in_blocks(case) is named
 
 
-@pytest.mark.parametrize("explained, before, after, named", [(0.45, 0.12, 0.01, True), (0.45, 0.12, 0.06, False), (0.3, 0.12, 0.01, False), (0.45, 0.02, 0.0, False)])
+@pytest.mark.parametrize(
+    "explained, before, after, named",
+    [(0.45, 0.12, 0.01, True), (0.45, 0.12, 0.06, False), (0.3, 0.12, 0.01, False), (0.45, 0.02, 0.0, False)],
+)
 def test_what_memory_loses_is_named_though_one_free_run_forks(explained, before, after, named):
-    case = SimpleNamespace(explained=explained, left_before={"output": before, "current": 0.0}, left={"output": after, "current": 0.0})
+    case = SimpleNamespace(
+        explained=explained, left_before={"output": before, "current": 0.0}, left={"output": after, "current": 0.0}
+    )
     assert Case._goes_from_memory(case) is named
 
 
@@ -213,7 +268,16 @@ def test_where_no_error_is_above_the_noise_memory_tells_what_is_explained(before
     assert Case._explained_each(case) == pytest.approx(explained)
 
 
-@pytest.mark.parametrize("explained, left, after, part", [(0.95, 0.2, 3.0, True), (0.99, 0.2, 3.0, False), (0.95, 0.05, 3.0, False), (0.95, 0.2, 9.0, False)])
+@pytest.mark.parametrize(
+    "explained, left, after, part",
+    [(0.95, 0.2, 3.0, True), (0.99, 0.2, 3.0, False), (0.95, 0.05, 3.0, False), (0.95, 0.2, 9.0, False)],
+)
 def test_what_memory_and_held_out_error_both_miss_is_left(explained, left, after, part):
-    case = SimpleNamespace(told_effects=("supply_sag",), explained=explained, left={"output": left}, fits={"heldout_rmse_after_rad": after}, noise=1.0)
+    case = SimpleNamespace(
+        told_effects=("supply_sag",),
+        explained=explained,
+        left={"output": left},
+        fits={"heldout_rmse_after_rad": after},
+        noise=1.0,
+    )
     assert Case._is_a_part(case) is part

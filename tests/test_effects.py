@@ -53,7 +53,10 @@ def test_what_a_reader_may_give_acts_and_leaves_numbers(effect):
     """Any of an effect's numbers, however few, are refused or change the recording: none is swallowed in silence."""
     starts = effect.starts(SCALES)
     starts += [more for p in starts for more in effect.grown(effect.name, p, SCALES)]
-    typical = {p.name: min((abs(float(s[k])) for s in starts if np.isfinite(s[k]) and s[k] != 0), default=0.3) for k, p in enumerate(effect.parameters)}
+    typical = {
+        p.name: min((abs(float(s[k])) for s in starts if np.isfinite(s[k]) and s[k] != 0), default=0.3)
+        for k, p in enumerate(effect.parameters)
+    }
     typical |= {"rate": 5.0, "tau_max": 0.01}
     settable = [p.name for p in effect.parameters if not p.recorded]
     t, u = T[:1500], INPUTS["multisine"](T[:1500])
@@ -84,33 +87,61 @@ CURRENT = [e for e in EFFECTS if e.subsystem in ("drive", "transmission") and e.
 @pytest.mark.parametrize("effect", CURRENT, **ids)
 def test_an_open_circuit_feels_nothing_of_the_current(effect):
     off, c = np.zeros(T.size, bool), table_1().coefficients
-    with_it, without = (ReducedModel(c, chosen).simulate(T, np.zeros(T.size), (0.5, 8.0), enable=off).theta
-                        for chosen in ([(effect.name, effect.starts(SCALES)[0])], []))
+    with_it, without = (
+        ReducedModel(c, chosen).simulate(T, np.zeros(T.size), (0.5, 8.0), enable=off).theta
+        for chosen in ([(effect.name, effect.starts(SCALES)[0])], [])
+    )
     assert np.degrees(np.max(np.abs(with_it - without))) < 1e-6
 
 
 def test_a_bristle_is_begun_with_damping_that_fades_where_it_was_lost(pushed):
     scales, effect = pushed.fit.model.scales, BY_NAME["presliding"]
     lasting, fading = (np.array([1e-3, 0.1, w_d, np.inf]) for w_d in (10.0 * scales.speed, 0.1 * scales.speed))
-    assert [p[0] == 1e-3 and p[2] < scales.speed for p in effect.grown("presliding", lasting, scales)] == [True, False, False]
+    assert [p[0] == 1e-3 and p[2] < scales.speed for p in effect.grown("presliding", lasting, scales)] == [
+        True,
+        False,
+        False,
+    ]
     assert not any(p[2] < np.inf for p in effect.grown("presliding", fading, scales))
 
 
 def test_wider_forms_begin_near_the_plain_one(pushed):
-    """Half of a Stribeck friction is left at the same speed, a difference of friction in motion stays, a push is as strong over its time; what is wide already is not widened."""
+    """Half of a Stribeck friction is left at the same speed, a difference of friction in motion stays, a push is as
+    strong over its time; what is wide already is not widened.
+    """
     scales = pushed.fit.model.scales
-    plain = {"stribeck": [40.0, 0.6, 1.4, np.inf], "asymmetric_friction": [30.0, 1.0, np.inf, np.inf], "load_disturbance": [100.0, 1.0, 0.3, 0.0, np.inf]}
+    plain = {
+        "stribeck": [40.0, 0.6, 1.4, np.inf],
+        "asymmetric_friction": [30.0, 1.0, np.inf, np.inf],
+        "load_disturbance": [100.0, 1.0, 0.3, 0.0, np.inf],
+    }
     wide = {name: BY_NAME[name].grown(name, np.array(p), scales) for name, p in plain.items()}
-    level = [law.friction(tuple(law.constants(np.array(p), None)), 0.0, 0.0, 0.6 * np.log(2.0) ** (1.0 / 1.4), 0.0, 1.0)
-             for law in [BY_NAME["stribeck"]] for p in (plain["stribeck"], wide["stribeck"][0])]
+    level = [
+        law.friction(tuple(law.constants(np.array(p), None)), 0.0, 0.0, 0.6 * np.log(2.0) ** (1.0 / 1.4), 0.0, 1.0)
+        for law in [BY_NAME["stribeck"]]
+        for p in (plain["stribeck"], wide["stribeck"][0])
+    ]
     assert level == pytest.approx([20.0, 20.0])
-    fast, slow = (BY_NAME["asymmetric_friction"].friction(tuple(BY_NAME["asymmetric_friction"].constants(wide["asymmetric_friction"][0], None)), 50.0, 0.0, w, 0.0, 1.0)
-                  for w in (10.0 * scales.speed, 0.0))
+    fast, slow = (
+        BY_NAME["asymmetric_friction"].friction(
+            tuple(BY_NAME["asymmetric_friction"].constants(wide["asymmetric_friction"][0], None)),
+            50.0,
+            0.0,
+            w,
+            0.0,
+            1.0,
+        )
+        for w in (10.0 * scales.speed, 0.0)
+    )
     assert fast == pytest.approx(50.0) and slow == pytest.approx(35.0)
     push = wide["load_disturbance"][0]
     assert push[0] * push[4] == pytest.approx(100.0 * 0.3) and np.isinf(push[2])
-    assert BY_NAME["load_disturbance"].grown("load_disturbance", push, scales)[0] == pytest.approx(plain["load_disturbance"])
-    assert not any(BY_NAME[name].grown(name, some[0], scales) for name, some in wide.items() if name != "load_disturbance")
+    assert BY_NAME["load_disturbance"].grown("load_disturbance", push, scales)[0] == pytest.approx(
+        plain["load_disturbance"]
+    )
+    assert not any(
+        BY_NAME[name].grown(name, some[0], scales) for name, some in wide.items() if name != "load_disturbance"
+    )
 
 
 def test_a_gust_keeps_its_phases_in_a_wider_form(pushed):
@@ -118,24 +149,45 @@ def test_a_gust_keeps_its_phases_in_a_wider_form(pushed):
     model, gust = pushed.fit.model, BY_NAME["periodic_gust"]
     model = model.with_effect("periodic_gust", gust.starts(model.scales)[0])
     model.local["periodic_gust"][:, 0] = phases = np.arange(len(model.local["periodic_gust"])) + 0.3
-    forms = [model.with_form("periodic_gust", p) for p in gust.grown("periodic_gust", dict(model.effects)["periodic_gust"], model.scales)]
-    assert len(forms) > 2 and all(np.array_equal(form.local["periodic_gust"][:, 0], phases) and form.names == model.names for form in forms)
-    begun = [begin.model for name, begin in wider({"periodic_gust": replace(pushed.fit, model=model)}, ()) if name == "periodic_gust"]
+    forms = [
+        model.with_form("periodic_gust", p)
+        for p in gust.grown("periodic_gust", dict(model.effects)["periodic_gust"], model.scales)
+    ]
+    assert len(forms) > 2 and all(
+        np.array_equal(form.local["periodic_gust"][:, 0], phases) and form.names == model.names for form in forms
+    )
+    begun = [
+        begin.model
+        for name, begin in wider({"periodic_gust": replace(pushed.fit, model=model)}, ())
+        if name == "periodic_gust"
+    ]
     assert len(begun) == len(forms) and all(np.array_equal(some.local["periodic_gust"][:, 0], phases) for some in begun)
 
 
 def test_a_gust_may_swell_more_slowly_than_it_may_swing(pushed):
-    """A swing of less than three cycles bends to any drift; what swells once within the recording has the cycles of its wave to tell it."""
+    """A swing of less than three cycles bends to any drift; what swells once within the recording has the cycles of its
+    wave to tell it.
+    """
     model = pushed.fit.model
-    starts = BY_NAME["periodic_gust"].grown("periodic_gust", BY_NAME["periodic_gust"].starts(model.scales)[0], model.scales)
+    starts = BY_NAME["periodic_gust"].grown(
+        "periodic_gust", BY_NAME["periodic_gust"].starts(model.scales)[0], model.scales
+    )
     forms = [model.with_effect("periodic_gust", start) for start in starts if np.isfinite(start[5])]
-    swings, swells = ([next(f.lower for f in form.layout() if (f.owner, f.name) == ("periodic_gust", name)) for form in forms] for name in ("f", "f_s"))
-    assert swings == pytest.approx([3.0 / model.scales.duration] * len(forms)) and max(swells) < 0.5 / model.scales.duration
+    swings, swells = (
+        [next(f.lower for f in form.layout() if (f.owner, f.name) == ("periodic_gust", name)) for form in forms]
+        for name in ("f", "f_s")
+    )
+    assert (
+        swings == pytest.approx([3.0 / model.scales.duration] * len(forms))
+        and max(swells) < 0.5 / model.scales.duration
+    )
     assert not any(form.at_bound(f) for form in forms for f in form.layout() if f.name == "f_s")
 
 
 def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
-    """Behind a gear of 20 a motor that cogs thrice a turn has a period of 0.105 rad at the output; without a gear any period may be its own."""
+    """Behind a gear of 20 a motor that cogs thrice a turn has a period of 0.105 rad at the output; without a gear any
+    period may be its own.
+    """
     scales = replace(pushed.fit.model.scales, low=-0.3, high=0.3, cog=2 * np.pi / 60.0)
     cogs, gears = ([p for p in BY_NAME[name].starts(scales)] for name in ("cogging", "transmission_ripple"))
     torques = [p for p in gears if np.isfinite(p[3])]
@@ -144,14 +196,28 @@ def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
 
 
 def test_a_torque_that_returns_must_be_seen_to_return(pushed):
-    """Less than a period of it is any smooth torque; with a second harmonic even a whole one is. A friction that changes along the travel may be slower."""
+    """Less than a period of it is any smooth torque; with a second harmonic even a whole one is. A friction that
+    changes along the travel may be slower.
+    """
     model, ripple = pushed.fit.model, BY_NAME["transmission_ripple"]
     travel = 2.0 * model.scales.position
-    longest = {name: next(f.upper for f in model.with_effect(name, p).layout() if (f.owner, f.name) == (name, "period")) / travel for name, p in
-               (("cogging", [1.0, 0.1, 0.0, np.inf, np.inf]), ("transmission_ripple", [np.inf, 0.1, 0.0, 1.0, np.inf, np.inf]),
-                ("position_dependent_friction", [1.0, np.inf, np.inf, 0.1, 0.0]))}
-    assert longest["cogging"] == longest["transmission_ripple"] == pytest.approx(1 / 0.95) and longest["position_dependent_friction"] == pytest.approx(1.25)
-    assert [len(ripple.grown(ripple.name, np.array([np.inf, turns * travel, 0.0, 1.0, np.inf, np.inf]), model.scales)) for turns in (0.9, 1.03)] == [2, 0]
+    longest = {
+        name: (
+            next(f.upper for f in model.with_effect(name, p).layout() if (f.owner, f.name) == (name, "period")) / travel
+        )
+        for name, p in (
+            ("cogging", [1.0, 0.1, 0.0, np.inf, np.inf]),
+            ("transmission_ripple", [np.inf, 0.1, 0.0, 1.0, np.inf, np.inf]),
+            ("position_dependent_friction", [1.0, np.inf, np.inf, 0.1, 0.0]),
+        )
+    }
+    assert longest["cogging"] == longest["transmission_ripple"] == pytest.approx(1 / 0.95) and longest[
+        "position_dependent_friction"
+    ] == pytest.approx(1.25)
+    assert [
+        len(ripple.grown(ripple.name, np.array([np.inf, turns * travel, 0.0, 1.0, np.inf, np.inf]), model.scales))
+        for turns in (0.9, 1.03)
+    ] == [2, 0]
 
 
 def test_a_datasheets_gear_bounds_the_period_of_cogging(pushed):
@@ -163,8 +229,10 @@ def test_a_datasheets_gear_bounds_the_period_of_cogging(pushed):
 def test_an_uneven_gears_torque_is_the_one_of_a_cog():
     u, c = INPUTS["multisine"](T), lumped(TRUTH)
     wave = [5.0, 0.2, 0.4, 0.3, 1.0]
-    gear, cog = (ReducedModel(c, [(name, np.array(p))]).simulate(T, u).theta for name, p in
-                 (("transmission_ripple", [np.inf, 0.2, 0.4, 5.0, 0.3, 1.0]), ("cogging", wave)))
+    gear, cog = (
+        ReducedModel(c, [(name, np.array(p))]).simulate(T, u).theta
+        for name, p in (("transmission_ripple", [np.inf, 0.2, 0.4, 5.0, 0.3, 1.0]), ("cogging", wave))
+    )
     assert np.allclose(gear, cog, atol=1e-9)
     with pytest.raises(InputError, match="ripple and A are both given"):
         ReducedModel(c, [("transmission_ripple", np.array([0.1, 0.2, 0.4, 5.0, np.inf, np.inf]))]).simulate(T, u)

@@ -37,11 +37,17 @@ def test_the_design_keeps_to_the_limits(for_b):
 
 def test_with_the_current_b_is_known_to_a_per_cent_and_several_times_better_than_before(for_b):
     _, before, plan = for_b
-    assert plan.found["B"] < 0.01 and plan.spread["B"] < 0.4 * before.spread["B"] and plan.found["B"] < 0.6 * before.found["B"]
+    assert (
+        plan.found["B"] < 0.01
+        and plan.spread["B"] < 0.4 * before.spread["B"]
+        and plan.found["B"] < 0.6 * before.found["B"]
+    )
 
 
 def test_refits_keep_the_promise(for_b):
-    """RMS of REFITS errors over their standard deviation: chi-square within its 99.9 %, both ways, times what a linear promise may err."""
+    """RMS of REFITS errors over their standard deviation: chi-square within its 99.9 %, both ways, times what a linear
+    promise may err.
+    """
     ratio = for_b[2].found["B"] / for_b[2].spread["B"]
     assert 0.4 < ratio < 2.5
 
@@ -63,7 +69,16 @@ def test_what_the_sensors_cannot_tell_is_refused():
         Question.of(SHEET, rig(), ("a_2", "b", "B", "K_e"), "D")
 
 
-@pytest.mark.parametrize("options", [["--against", "x"], ["--for", "Q"], ["--duration-s", "1e9"], ["--umax-V", "-1"], ["--for", "B", "--inductance", "off"]])
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--against", "x"],
+        ["--for", "Q"],
+        ["--duration-s", "1e9"],
+        ["--umax-V", "-1"],
+        ["--for", "B", "--inductance", "off"],
+    ],
+)
 def test_bad_options_are_one_sentence_and_write_nothing(options, tmp_path, capsys):
     out = tmp_path / "next.csv"
     assert cli.main(["excite", "--out", str(out), *options]) == 2
@@ -75,7 +90,27 @@ def test_the_command_writes_an_input_that_simulate_takes(tmp_path, capsys, monke
     monkeypatch.setattr(experiment, "ROUNDS", 1)
     monkeypatch.setattr(experiment, "CHECKED", 2)
     out = tmp_path / "next.csv"
-    assert cli.main(["excite", "--umax-V", "12", "--duration-s", "2", "--rate-hz", "500", "--for", "c_2,b", "--inductance", "off", "--out", str(out), "--json"]) == 0
+    assert (
+        cli.main(
+            [
+                "excite",
+                "--umax-V",
+                "12",
+                "--duration-s",
+                "2",
+                "--rate-hz",
+                "500",
+                "--for",
+                "c_2,b",
+                "--inductance",
+                "off",
+                "--out",
+                str(out),
+                "--json",
+            ]
+        )
+        == 0
+    )
     told = json.loads(capsys.readouterr().out)
     assert set(told["half_width_95"]) == {"c_2", "b"} and told["parts"]
     t, u = read_input(out)

@@ -28,12 +28,20 @@ SPRINGY = ("backlash", {"gap": math.radians(0.5), "rho": 0.64, "phi": 0.0, "f_co
 RATE = 2000.0
 
 
-# -- linear plants -------------------------------------------------------------------------------------------------------
+# -- linear plants
+# -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("effects", "options"), [
-    ([], {}), ([], {"inductance": True}), (["input_delay:T_d=0.0023"], {}), (["input_delay:T_d=0.0023"], {"inductance": True}),
-    (["shaft_compliance:f_shaft=20,zeta=0.1,rho=0.5,phi=0.0"], {})])
+@pytest.mark.parametrize(
+    ("effects", "options"),
+    [
+        ([], {}),
+        ([], {"inductance": True}),
+        (["input_delay:T_d=0.0023"], {}),
+        (["input_delay:T_d=0.0023"], {"inductance": True}),
+        (["shaft_compliance:f_shaft=20,zeta=0.1,rho=0.5,phi=0.0"], {}),
+    ],
+)
 def test_the_linear_plant_moves_as_the_reduced_model(effects, options):
     """From a speed, under voltages that slip all the way."""
     plant = build_plant(FREE, effects=[parse_effect(text) for text in effects], **options)
@@ -43,46 +51,84 @@ def test_the_linear_plant_moves_as_the_reduced_model(effects, options):
     held = linearised(plant, 1000.0, HOME).held
     x = np.zeros(held.nstates)
     x[[1, 3] if "shaft" in str(effects) else [1]] = 0.3
-    np.testing.assert_allclose(control.forced_response(held, t, u, x).y[0], whole, atol=1e-7 if "shaft" in str(effects) else 1e-10)
+    np.testing.assert_allclose(
+        control.forced_response(held, t, u, x).y[0], whole, atol=1e-7 if "shaft" in str(effects) else 1e-10
+    )
 
 
 def test_a_sensors_lag_is_in_it():
-    plain, late = (linearised(build_plant(FREE, effects=effects), 1000.0, HOME) for effects in ((), [("sensor_lag", {"T": 0.004})]))
-    np.testing.assert_allclose(late.response(F_HZ) / plain.response(F_HZ), 1 / (1 + 2j * np.pi * F_HZ * 0.004), rtol=0.04)  # the reading takes the angle as straight between samples
+    plain, late = (
+        linearised(build_plant(FREE, effects=effects), 1000.0, HOME) for effects in ((), [("sensor_lag", {"T": 0.004})])
+    )
+    np.testing.assert_allclose(
+        late.response(F_HZ) / plain.response(F_HZ), 1 / (1 + 2j * np.pi * F_HZ * 0.004), rtol=0.04
+    )  # the reading takes the angle as straight between samples
     later = linearised(build_plant(FREE, effects=[("sensor_lag", {"T": 0.004, "T_d": 0.0033})]), 1000.0, HOME)
-    np.testing.assert_allclose(later.response(F_HZ) / late.response(F_HZ), np.exp(-2j * np.pi * F_HZ * 0.0033), rtol=0.05)
+    np.testing.assert_allclose(
+        later.response(F_HZ) / late.response(F_HZ), np.exp(-2j * np.pi * F_HZ * 0.0033), rtol=0.05
+    )
     load = [at(x.load, F_HZ) for x in (late, later)]
     np.testing.assert_allclose(load[1] / load[0], np.exp(-2j * np.pi * F_HZ * 0.0033), rtol=0.05)
 
 
-@pytest.mark.parametrize(("effects", "options"), [([], {}), ([], {"inductance": True}), ([], {"gap": math.radians(0.5)}),
-                                                  (["hinge_moment_cubic:k_3=5"], {}), (["input_delay:T_d=0.0023"], {})])
+@pytest.mark.parametrize(
+    ("effects", "options"),
+    [
+        ([], {}),
+        ([], {"inductance": True}),
+        ([], {"gap": math.radians(0.5)}),
+        (["hinge_moment_cubic:k_3=5"], {}),
+        (["input_delay:T_d=0.0023"], {}),
+    ],
+)
 def test_mujocos_own_derivatives_agree(effects, options):
-    """Two roads, one answer; MuJoCo's angle is half a step, 25 us, early, with inductance a whole one: 0.9 and 1.8 deg at 100 Hz."""
-    pair = [linearised(build_plant(SHEET, plant=kind, effects=[parse_effect(text) for text in effects], **options), 1000.0, HOME + 0.17)
-            for kind in ("reduced", "mujoco")]
+    """Two roads, one answer; MuJoCo's angle is half a step, 25 us, early, with inductance a whole one: 0.9 and 1.8 deg
+    at 100 Hz.
+    """
+    pair = [
+        linearised(
+            build_plant(SHEET, plant=kind, effects=[parse_effect(text) for text in effects], **options),
+            1000.0,
+            HOME + 0.17,
+        )
+        for kind in ("reduced", "mujoco")
+    ]
     ratio = pair[1].response(F_HZ) / pair[0].response(F_HZ)
-    assert np.abs(20 * np.log10(np.abs(ratio))).max() < 0.1 and np.abs(np.degrees(np.angle(ratio))).max() < (1.9 if options.get("inductance") else 1.0)
+    assert np.abs(20 * np.log10(np.abs(ratio))).max() < 0.1 and np.abs(np.degrees(np.angle(ratio))).max() < (
+        1.9 if options.get("inductance") else 1.0
+    )
     loads = pair[1].load_response(F_HZ) / pair[0].load_response(F_HZ)
     assert np.abs(loads - 1).max() < 0.02
 
 
 @pytest.mark.parametrize("effects", [(), ("presliding:x_s=0.001,zeta=0.5",)])
 def test_a_lumped_servo_that_turns_the_other_way_has_mujocos_derivatives_too(effects):
-    sheet = replace(SHEET, parameters={}, lumped={"a_1": 28.0, "a_2": 56.0, "b": -81.0, "c_1": 10.0, "c_2": 20.0, "theta_0": 0.1})
-    pair = [linearised(build_plant(sheet, plant=kind, effects=[parse_effect(text) for text in effects]), 1000.0, 0.3) for kind in ("reduced", "mujoco")]
+    sheet = replace(
+        SHEET, parameters={}, lumped={"a_1": 28.0, "a_2": 56.0, "b": -81.0, "c_1": 10.0, "c_2": 20.0, "theta_0": 0.1}
+    )
+    pair = [
+        linearised(build_plant(sheet, plant=kind, effects=[parse_effect(text) for text in effects]), 1000.0, 0.3)
+        for kind in ("reduced", "mujoco")
+    ]
     np.testing.assert_allclose(pair[1].response(F_HZ) / pair[0].response(F_HZ), np.ones(F_HZ.size), atol=0.04)
 
 
 def test_effects_that_no_linear_plant_has_are_named():
-    plant = build_plant(SHEET, plant="mujoco", effects=[parse_effect(text) for text in ("stribeck:dF_s=0.1,v_s=0.2", "voltage_saturation:u_max=9")])
+    plant = build_plant(
+        SHEET,
+        plant="mujoco",
+        effects=[parse_effect(text) for text in ("stribeck:dF_s=0.1,v_s=0.2", "voltage_saturation:u_max=9")],
+    )
     assert linearised(plant, 1000.0, HOME + 0.1).left_out == ("voltage_saturation", "stribeck")
     slope = linearised(build_plant(SHEET, effects=[parse_effect("stribeck:dF_s=0.1,v_s=0.5")]), 1000.0, HOME + 0.1, 0.4)
     plain = linearised(build_plant(SHEET), 1000.0, HOME + 0.1, 0.4)
-    assert abs(slope.load_response(np.array([1.0]))[0]) > 1.1 * abs(plain.load_response(np.array([1.0]))[0])  # friction that falls undamps
+    assert abs(slope.load_response(np.array([1.0]))[0]) > 1.1 * abs(
+        plain.load_response(np.array([1.0]))[0]
+    )  # friction that falls undamps
 
 
-# -- describing functions ------------------------------------------------------------------------------------------------
+# -- describing functions
+# ------------------------------------------------------------------------------------------------
 
 
 PHASE = 2 * np.pi * (np.arange(40_000) + 0.5) / 40_000
@@ -96,8 +142,15 @@ def test_describing_functions_are_first_harmonics():
     E, w = 0.02, 30.0
     theta, speed = E * np.sin(PHASE), E * w * np.cos(PHASE)
     assert coulomb(7.0, E) == pytest.approx(first_harmonic(7.0 * np.sign(speed)) / E, rel=1e-4)
-    assert preload(7.0, E, 0.012) == pytest.approx(first_harmonic(7.0 * np.sign(theta + 0.012)) / E, rel=1e-3) and preload(7.0, E, 0.03) == 0.0
-    assert saturation(1.5, 4.0) == pytest.approx(first_harmonic(np.clip(4.0 * np.sin(PHASE), -1.5, 1.5)).real / 4.0, rel=1e-6) and saturation(4, 1.5) == 1
+    assert (
+        preload(7.0, E, 0.012) == pytest.approx(first_harmonic(7.0 * np.sign(theta + 0.012)) / E, rel=1e-3)
+        and preload(7.0, E, 0.03) == 0.0
+    )
+    assert (
+        saturation(1.5, 4.0)
+        == pytest.approx(first_harmonic(np.clip(4.0 * np.sin(PHASE), -1.5, 1.5)).real / 4.0, rel=1e-6)
+        and saturation(4, 1.5) == 1
+    )
     depth = np.abs(theta) - 0.008
     force = np.where(depth > 0, np.maximum(900 * depth + 12 * speed * np.sign(theta), 0), 0) * np.sign(theta)
     assert contact(900.0, 12.0, 0.008, np.array([E]), w)[0] == pytest.approx(first_harmonic(force) / E, rel=1e-3)
@@ -133,13 +186,16 @@ def test_friction_compensation_undoes_the_friction_of_the_plant():
     np.testing.assert_allclose(servo.b * difference, -coulomb(servo.c_2, E) * np.ones(2), rtol=0.15)
 
 
-# -- margins ---------------------------------------------------------------------------------------------------------------
+# -- margins
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def test_margins_are_those_of_the_rational_loop():
     plant = build_plant(FREE)
     linear = linearised(plant, RATE, HOME + 0.17)
-    loop = close_loop(ask(CONTROLLERS["pid"](Servo.of(FREE), RATE), HOME + 0.17, 0.01), linear, Coefficients(*plant._lowered[0]))
+    loop = close_loop(
+        ask(CONTROLLERS["pid"](Servo.of(FREE), RATE), HOME + 0.17, 0.01), linear, Coefficients(*plant._lowered[0])
+    )
     z, h, new, servo = control.tf("z"), 1 / RATE, 1 - math.exp(-1 / (RATE * 5e-4)), Servo.of(FREE)
     z.dt = h
     C = math.degrees(1) * (5 + 1.2 * h * z / (z - 1) + 0.1 * new / h * (z - 1) / (z - (1 - new))) - servo.a_1 / servo.b
@@ -148,11 +204,17 @@ def test_margins_are_those_of_the_rational_loop():
     exact = L(np.exp(1j * omega * h))
     S = 1 / (1 + exact)
     gain, phase, _, _, crossing, _ = control.stability_margins(L)
-    assert loop.gain_margin_db == pytest.approx(20 * math.log10(gain), abs=0.1) and loop.gain_crossover_hz == pytest.approx(crossing / (2 * math.pi), rel=0.01)
-    assert loop.phase_margin_deg == pytest.approx(phase, abs=0.5) and loop.sensitivity_peak == pytest.approx(np.abs(S).max(), rel=0.01)
+    assert loop.gain_margin_db == pytest.approx(
+        20 * math.log10(gain), abs=0.1
+    ) and loop.gain_crossover_hz == pytest.approx(crossing / (2 * math.pi), rel=0.01)
+    assert loop.phase_margin_deg == pytest.approx(phase, abs=0.5) and loop.sensitivity_peak == pytest.approx(
+        np.abs(S).max(), rel=0.01
+    )
     alpha, gain_db, phase_deg = control.disk_margins(control.tf2ss(L), omega)
     assert loop.disk_margin == pytest.approx(alpha, rel=0.01)
-    assert loop.disk_gain_margin_db == pytest.approx(gain_db, rel=0.01) and loop.disk_phase_margin_deg == pytest.approx(phase_deg, rel=0.01)
+    assert loop.disk_gain_margin_db == pytest.approx(gain_db, rel=0.01) and loop.disk_phase_margin_deg == pytest.approx(
+        phase_deg, rel=0.01
+    )
     T = np.abs(exact * S)
     assert loop.bandwidth_hz == pytest.approx(loop.f_hz[np.argmax(T < T[0] / math.sqrt(2))], rel=0.03) and loop.stable
 
@@ -161,7 +223,13 @@ def test_a_gain_beyond_the_margin_is_unstable_in_the_loop_too():
     plant = build_plant(FREE)
     linear, servo = linearised(plant, RATE, HOME), Servo.of(FREE)
     f_hz = np.geomspace(0.5, 950, 500)
-    at = lambda factor: judged("pid", "reduced", f_hz, linear.response(f_hz), pid_by_hand(f_hz, RATE, PidGains(*(factor * x for x in (5, 1.2, 0.1)))))  # noqa: E731
+    at = lambda factor: judged(
+        "pid",
+        "reduced",
+        f_hz,
+        linear.response(f_hz),
+        pid_by_hand(f_hz, RATE, PidGains(*(factor * x for x in (5, 1.2, 0.1)))),
+    )  # noqa: E731
     limit = at(1.0).gain_range[1]
     for factor, holds in ((0.85 * limit, True), (1.2 * limit, False)):
         assert at(factor).stable is holds
@@ -170,7 +238,8 @@ def test_a_gain_beyond_the_margin_is_unstable_in_the_loop_too():
         assert bool(np.isfinite(theta).all() and np.abs(theta[-200:]).max() < 0.01) is holds
 
 
-# -- limit cycles ------------------------------------------------------------------------------------------------------------
+# -- limit cycles
+# ------------------------------------------------------------------------------------------------------------
 
 
 def test_the_cycle_of_a_relay_is_the_textbooks():
@@ -178,11 +247,17 @@ def test_the_cycle_of_a_relay_is_the_textbooks():
     K, p = 5.0, 2 * math.pi * 20.0
     s = lambda f: 2j * math.pi * f  # noqa: E731
     (found,) = balanced(lambda f, E: s(f) * (s(f) / p + 1) ** 2 / K + 4 / (math.pi * E))
-    assert found.f_hz == pytest.approx(20.0, rel=1e-6) and found.amplitude == pytest.approx(2 * K / (math.pi * p), rel=1e-6) and found.lasting
+    assert (
+        found.f_hz == pytest.approx(20.0, rel=1e-6)
+        and found.amplitude == pytest.approx(2 * K / (math.pi * p), rel=1e-6)
+        and found.lasting
+    )
 
 
 def cycles_of(datasheet, kind):
-    """(predicted that last, simulated) of the plain PID of the bar: 2 V/deg, 1.2, 0.05, 2 kHz, filter 0.5 ms, contact of 40 Hz and 0.2, 0.64 of J at the motor."""
+    """(predicted that last, simulated) of the plain PID of the bar: 2 V/deg, 1.2, 0.05, 2 kHz, filter 0.5 ms, contact
+    of 40 Hz and 0.2, 0.64 of J at the motor.
+    """
     plant, reduced = (build_plant(datasheet, plant=name, effects=[SPRINGY]) for name in (kind, "reduced"))
     law = CONTROLLERS["pid"](Servo.of(FREE), RATE, pid=PidGains(P=2.0, D=0.05))
     seen, _ = simulated(law, sampled(plant, RATE, (HOME + 0.03, 0.0)), plant.effects, plant.terminal, HOME, 0.03, 2.0)
@@ -191,7 +266,9 @@ def cycles_of(datasheet, kind):
 
 @pytest.mark.parametrize("kind", ["reduced", "mujoco"])
 def test_the_cycle_of_a_play_is_predicted(kind):
-    """The bar: frequency and amplitude within 20 %; with Table 1's friction and preload none is predicted and none is seen."""
+    """The bar: frequency and amplitude within 20 %; with Table 1's friction and preload none is predicted and none is
+    seen.
+    """
     (told,), seen = cycles_of(FREE, kind)
     assert told.f_hz == pytest.approx(seen.f_hz, rel=0.2) and told.amplitude == pytest.approx(seen.amplitude, rel=0.2)
     assert cycles_of(SHEET, kind) == ([], None)
@@ -207,51 +284,110 @@ def test_only_what_goes_on_is_a_cycle():
     sine = 0.01 * np.sin(2 * np.pi * 23.4 * t)
     found = lasting(sine, 1e-3)
     assert found.f_hz == pytest.approx(23.4, rel=1e-3) and found.amplitude == pytest.approx(0.01, rel=0.01)
-    assert lasting(sine * np.exp(-t), 1e-3) is None and lasting(0.001 * sine, 1e-3) is None and lasting(np.where(t > 2, np.nan, sine), 1e-3) is None
+    assert (
+        lasting(sine * np.exp(-t), 1e-3) is None
+        and lasting(0.001 * sine, 1e-3) is None
+        and lasting(np.where(t > 2, np.nan, sine), 1e-3) is None
+    )
 
 
-# -- the command ------------------------------------------------------------------------------------------------------------------
+# -- the command
+# ------------------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def free(tmp_path_factory):
     folder = tmp_path_factory.mktemp("free")
     write_model(folder / "free.toml", FREE)
-    assert cli.main(["simulate", str(folder / "free.toml"), "--input", "multisine", "--noise-deg", "0.01", "--out", str(folder / "rec.csv")]) == 0
+    assert (
+        cli.main(
+            [
+                "simulate",
+                str(folder / "free.toml"),
+                "--input",
+                "multisine",
+                "--noise-deg",
+                "0.01",
+                "--out",
+                str(folder / "rec.csv"),
+            ]
+        )
+        == 0
+    )
     return folder
 
 
 def test_json_has_the_contracts_keys(free, capsys):
-    arguments = ["frequency", str(free / "rec.csv"), "--datasheet", str(free / "free.toml"), "--controller", "pid", "--rate-hz", "2000", "--json"]
+    arguments = [
+        "frequency",
+        str(free / "rec.csv"),
+        "--datasheet",
+        str(free / "free.toml"),
+        "--controller",
+        "pid",
+        "--rate-hz",
+        "2000",
+        "--json",
+    ]
     capsys.readouterr()
     assert cli.main(arguments) == 0
     told = json.loads(capsys.readouterr().out)
-    assert {"gain_margin_db", "phase_margin_deg", "sensitivity_peak", "bandwidth_hz"} <= told.keys() and told["loops"][0]["gain_margin_db"] == told["gain_margin_db"]
+    assert {"gain_margin_db", "phase_margin_deg", "sensitivity_peak", "bandwidth_hz"} <= told.keys() and told["loops"][
+        0
+    ]["gain_margin_db"] == told["gain_margin_db"]
     recording = told["recordings"][0]
     found = recording["gaps"]["reduced, slipping"]
-    assert found["max_db"] < 0.5 and found["max_deg"] < 3.0 and len(recording["f_hz"]) == len(recording["gain_db"]) == 20
+    assert (
+        found["max_db"] < 0.5 and found["max_deg"] < 3.0 and len(recording["f_hz"]) == len(recording["gain_db"]) == 20
+    )
     assert told["cycles"][0]["simulated"] == {"reduced": None}
 
 
 def test_a_table_and_a_page_are_written(free, tmp_path, capsys):
-    arguments = ["frequency", str(free / "rec.csv"), "--controller", "pid,ftrc", "--plant", "reduced,mujoco", "--rate-hz", "500", "--gap", "0.5", "--out", str(tmp_path / "out")]
+    arguments = [
+        "frequency",
+        str(free / "rec.csv"),
+        "--controller",
+        "pid,ftrc",
+        "--plant",
+        "reduced,mujoco",
+        "--rate-hz",
+        "500",
+        "--gap",
+        "0.5",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert cli.main(arguments) == 0
     out = capsys.readouterr().out
     assert "ftrc, mujoco" in out and "limit cycles" in out and "friction described" in out
     page = read((tmp_path / "out" / "report.html").read_text())
     words = " ".join(page.words)
-    assert all(x in words for x in ("Loops over frequency", "Limit cycles", "Recording rec.csv", "Plants")) and len(page.ids) == len(set(page.ids))
+    assert all(x in words for x in ("Loops over frequency", "Limit cycles", "Recording rec.csv", "Plants")) and len(
+        page.ids
+    ) == len(set(page.ids))
     assert not [x for x in page.references if not x.startswith("#")]
     assert len(json.loads((tmp_path / "out" / "frequency.json").read_text())["loops"]) == 4
     assert cli.main(arguments) == 2 and "--force" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("arguments", "says"), [
-    (["--controller", "lqr"], "there is no 'lqr'; there are ftrc"), (["--plant", "adams"], "there are reduced, mujoco"), (["nothing.csv"], "no such file"),
-    (["--pid", "Q=1"], "there is no gain 'Q'; there are P, I, D"), (["--pid", "P=x"], "a number was expected"), (["--pid", "P=-1"], "not between"),
-    (["--amplitude-deg", "0"], "not above 0"), (["--rate-hz", "5"], "20 Hz to 100000 Hz was expected"), 
-    (["--delay-ms", "1e6"], "1000 at most"), (["--rate-hz", "1e12"], "20 Hz to"),
-    (["--datasheet", "nothing.toml"], "no such file"), (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice")])
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--controller", "lqr"], "there is no 'lqr'; there are ftrc"),
+        (["--plant", "adams"], "there are reduced, mujoco"),
+        (["nothing.csv"], "no such file"),
+        (["--pid", "Q=1"], "there is no gain 'Q'; there are P, I, D"),
+        (["--pid", "P=x"], "a number was expected"),
+        (["--pid", "P=-1"], "not between"),
+        (["--amplitude-deg", "0"], "not above 0"),
+        (["--rate-hz", "5"], "20 Hz to 100000 Hz was expected"),
+        (["--delay-ms", "1e6"], "1000 at most"),
+        (["--rate-hz", "1e12"], "20 Hz to"),
+        (["--datasheet", "nothing.toml"], "no such file"),
+        (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice"),
+    ],
+)
 def test_bad_input_is_one_sentence_and_code_2(arguments, says, capsys):
     assert cli.main(["frequency", "--json", *arguments]) == 2
     error = capsys.readouterr().err

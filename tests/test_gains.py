@@ -24,7 +24,9 @@ def test_96_of_97_gives_others():
 
 def test_the_bound_is_finite_and_useless():
     assert 5e5 < settling_bound(Gains(), math.radians(10)) < 6e5
-    assert settling_bound(replace(Gains(), k_1=50.0), 0.1) is None and settling_bound(replace(Gains(), q=1), 0.1) is None
+    assert (
+        settling_bound(replace(Gains(), k_1=50.0), 0.1) is None and settling_bound(replace(Gains(), q=1), 0.1) is None
+    )
 
 
 @pytest.mark.parametrize("x", [(0.1, 0.0, 0.0), (0.0, -0.1, 0.0), (0.0, 0.0, 0.2), (0.01, -0.02, 0.3)])
@@ -61,7 +63,11 @@ def test_the_search_takes_the_smallest_gain_that_settles_in_time():
 def test_the_command_checks(capsys):
     assert cli.main(["gains", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["feasible"] and told["m"] == pytest.approx([0.00756, 5.7595, 0.000356], rel=2e-3) and told["settling_time_s"] < 0.1
+    assert (
+        told["feasible"]
+        and told["m"] == pytest.approx([0.00756, 5.7595, 0.000356], rel=2e-3)
+        and told["settling_time_s"] < 0.1
+    )
     assert cli.main(["gains", "--gains", "k_1=50"]) == 1
     out = capsys.readouterr().out
     assert "do not hold" in out and "m_1 = -" in out and "bound" not in out

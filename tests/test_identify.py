@@ -22,16 +22,39 @@ from ers_mj.simulation import build_plant, simulate_recording
 from ers_mj.identifying.structure import structure_of
 from ers_mj.traces import trace_of
 
-TRUTH = {"L": 0.003, "R": 1.2, "k_s": 0.08, "T_LH": 0.4, "F_c": 0.2, "J": 0.001, "B": 0.006, "K_t": 0.5, "K_e": 0.6, "theta_0": 0.0}
+TRUTH = {
+    "L": 0.003,
+    "R": 1.2,
+    "k_s": 0.08,
+    "T_LH": 0.4,
+    "F_c": 0.2,
+    "J": 0.001,
+    "B": 0.006,
+    "K_t": 0.5,
+    "K_e": 0.6,
+    "theta_0": 0.0,
+}
 SHEET = Datasheet(parameters=TRUTH)
-OFF = Datasheet(parameters={**TRUTH, "L": 0.006, "k_s": 0.04, "F_c": 0.5, "B": 0.01, "K_t": 0.3, "K_e": 0.4, "T_LH": 0.7})
+OFF = Datasheet(
+    parameters={**TRUTH, "L": 0.006, "k_s": 0.04, "F_c": 0.5, "B": 0.01, "K_t": 0.3, "K_e": 0.4, "T_LH": 0.7}
+)
 T = np.arange(2000) / 1e3
-TOLD = {"L/R": 0.0025, "k_s/J": 80.0, "T_LH/J": 400.0, "F_c/J": 200.0, "B/J": 6.0, "K_t/(J R)": 0.5 / 0.0012, "K_e": 0.6}
+TOLD = {
+    "L/R": 0.0025,
+    "k_s/J": 80.0,
+    "T_LH/J": 400.0,
+    "F_c/J": 200.0,
+    "B/J": 6.0,
+    "K_t/(J R)": 0.5 / 0.0012,
+    "K_e": 0.6,
+}
 
 
 def record(noise_deg=0.0, seed=0, sheet=SHEET, current=False, inductance=True, **options):
     u = INPUTS["multisine"](T)
-    columns = simulate_recording(sheet, T, u, noise=math.radians(noise_deg), seed=seed, inductance=inductance, **options)
+    columns = simulate_recording(
+        sheet, T, u, noise=math.radians(noise_deg), seed=seed, inductance=inductance, **options
+    )
     more = {}
     if current:
         p = sheet.parameters
@@ -100,8 +123,17 @@ def test_a_winding_that_the_recording_does_not_show_is_left_out(wave):
     columns = simulate_recording(sheet, t, INPUTS[wave](t), noise=math.radians(0.01), seed=3)
     found = identify([from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"])], sheet)
     told = rows(found)
-    assert found.explains and found.structure.rank == 6 and "L" not in told and any("L was left out" in w for w in found.warnings)
-    assert told["J"].value is None and told["k_s/J"].value == pytest.approx(28.29, rel=0.02) and told["c_1"].value == pytest.approx(148.4, rel=0.02)
+    assert (
+        found.explains
+        and found.structure.rank == 6
+        and "L" not in told
+        and any("L was left out" in w for w in found.warnings)
+    )
+    assert (
+        told["J"].value is None
+        and told["k_s/J"].value == pytest.approx(28.29, rel=0.02)
+        and told["c_1"].value == pytest.approx(148.4, rel=0.02)
+    )
 
 
 def test_a_winding_may_be_bounded_by_nothing():
@@ -124,11 +156,17 @@ def test_a_play_makes_the_model_wrong():
 
 
 def test_the_null_space_of_powers_is_found_without_being_told():
-    """y = (a/b) s + (c^2/b) s^2 can tell two of three; the third row of any basis is b, a b^-1 and c b^-1/2 where the exponents are whole."""
+    """y = (a/b) s + (c^2/b) s^2 can tell two of three; the third row of any basis is b, a b^-1 and c b^-1/2 where the
+    exponents are whole.
+    """
     s = np.linspace(0, 1, 50)
     found = structure_of(np.column_stack([s, -s - s**2, s**2]), ("k_s", "J", "T_LH"))
     assert found.rank == 2 and [found.names[p] for p in found.pivots] == ["J"]
-    assert [found.combination(k) for k in found.kept] == ["k_s/J", "T_LH/J"] and found.told(np.array([1.0, -1.0, 0.0])) and not found.told(np.array([1.0, 0.0, 0.0]))
+    assert (
+        [found.combination(k) for k in found.kept] == ["k_s/J", "T_LH/J"]
+        and found.told(np.array([1.0, -1.0, 0.0]))
+        and not found.told(np.array([1.0, 0.0, 0.0]))
+    )
 
 
 def test_resampled_and_fisher_widths_agree_on_white_residuals_and_not_on_coloured_ones():
@@ -152,7 +190,10 @@ def test_many_candidates_in_mujoco_are_what_one_is():
     traces = [replace(traces[0], start=(sheet.parameters["theta_0"], 0.0))]
     unknowns = unknowns_of(traces, sheet, {"L": 0.0}, {})
     candidates = [unknowns.reference, 1.1 * unknowns.reference]
-    both, alone = rollouts(2)(unknowns, candidates, traces, 0.0), [rollouts(1)(unknowns, [c], traces, 0.0)[0] for c in candidates]
+    both, alone = (
+        rollouts(2)(unknowns, candidates, traces, 0.0),
+        [rollouts(1)(unknowns, [c], traces, 0.0)[0] for c in candidates],
+    )
     assert np.allclose(both, alone, atol=1e-6) and np.abs(both[0]).max() < np.abs(both[1]).max()
 
 
@@ -167,7 +208,10 @@ def test_an_observer_in_mujoco_changes_nothing_where_it_is_right_and_comes_back_
 
 def test_forgiving_blocks_keeps_the_slope_of_the_sum_that_it_makes():
     trace, random = trace_of(record(0.01), None), np.random.default_rng(0)
-    e, direction = random.standard_normal(trace.rows) * (1 + 30 * (trace.block == 3)), random.standard_normal(trace.rows)
+    e, direction = (
+        random.standard_normal(trace.rows) * (1 + 30 * (trace.block == 3)),
+        random.standard_normal(trace.rows),
+    )
     made = forgiving(e, [trace])
     slope = 2 * made @ (forgiven(made, [trace]) * direction)
     ahead, behind = (np.sum(forgiving(e + way * 1e-5 * direction, [trace]) ** 2) for way in (1, -1))
@@ -194,10 +238,16 @@ def test_five_parameters_of_a_mujoco_plant():
     assert not said[1].explains
 
 
-@pytest.mark.parametrize("settings, said", [
-    (dict(method="magic"), "no method"), (dict(fixed={"zeta": 1.0}), "no parameter"), (dict(fixed={"a_1": 1.0}), "cannot be fixed or bounded"),
-    (dict(bounds={"R": (2.0, 1.0)}), "bounds of R"), (dict(fixed={"R": 1.0}, bounds={"R": (1.0, 2.0)}), "is fixed and has bounds"),
-])
+@pytest.mark.parametrize(
+    "settings, said",
+    [
+        (dict(method="magic"), "no method"),
+        (dict(fixed={"zeta": 1.0}), "no parameter"),
+        (dict(fixed={"a_1": 1.0}), "cannot be fixed or bounded"),
+        (dict(bounds={"R": (2.0, 1.0)}), "bounds of R"),
+        (dict(fixed={"R": 1.0}, bounds={"R": (1.0, 2.0)}), "is fixed and has bounds"),
+    ],
+)
 def test_what_cannot_be_asked_is_refused(settings, said):
     with pytest.raises(InputError, match=said):
         identify([record()], OFF, Settings(**settings))
@@ -207,11 +257,28 @@ def test_the_command_writes_a_model_that_others_read(tmp_path, capsys):
     columns = simulate_recording(read_datasheet("table1"), T, INPUTS["multisine"](T), noise=1e-4, inductance=True)
     write_recording(tmp_path / "rec.csv", columns)
     out = tmp_path / "out"
-    assert cli.main(["identify", str(tmp_path / "rec.csv"), "--datasheet", "table1", "--fix", "J=0.0031", "--out", str(out), "--json"]) == 0
+    assert (
+        cli.main(
+            [
+                "identify",
+                str(tmp_path / "rec.csv"),
+                "--datasheet",
+                "table1",
+                "--fix",
+                "J=0.0031",
+                "--out",
+                str(out),
+                "--json",
+            ]
+        )
+        == 0
+    )
     document = json.loads(capsys.readouterr().out)
     assert {"method", "plant", "parameters", "fitness", "evaluations", "wall_s"} <= document.keys()
     assert {"value", "unit", "ci95", "datasheet", "identifiable"} <= document["parameters"]["k_s"].keys()
-    assert document["parameters"]["R"]["value"] is None and document["parameters"]["L/R"]["value"] == pytest.approx(0.0016 / 1.55, rel=0.02)
+    assert document["parameters"]["R"]["value"] is None and document["parameters"]["L/R"]["value"] == pytest.approx(
+        0.0016 / 1.55, rel=0.02
+    )
     assert read_datasheet(out / "model.toml").to_lumped()["b"] == pytest.approx(81.07, rel=0.01)
     assert "<svg" in (out / "report.html").read_text()
     assert cli.main(["trial", str(out / "model.toml"), "--json"]) == 0
@@ -223,7 +290,17 @@ def test_other_methods_are_the_same_by_seed_whatever_the_jobs(method):
     assert found[0].fitness == found[1].fitness and found[0].evaluations == 200
 
 
-@pytest.mark.parametrize("options", [["--fix", "J"], ["--fix", "J=x"], ["--fix", "J=1", "--fix", "J=2"], ["--bounds", "J=1"], ["--within", "2,3"], ["--method", "x"]])
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--fix", "J"],
+        ["--fix", "J=x"],
+        ["--fix", "J=1", "--fix", "J=2"],
+        ["--bounds", "J=1"],
+        ["--within", "2,3"],
+        ["--method", "x"],
+    ],
+)
 def test_bad_options_are_one_sentence_and_code_2(tmp_path, capsys, options):
     write_recording(tmp_path / "rec.csv", simulate_recording(SHEET, T[:200], INPUTS["multisine"](T[:200])))
     assert cli.main(["identify", str(tmp_path / "rec.csv"), "--datasheet", "table1", *options, "--json"]) == 2
@@ -231,10 +308,14 @@ def test_bad_options_are_one_sentence_and_code_2(tmp_path, capsys, options):
     assert said.out == "" and said.err.count("\n") == 1
 
 
-@pytest.mark.parametrize("u, options, said", [
-    (0.0, [], "the input is zero throughout"), (None, ["--datasheet", "table1", "--fix", "J=-1"], "negative J"),
-    (None, ["--datasheet", "table1", "--fix", "R=0"], "R = 0"),
-])
+@pytest.mark.parametrize(
+    "u, options, said",
+    [
+        (0.0, [], "the input is zero throughout"),
+        (None, ["--datasheet", "table1", "--fix", "J=-1"], "negative J"),
+        (None, ["--datasheet", "table1", "--fix", "R=0"], "R = 0"),
+    ],
+)
 def test_what_no_servo_has_and_what_shows_nothing_are_one_sentence_and_code_2(tmp_path, capsys, u, options, said):
     columns = dict(simulate_recording(read_datasheet("table1"), T[:700], INPUTS["multisine"](T[:700]), noise=1e-4))
     if u is not None:

@@ -100,7 +100,9 @@ def test_samples_need_not_be_uniform():
 def test_a_rod_starts_at_rest_from_any_angle():
     plant = rudder(linkage="rod")
     for theta in (EQ_5.theta_0, -0.3, 0.6):
-        held = plant.simulate(T[:50], np.full(50, (EQ_5.c_1 * np.sign(theta - EQ_5.theta_0)) / EQ_5.b), start=(theta, 0.0))
+        held = plant.simulate(
+            T[:50], np.full(50, (EQ_5.c_1 * np.sign(theta - EQ_5.theta_0)) / EQ_5.b), start=(theta, 0.0)
+        )
         assert held.theta[0] == pytest.approx(theta)
         assert np.degrees(np.ptp(held.theta)) < 1e-3
 
@@ -116,8 +118,12 @@ def test_many_at_once_are_the_same_as_one_by_one():
 
 
 def test_the_exported_model_is_the_plant():
-    effects = [("voltage_saturation", np.array([4.5, np.inf])), ("bias_torque", np.array([8.0])), ("gravity_imbalance", np.array([15.0, 5.0])),
-               ("input_delay", np.array([3e-3]))]
+    effects = [
+        ("voltage_saturation", np.array([4.5, np.inf])),
+        ("bias_torque", np.array([8.0])),
+        ("gravity_imbalance", np.array([15.0, 5.0])),
+        ("input_delay", np.array([3e-3])),
+    ]
     u, plant = INPUTS["chirp"](T[:1000]), rudder(EQ_1, effects=effects, linkage="rod", gap=0.01)
     model = mujoco.MjModel.from_xml_string(plant.xml())
     data, theta = mujoco.MjData(model), []
@@ -130,13 +136,18 @@ def test_the_exported_model_is_the_plant():
 
 
 def test_the_export_says_what_it_does_not_carry():
-    plant = rudder(effects=[("load_dependent_friction", np.array([0.05, np.inf])), ("drive_dead_zone", np.array([0.2]))])
+    plant = rudder(
+        effects=[("load_dependent_friction", np.array([0.05, np.inf])), ("drive_dead_zone", np.array([0.2]))]
+    )
     assert plant.stepped == ("load_dependent_friction",)
     assert "drive_dead_zone, load_dependent_friction" in plant.xml().splitlines()[0]
 
 
 def test_a_plant_survives_the_way_to_another_process():
-    u, plant = INPUTS["chirp"](T[:200]), rudder(gap=0.01, effects=[("load_dependent_friction", np.array([0.05, np.inf]))])
+    u, plant = (
+        INPUTS["chirp"](T[:200]),
+        rudder(gap=0.01, effects=[("load_dependent_friction", np.array([0.05, np.inf]))]),
+    )
     again = pickle.loads(pickle.dumps(plant))
     assert np.array_equal(again.simulate(T[:200], u).theta, plant.simulate(T[:200], u).theta)
 

@@ -21,11 +21,26 @@ def test_one_law_without_a_name_takes_the_place_of_all_names(monkeypatch):
     """A damping along the travel, told as three that explain it together, none of which alone gives way to it."""
     traces = []
     for k, name in enumerate(("multisine", "steps", "chirp")):
-        y = ReducedModel(lumped(TRUTH), [("uneven_damping", np.array([5.0, 3.0, 0.3, np.inf, np.inf, np.inf]))]).simulate(T, INPUTS[name](T)).measured
-        traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+        y = (
+            ReducedModel(lumped(TRUTH), [("uneven_damping", np.array([5.0, 3.0, 0.3, np.inf, np.inf, np.inf]))])
+            .simulate(T, INPUTS[name](T))
+            .measured
+        )
+        traces.append(
+            trace_of(
+                from_arrays(
+                    T, INPUTS[name](T), y + 1.5e-4 * np.random.default_rng(k).standard_normal(T.size), name=name
+                ),
+                None,
+            )
+        )
     start = baseline(traces, Datasheet(lumped=TRUTH), True, 1)
     model = start.fit.model
-    for name, p in (("quadratic_drag", [0.5, np.inf]), ("sensor_nonlinearity", [0.05, 0.05, np.inf, np.inf, np.inf]), ("asymmetric_friction", [1.0, 0.5, np.inf, np.inf])):
+    for name, p in (
+        ("quadratic_drag", [0.5, np.inf]),
+        ("sensor_nonlinearity", [0.05, 0.05, np.inf, np.inf, np.inf]),
+        ("asymmetric_friction", [1.0, 0.5, np.inf, np.inf]),
+    ):
         model = model.with_effect(name, np.array(p))
     told = Selection(start.fit, fit(model, start.traces), (), 1.0, start.traces)
     monkeypatch.setattr(mimics, "_in_its_place", lambda *_: [])

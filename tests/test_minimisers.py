@@ -47,7 +47,11 @@ def test_it_comes_down_within_bounds_and_budget(method, problem):
     assert np.isclose(found.value, asked(found.x[None])[0]) and not found.x.flags.writeable
     assert np.all(points >= LOWER - 1e-9) and np.all(points <= UPPER + 1e-9)
     assert found.evaluations == len(points) <= BUDGET
-    assert np.all(np.diff(found.trace[:, 1]) <= 0) and found.trace[-1, 1] == found.value and found.trace[-1, 0] == found.evaluations
+    assert (
+        np.all(np.diff(found.trace[:, 1]) <= 0)
+        and found.trace[-1, 1] == found.value
+        and found.trace[-1, 0] == found.evaluations
+    )
 
 
 @ALL
@@ -96,12 +100,22 @@ def test_least_squares_stops_at_the_target_and_starts_again_above_it():
 
 def test_the_printed_equations():
     chances = ranked(10, 1.5)
-    assert np.isclose(chances.sum(), 1) and np.isclose(chances[0], 1.5 / 10) and np.isclose(chances[-1], 0.5 / 10) and np.allclose(np.diff(chances, 2), 0)
-    assert np.isclose(sigmoid(0.9, 0.6, 0.25), 0.75) and abs(sigmoid(0.9, 0.6, 1.0) - 0.6) < 1e-6 and abs(sigmoid(0.9, 0.6, 0.0) - 0.9) < 0.01
+    assert (
+        np.isclose(chances.sum(), 1)
+        and np.isclose(chances[0], 1.5 / 10)
+        and np.isclose(chances[-1], 0.5 / 10)
+        and np.allclose(np.diff(chances, 2), 0)
+    )
+    assert (
+        np.isclose(sigmoid(0.9, 0.6, 0.25), 0.75)
+        and abs(sigmoid(0.9, 0.6, 1.0) - 0.6) < 1e-6
+        and abs(sigmoid(0.9, 0.6, 0.0) - 0.9) < 0.01
+    )
 
 
 def test_an_elite_is_never_lost():
     """Without elitism the best of a generation may be worse than that of the one before; with it never."""
+
     def bests(elitist):
         seen = []
 

@@ -1,4 +1,6 @@
-"""What a simulation leaves over frequency: linear gaps, distortions and noise are told apart, on made signals and on servos."""
+"""What a simulation leaves over frequency: linear gaps, distortions and noise are told apart, on made signals and on
+servos.
+"""
 
 from dataclasses import replace
 
@@ -60,7 +62,11 @@ def test_the_shares_add_as_they_were_mixed():
 def test_the_band_is_where_the_error_was_put():
     tone = np.sin(2 * np.pi * 17.0 * H * np.arange(8000))
     found = told(lambda x: 0.02 * tone)
-    assert found.region[0] < 17.0 < found.region[1] < 1.2 * 17.0 and found.share_of_error > 0.6 and found.share_of_motion < 0.1
+    assert (
+        found.region[0] < 17.0 < found.region[1] < 1.2 * 17.0
+        and found.share_of_error > 0.6
+        and found.share_of_motion < 0.1
+    )
 
 
 def test_a_sweep_that_passes_a_line_once_is_not_called_linear_for_that():
@@ -70,7 +76,12 @@ def test_a_sweep_that_passes_a_line_once_is_not_called_linear_for_that():
     gain = np.repeat(np.random.default_rng(5).standard_normal(80), 100)
     for error, kind in ((0.1 * gain * x, "distortion"), (late(x), "linear")):
         error = error + SIGMA * np.random.default_rng(6).standard_normal(t.size)
-        assert mismatch([make_trace("sweep", t, x, x + error, np.ones(t.size, bool), None, None, SIGMA, 0.0)], [error], 1e-9).kind == kind
+        assert (
+            mismatch(
+                [make_trace("sweep", t, x, x + error, np.ones(t.size, bool), None, None, SIGMA, 0.0)], [error], 1e-9
+            ).kind
+            == kind
+        )
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -94,27 +105,44 @@ def test_what_the_observer_makes_of_noise():
     assert density[low].mean() == pytest.approx(observed_noise(f, H, every, 1.0, LOCAL_RATE)[low].mean(), rel=0.03)
 
 
-# -- servos --------------------------------------------------------------------------------------------------------------
+# -- servos
+# --------------------------------------------------------------------------------------------------------------
 
 
 def located(effects=(), plant="reduced"):
     """The places and the spectrum of a servo that is not quite Table 1's, behind the refitted baseline."""
-    truth = replace(SHEET, parameters={**SHEET.parameters, "J": 1.1 * SHEET.parameters["J"], "F_c": 0.9 * SHEET.parameters["F_c"]})
+    truth = replace(
+        SHEET, parameters={**SHEET.parameters, "J": 1.1 * SHEET.parameters["J"], "F_c": 0.9 * SHEET.parameters["F_c"]}
+    )
     t, traces = np.arange(4000) * H, []
     for k, name in enumerate(("multisine", "chirp", "steps")):
-        columns = simulate_recording(truth, t, INPUTS[name](t), noise=np.radians(0.01), seed=k, effects=effects, plant=plant, inductance=True)
-        traces.append(trace_of(from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"], name=name), SHEET.parameters["J"]))
+        columns = simulate_recording(
+            truth, t, INPUTS[name](t), noise=np.radians(0.01), seed=k, effects=effects, plant=plant, inductance=True
+        )
+        traces.append(
+            trace_of(
+                from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"], name=name), SHEET.parameters["J"]
+            )
+        )
     start = baseline(traces, SHEET, True)
     samples = gather(start.fit.model, start.fit.model, start.traces)
     spectrum = over_frequency(samples, start.traces)
     return places(samples, start.traces, (), start.fit.cost, (), "rad", "V", spectrum), spectrum
 
 
-@pytest.mark.parametrize(("effect", "kind"), [
-    (("sensor_lag", {"T": 0.003}), ("linear",)), (("input_delay", {"T_d": 0.003}), ("linear",)),
-    (("shaft_compliance", {"f_shaft": 20.0, "zeta": 0.1, "rho": 0.55, "phi": 0.15}), ("both", "linear")),  # its friction bends it: about 0.6 of it is linear
-    (("stribeck", {"dF_s": 0.08, "v_s": 0.15}), ("distortion",)), (("backlash", {"gap": 0.008, "rho": 0.6, "f_contact": 80.0, "zeta": 0.3}), ("distortion",)),
-])
+@pytest.mark.parametrize(
+    ("effect", "kind"),
+    [
+        (("sensor_lag", {"T": 0.003}), ("linear",)),
+        (("input_delay", {"T_d": 0.003}), ("linear",)),
+        (
+            ("shaft_compliance", {"f_shaft": 20.0, "zeta": 0.1, "rho": 0.55, "phi": 0.15}),
+            ("both", "linear"),
+        ),  # its friction bends it: about 0.6 of it is linear
+        (("stribeck", {"dF_s": 0.08, "v_s": 0.15}), ("distortion",)),
+        (("backlash", {"gap": 0.008, "rho": 0.6, "f_contact": 80.0, "zeta": 0.3}), ("distortion",)),
+    ],
+)
 def test_a_concealed_effect_is_linear_or_a_distortion(effect, kind):
     found, spectrum = located([effect])
     place = next(p for p in found if p.axis == "frequency")

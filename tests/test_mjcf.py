@@ -47,7 +47,9 @@ def test_the_numbers_are_those_of_table_1(model):
     assert model.tendon_frictionloss[angle.id] == pytest.approx(p["F_c"])
     assert model.tendon_stiffness[angle.id] == pytest.approx(p["k_s"])
     assert model.tendon_lengthspring[angle.id] == pytest.approx(p["theta_0"])
-    assert [model.actuator(f"preload_{way}").biasprm[0] for way in ("up", "down")] == pytest.approx([-p["T_LH"], p["T_LH"]])
+    assert [model.actuator(f"preload_{way}").biasprm[0] for way in ("up", "down")] == pytest.approx(
+        [-p["T_LH"], p["T_LH"]]
+    )
     assert model.eq_data[model.equality("ratio").id][1] == pytest.approx(1 / p["n"])
     assert K_t == pytest.approx(p["K_t"])
     assert K_t * K == pytest.approx(p["K_e"])
@@ -100,8 +102,13 @@ def test_every_package_ships():
 
 def test_what_no_plant_can_have_is_refused():
     c = lumped(SHEET.to_lumped())
-    for options, word in (({"gap": -0.1}, "gap"), ({"linkage": "belt", "parameters": SHEET.parameters}, "belt"),
-                          ({"linkage": "rod"}, "datasheet"), ({"parameters": {"J": 1.0}}, "n and K_t"), ({"timestep": 0.0}, "timestep")):
+    for options, word in (
+        ({"gap": -0.1}, "gap"),
+        ({"linkage": "belt", "parameters": SHEET.parameters}, "belt"),
+        ({"linkage": "rod"}, "datasheet"),
+        ({"parameters": {"J": 1.0}}, "n and K_t"),
+        ({"timestep": 0.0}, "timestep"),
+    ):
         with pytest.raises(InputError, match=word):
             MechanicalPlant(c, **options)
     with pytest.raises(InputError, match="b is 0"):

@@ -1,4 +1,6 @@
-"""The observer form that fits are made of: it passes over its own recording without a correction, and what it leaves has slopes."""
+"""The observer form that fits are made of: it passes over its own recording without a correction, and what it leaves
+has slopes.
+"""
 
 from dataclasses import replace
 
@@ -15,7 +17,17 @@ from ers_mj.traces import trace_of
 from test_reduced import SCALES
 
 T = np.arange(0.0, 3.0, 1e-3)
-TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625, "tau_e": 1.1e-3, "emf_share": 0.9, "ampere": 110.0}
+TRUTH = {
+    "a_1": 25.0,
+    "a_2": 50.0,
+    "b": 70.0,
+    "c_1": 135.0,
+    "c_2": 115.0,
+    "theta_0": 0.2625,
+    "tau_e": 1.1e-3,
+    "emf_share": 0.9,
+    "ampere": 110.0,
+}
 SHEET = {**TRUTH, "b": 80.0, "c_1": 150.0, "c_2": 105.0, "a_1": 29.0}  # where fits begin: beside the data
 NOISE = 3e-4
 SOME = [e for e in EFFECTS if e.starts(SCALES) and not e.once]
@@ -32,7 +44,9 @@ def model(values, effects):
     return Model(values, ("a_2", "b", "c_2", "a_1", "c_1", "theta_0"), effects=tuple(effects), scales=SCALES)
 
 
-@pytest.mark.parametrize("bent", [[0.1, 0.3, np.inf, np.inf, np.inf], [np.inf, np.inf, 0.01, 0.3, 1.0]], ids=["polynomial", "wave"])
+@pytest.mark.parametrize(
+    "bent", [[0.1, 0.3, np.inf, np.inf, np.inf], [np.inf, np.inf, 0.01, 0.3, 1.0]], ids=["polynomial", "wave"]
+)
 def test_a_bent_sensor_is_taken_off_where_the_run_begins_and_where_it_is_followed(bent):
     bent = [("sensor_nonlinearity", np.array(bent))]
     reading = float(ReducedModel(lumped(TRUTH), bent).read(T[:1], np.array([TRUTH["theta_0"]]))[0])
@@ -47,8 +61,11 @@ def test_what_a_run_leaves_has_slopes_beside_the_data(effect):
     layout = here.layout()
     z, e = here.vector(layout), residuals(here, data, OBSERVER_RATE)
     row = np.eye(z.size)[[f.name for f in layout].index("c_2")]
-    over, within = ((residuals(here.at(layout, z + step * row), data, OBSERVER_RATE) - e) / step for step in (step_of(here), 0.2 * step_of(here)))
-    assert np.sqrt(np.mean((over - within)**2)) < 0.2 * np.sqrt(np.mean(over**2))
+    over, within = (
+        (residuals(here.at(layout, z + step * row), data, OBSERVER_RATE) - e) / step
+        for step in (step_of(here), 0.2 * step_of(here))
+    )
+    assert np.sqrt(np.mean((over - within) ** 2)) < 0.2 * np.sqrt(np.mean(over**2))
 
 
 @pytest.mark.parametrize("name", ["supply_sag", "thermal_drift"])

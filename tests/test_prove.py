@@ -1,4 +1,6 @@
-"""The proof: its generator knows nothing of the library, MuJoCo's recorder agrees with the quick simulator, seals hold, scores are right."""
+"""The proof: its generator knows nothing of the library, MuJoCo's recorder agrees with the quick simulator, seals hold,
+scores are right.
+"""
 
 import ast
 import json
@@ -29,7 +31,15 @@ from ers_mj.proving.strength import nearest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
 T = np.arange(0.0, 2.0, 1e-3)
-CONTEXT = {"params": TABLE_1, "travel": (-0.2, 0.25), "records": 1, "durations": [2.0], "peak_V": 9.0, "umax_V": 14.0, "peak_A": 2.0}
+CONTEXT = {
+    "params": TABLE_1,
+    "travel": (-0.2, 0.25),
+    "records": 1,
+    "durations": [2.0],
+    "peak_V": 9.0,
+    "umax_V": 14.0,
+    "peak_A": 2.0,
+}
 
 
 def rms_deg(x):
@@ -46,7 +56,11 @@ def imported(path):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("ers_mj"):
             modules |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.ImportFrom) and node.level:
-            base = ".".join(["ers_mj", *path.relative_to(PACKAGE).parts[:-1]][: len(path.relative_to(PACKAGE).parts) + 1 - node.level])
+            base = ".".join(
+                ["ers_mj", *path.relative_to(PACKAGE).parts[:-1]][
+                    : len(path.relative_to(PACKAGE).parts) + 1 - node.level
+                ]
+            )
             modules |= {f"{base}.{node.module}" if node.module else f"{base}.{alias.name}" for alias in node.names}
         elif isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names if alias.name.startswith("ers_mj")}
@@ -101,9 +115,28 @@ def test_without_effects_both_simulators_agree(name):
     assert rms_deg(recorder.record(TABLE_1, [], T, u, step=2.5e-5).true - truth) < 0.002
 
 
-@pytest.mark.parametrize("name", ["asymmetric_friction", "backlash", "cogging", "current_limit", "end_stop", "gravity_imbalance", "input_delay",
-                                  "load_dependent_friction", "sensor_lag", "shaft_compliance", "stribeck", "supply_sag", "thermal_drift",
-                                  "variable_ratio", "second_resonance", "friction_ageing", "viscoelastic_spring"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "asymmetric_friction",
+        "backlash",
+        "cogging",
+        "current_limit",
+        "end_stop",
+        "gravity_imbalance",
+        "input_delay",
+        "load_dependent_friction",
+        "sensor_lag",
+        "shaft_compliance",
+        "stribeck",
+        "supply_sag",
+        "thermal_drift",
+        "variable_ratio",
+        "second_resonance",
+        "friction_ageing",
+        "viscoelastic_spring",
+    ],
+)
 def test_with_an_effect_both_simulators_agree(name):
     rng, u = np.random.default_rng(5), INPUTS["multisine"](T)
     shape = draw_shape(rng, CATALOGUE[name], CONTEXT)
@@ -116,9 +149,28 @@ def test_with_an_effect_both_simulators_agree(name):
 
 def test_a_loop_is_closed_round_the_measured_angle():
     rng = np.random.default_rng(4)
-    controller = {"KP": 25.0, "KI": 40.0, "KD": 0.3, "TF": 0.006, "UMAX": 14.0, "FF_ON": 0.0, "FF_C": 0.0, "FF_TLH": 0.0, "FF_KS": 0.0, "FF_TH0": 0.0}
-    options = {"noise": 1e-4 * rng.standard_normal(T.size), "controller": controller, "theta_ref": 0.26 + 0.2 * np.sin(4 * T), "decimals": 4}
-    truth, ours = quick.simulate(TABLE_1, [], T, None, **options), recorder.record(TABLE_1, [], T, None, step=2.5e-5, **options)
+    controller = {
+        "KP": 25.0,
+        "KI": 40.0,
+        "KD": 0.3,
+        "TF": 0.006,
+        "UMAX": 14.0,
+        "FF_ON": 0.0,
+        "FF_C": 0.0,
+        "FF_TLH": 0.0,
+        "FF_KS": 0.0,
+        "FF_TH0": 0.0,
+    }
+    options = {
+        "noise": 1e-4 * rng.standard_normal(T.size),
+        "controller": controller,
+        "theta_ref": 0.26 + 0.2 * np.sin(4 * T),
+        "decimals": 4,
+    }
+    truth, ours = (
+        quick.simulate(TABLE_1, [], T, None, **options),
+        recorder.record(TABLE_1, [], T, None, step=2.5e-5, **options),
+    )
     assert rms_deg(ours.true - truth.true) < 0.01
     assert np.abs(ours.u).max() <= 14.0
 
@@ -136,7 +188,13 @@ def test_the_rod_is_the_packages_rod():
 
 def made(name, seed):
     return {"rec1.csv": f"t_s,u_V\n{seed}\n", "datasheet.toml": ""}, {
-        "case": name, "kind": "null", "labels": [], "effects": [], "visibility_after_refit_sigma": 0.0, "seed": seed}
+        "case": name,
+        "kind": "null",
+        "labels": [],
+        "effects": [],
+        "visibility_after_refit_sigma": 0.0,
+        "seed": seed,
+    }
 
 
 TASKS = [conduct.Task(f"case-{k:03d}", made, (f"case-{k:03d}", k)) for k in (1, 2, 3)]
@@ -167,7 +225,9 @@ def test_the_truth_is_sealed_before_the_first_question(tmp_path, asked):
     sealed = (tmp_path / "p" / "sealed" / "truth.json").read_bytes()
     assert told == [(f"the truth of 3 cases is sealed, sha256 {sealing.hash_of(sealed)}", 0)]
     assert asked == [["datasheet.toml", "rec1.csv"]] * 3
-    assert proof.sha256 == sealing.hash_of(sealed) and set(proof.truths) == set(proof.answers) == {task.name for task in TASKS}
+    assert proof.sha256 == sealing.hash_of(sealed) and set(proof.truths) == set(proof.answers) == {
+        task.name for task in TASKS
+    }
 
 
 def test_a_second_run_keeps_what_is_there(tmp_path, asked):
@@ -233,10 +293,20 @@ def test_a_stopped_proof_keeps_its_answers(tmp_path, monkeypatch):
     assert len(list((tmp_path / "p" / "answers").glob("*.json"))) == 3
 
 
-@pytest.mark.parametrize(("exit_code", "cpu", "text", "error"), [
-    (2, 1.0, "", "ers: rec1.csv: is bad"), (-signal.SIGXCPU, 300.0, "", "no answer within 300 s"), (0, 1.0, "{", "its answer is no JSON")])
+@pytest.mark.parametrize(
+    ("exit_code", "cpu", "text", "error"),
+    [
+        (2, 1.0, "", "ers: rec1.csv: is bad"),
+        (-signal.SIGXCPU, 300.0, "", "no answer within 300 s"),
+        (0, 1.0, "{", "its answer is no JSON"),
+    ],
+)
 def test_failures_are_answers_without_a_document(tmp_path, monkeypatch, exit_code, cpu, text, error):
-    monkeypatch.setattr(asking.Asker, "_run", lambda self, folder: ({**COST, "exit": exit_code, "cpu_s": cpu}, text, "ers: rec1.csv: is bad\n"))
+    monkeypatch.setattr(
+        asking.Asker,
+        "_run",
+        lambda self, folder: ({**COST, "exit": exit_code, "cpu_s": cpu}, text, "ers: rec1.csv: is bad\n"),
+    )
     (tmp_path / "rec1.csv").write_text("x")
     answer = asking.Asker("code").ask(tmp_path)
     assert (answer["document"], answer["error"]) == (None, error)
@@ -251,12 +321,38 @@ def test_a_real_child_fails_in_one_sentence(tmp_path):
 # -- scores ----------------------------------------------------------------------------------------------------
 
 
-def truth_and_answer(kind, labels, named, visibility=10.0, significant=False, verdict="missing_physics", where="load", alternatives=(), each={}):
-    truth = {"case": "case-001", "kind": kind, "labels": labels, "visibility_after_refit_sigma": visibility, "linkage": "constant",
-             "effects": [{"label": label, "strength": None, "shape": {}, "quick_visibility_sigma": sigma} for label, sigma in each.items()]}
-    missing = [{"effect": n, "alternatives": [dict(zip(("effect", "probability"), a)) for a in alternatives]} for n in named]
-    document = {"verdict": verdict, "missing": missing, "remainder": {"significant": significant}, "where": [{"axis": "subsystem", "label": where}],
-                "fit": {"heldout_rmse_after_rad": 2.0, "noise_floor_rad": 1.0}}
+def truth_and_answer(
+    kind,
+    labels,
+    named,
+    visibility=10.0,
+    significant=False,
+    verdict="missing_physics",
+    where="load",
+    alternatives=(),
+    each={},
+):
+    truth = {
+        "case": "case-001",
+        "kind": kind,
+        "labels": labels,
+        "visibility_after_refit_sigma": visibility,
+        "linkage": "constant",
+        "effects": [
+            {"label": label, "strength": None, "shape": {}, "quick_visibility_sigma": sigma}
+            for label, sigma in each.items()
+        ],
+    }
+    missing = [
+        {"effect": n, "alternatives": [dict(zip(("effect", "probability"), a)) for a in alternatives]} for n in named
+    ]
+    document = {
+        "verdict": verdict,
+        "missing": missing,
+        "remainder": {"significant": significant},
+        "where": [{"axis": "subsystem", "label": where}],
+        "fit": {"heldout_rmse_after_rad": 2.0, "noise_floor_rad": 1.0},
+    }
     return truth, {**COST, "error": None, "document": document}
 
 
@@ -267,18 +363,46 @@ def test_shares_are_those_of_the_contract():
         truth_and_answer("single", ["stribeck"], ["stribeck", "backlash"], alternatives=[("presliding", 0.25)]),
         truth_and_answer("single", ["bias_torque"], ["asymmetric_friction"], visibility=0.6),
         truth_and_answer("single", ["backlash"], [], verdict="unexplained", significant=True, where="transmission"),
-        truth_and_answer("several", ["cogging", "stribeck"], ["transmission_ripple", "end_stop"], each={"cogging": 3.0, "stribeck": 0.4}),
+        truth_and_answer(
+            "several",
+            ["cogging", "stribeck"],
+            ["transmission_ripple", "end_stop"],
+            each={"cogging": 3.0, "stribeck": 0.4},
+        ),
         truth_and_answer("outside", ["second_resonance"], [], significant=True, verdict="unexplained"),
         truth_and_answer("outside", ["brush_drop"], ["stribeck"]),
     ]
     results = scoring.scored([scoring.row_of(*pair) for pair in cases])
     assert results["counts"] == {"null": 2, "single": 3, "several": 1, "outside": 2}
-    assert {k: results["of"][k] for k in ("top1", "top1_class", "top1_class_visible", "false_alarm_rate", "pair_recall", "pair_spurious",
-                                          "unexplained_recall", "false_flag_rate", "subsystem_recall")} == {
-        "top1": [1, 3], "top1_class": [2, 3], "top1_class_visible": [1, 2], "false_alarm_rate": [1, 2], "pair_recall": [1, 2],
-        "pair_spurious": [1, 2], "unexplained_recall": [1, 2], "false_flag_rate": [2, 6], "subsystem_recall": [3, 3]}
+    assert {
+        k: results["of"][k]
+        for k in (
+            "top1",
+            "top1_class",
+            "top1_class_visible",
+            "false_alarm_rate",
+            "pair_recall",
+            "pair_spurious",
+            "unexplained_recall",
+            "false_flag_rate",
+            "subsystem_recall",
+        )
+    } == {
+        "top1": [1, 3],
+        "top1_class": [2, 3],
+        "top1_class_visible": [1, 2],
+        "false_alarm_rate": [1, 2],
+        "pair_recall": [1, 2],
+        "pair_spurious": [1, 2],
+        "unexplained_recall": [1, 2],
+        "false_flag_rate": [2, 6],
+        "subsystem_recall": [3, 3],
+    }
     assert results["of"]["pair_recall_visible"] == [1, 1]
-    assert results["confusion"]["backlash"] == {"unexplained": 1} and results["confusion"]["nothing"] == {"nothing": 1, "stribeck": 1}
+    assert results["confusion"]["backlash"] == {"unexplained": 1} and results["confusion"]["nothing"] == {
+        "nothing": 1,
+        "stribeck": 1,
+    }
     assert sum(b["of"] for b in results["reliability"]) == 6 and results["error_over_floor"]["median"] == 2.0
 
 
@@ -286,19 +410,34 @@ def test_proofs_of_several_seeds_are_pooled(tmp_path, capsys):
     """The pooled shares are those of all cases together; a proof given twice, or none, is one sentence."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
     pooling = pytest.importorskip("pool_proofs", reason="analysis/ is not beside the tests")
-    told = {41: [truth_and_answer("null", [], []), truth_and_answer("several", ["cogging", "stribeck"], ["cogging"], each={"cogging": 8.0, "stribeck": 0.6})],
-            42: [truth_and_answer("single", ["cogging"], ["cogging"]), truth_and_answer("single", ["cogging"], ["stribeck"]),
-                 truth_and_answer("outside", ["running_in"], [], verdict="unexplained", significant=True), truth_and_answer("outside", ["brush_drop"], ["stribeck"])]}
+    told = {
+        41: [
+            truth_and_answer("null", [], []),
+            truth_and_answer("several", ["cogging", "stribeck"], ["cogging"], each={"cogging": 8.0, "stribeck": 0.6}),
+        ],
+        42: [
+            truth_and_answer("single", ["cogging"], ["cogging"]),
+            truth_and_answer("single", ["cogging"], ["stribeck"]),
+            truth_and_answer("outside", ["running_in"], [], verdict="unexplained", significant=True),
+            truth_and_answer("outside", ["brush_drop"], ["stribeck"]),
+        ],
+    }
     for seed, pairs in told.items():
         (tmp_path / str(seed)).mkdir()
-        (tmp_path / str(seed) / "results.json").write_text(json.dumps(plain({"seed": seed, "rows": [scoring.row_of(*pair) for pair in pairs]})))
+        (tmp_path / str(seed) / "results.json").write_text(
+            json.dumps(plain({"seed": seed, "rows": [scoring.row_of(*pair) for pair in pairs]}))
+        )
     folders = [str(tmp_path / str(seed)) for seed in told]
     assert pooling.main(folders) == 0
     lines = {line[:58].strip(): line[58:].split() for line in capsys.readouterr().out.splitlines()}
     assert lines["single effects named right, by class"][:3] == ["1", "of", "2"]
     assert lines["effects found, of several at once"][:3] == ["1", "of", "2"]
     assert lines["null cases with a named effect"][:3] == ["0", "of", "1"]
-    assert "6 cases of seeds 41 (2 cases), 42 (4 cases)" in lines and "0 to 1                0 of 1" in lines and "memory of a case: at most 100 MiB" in lines
+    assert (
+        "6 cases of seeds 41 (2 cases), 42 (4 cases)" in lines
+        and "0 to 1                0 of 1" in lines
+        and "memory of a case: at most 100 MiB" in lines
+    )
     assert {"kinds with a suspect's law     1 of 1", "kinds without                  0 of 1"} <= set(lines)
     for bad, word in (([folders[0]] * 2, "twice"), ([str(tmp_path)], "results.json")):
         assert pooling.main(bad) == 2
@@ -308,7 +447,11 @@ def test_proofs_of_several_seeds_are_pooled(tmp_path, capsys):
 def test_a_failed_case_is_wrong_and_counted():
     truth, _ = truth_and_answer("single", ["backlash"], [])
     results = scoring.scored([scoring.row_of(truth, {**COST, "error": "no answer within 300 s", "document": None})])
-    assert results["top1"] == 0 and results["confusion"] == {"backlash": {"no answer": 1}} and results["failures"] == ["case-001: no answer within 300 s"]
+    assert (
+        results["top1"] == 0
+        and results["confusion"] == {"backlash": {"no answer": 1}}
+        and results["failures"] == ["case-001: no answer within 300 s"]
+    )
 
 
 def test_without_cases_of_a_kind_its_share_is_null():
@@ -320,9 +463,13 @@ def test_parameters_are_compared_where_they_mean_one_thing():
     effects = [{"label": "backlash", "strength": 1.0, "shape": {}}, {"label": "stribeck", "strength": 1.0, "shape": {}}]
     truth = {"linkage": "constant", "lumped": {"b": 80.0}, "effects": effects, "true_parameters": {**TABLE_1}}
     half = np.radians(0.5)
-    document = {"parameters": {"b": {"value": 81.0, "ci95": [79.0, 83.0]}},
-                "missing": [{"effect": "backlash", "parameters": {"gap": {"value": 1.2 * half, "ci95": [1.1 * half, 1.3 * half]}}},
-                            {"effect": "stribeck", "parameters": {"dF_s": {"value": 1.0, "ci95": [0.0, 2.0]}}}]}
+    document = {
+        "parameters": {"b": {"value": 81.0, "ci95": [79.0, 83.0]}},
+        "missing": [
+            {"effect": "backlash", "parameters": {"gap": {"value": 1.2 * half, "ci95": [1.1 * half, 1.3 * half]}}},
+            {"effect": "stribeck", "parameters": {"dF_s": {"value": 1.0, "ci95": [0.0, 2.0]}}},
+        ],
+    }
     entries = {e["name"]: (e["inside"], e["relative_error"]) for e in covered(truth, document)}
     assert entries == {"b": (True, pytest.approx(1 / 80)), "backlash gap": (False, pytest.approx(0.2))}
 
@@ -334,7 +481,9 @@ def test_what_is_concealed_in_a_record():
     rng, t = np.random.default_rng(0), np.arange(300) * 0.01
     record = {"t_s": t, "u_V": np.sin(t), "theta_rad": np.sin(t - 0.1)}
     late, _ = real.conceal(rng, record, "input_delay", 0.05, "u_V", "theta_rad")
-    assert np.allclose(late["u_V"], np.sin(late["t_s"] + 0.05)) and np.allclose(late["theta_rad"], np.sin(late["t_s"] - 0.1))
+    assert np.allclose(late["u_V"], np.sin(late["t_s"] + 0.05)) and np.allclose(
+        late["theta_rad"], np.sin(late["t_s"] - 0.1)
+    )
     lagged, _ = real.conceal(rng, record | {"theta_rad": t.copy()}, "sensor_lag", 0.05, "u_V", "theta_rad")
     assert lagged["theta_rad"][-1] == pytest.approx(t[-1] - 0.05)
     held, _ = real.conceal(rng, record, "sensor_dropout", 0.2, "u_V", "theta_rad")
@@ -345,16 +494,27 @@ def test_what_is_concealed_in_a_record():
 
 def test_every_rig_is_diagnosed_as_it_is_first():
     plans = real.plans(18, 1)
-    assert [(p.rig, p.label) for p in plans[:3]] == [(rig, None) for rig in real.RIGS] and {(p.rig, p.label) for p in plans} == set(real.COVERAGE)
+    assert [(p.rig, p.label) for p in plans[:3]] == [(rig, None) for rig in real.RIGS] and {
+        (p.rig, p.label) for p in plans
+    } == set(real.COVERAGE)
 
 
 def test_a_rig_as_it_is_raises_no_false_alarm():
     rows = []
-    for kind, labels, named in (("untouched", [], ["end_stop"]), ("single", ["input_delay"], ["end_stop", "sensor_lag"]), ("single", ["bias_torque"], [])):
+    for kind, labels, named in (
+        ("untouched", [], ["end_stop"]),
+        ("single", ["input_delay"], ["end_stop", "sensor_lag"]),
+        ("single", ["bias_torque"], []),
+    ):
         truth, answer = truth_and_answer(kind, labels, named)
         rows.append(scoring.row_of({**truth, "rig": "throttle", "visibility_after_refit_sigma": None}, answer))
     results = real.scored_real(rows)
-    assert (results["found"], results["false_alarm_rate"], results["counts"]["null"], results["cases"]) == (0.5, None, 0, 3)
+    assert (results["found"], results["false_alarm_rate"], results["counts"]["null"], results["cases"]) == (
+        0.5,
+        None,
+        0,
+        3,
+    )
     assert results["own"] == {"throttle": ["end_stop"]} and results["concealed_in_real"][0]["others"] == []
     told = proof_report.table_of(results)
     assert not any("single effects" in what for what, _, _ in told)  # the rig's own come first
@@ -365,21 +525,50 @@ def test_a_rig_as_it_is_raises_no_false_alarm():
 
 
 def test_the_command_prints_the_contracts_keys(tmp_path, asked, monkeypatch, capsys):
-    monkeypatch.setattr(case, "make", lambda plan, seed: (
-        {"rec1.csv": "x"}, {**made(f"case-{plan.index + 1:03d}", seed)[1], "kind": plan.kind, "labels": list(plan.labels)}))
+    monkeypatch.setattr(
+        case,
+        "make",
+        lambda plan, seed: (
+            {"rec1.csv": "x"},
+            {**made(f"case-{plan.index + 1:03d}", seed)[1], "kind": plan.kind, "labels": list(plan.labels)},
+        ),
+    )
     assert main(["prove", "--cases", "8", "--json", "--jobs", "1"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert {"cases", "counts", "top1", "top1_class", "top1_class_visible", "false_alarm_rate", "pair_recall", "pair_spurious",
-            "unexplained_recall", "false_flag_rate", "subsystem_recall", "confusion"} <= set(printed)
+    assert {
+        "cases",
+        "counts",
+        "top1",
+        "top1_class",
+        "top1_class_visible",
+        "false_alarm_rate",
+        "pair_recall",
+        "pair_spurious",
+        "unexplained_recall",
+        "false_flag_rate",
+        "subsystem_recall",
+        "confusion",
+    } <= set(printed)
     assert main(["prove", "--cases", "8", "--jobs", "1", "--out", str(tmp_path / "p")]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert {"concealed -> named first", "a pair of effects: median 1.0 s, at most 1.0 s", "memory of a case: at most 100 MiB"} <= set(lines)
+    assert {
+        "concealed -> named first",
+        "a pair of effects: median 1.0 s, at most 1.0 s",
+        "memory of a case: at most 100 MiB",
+    } <= set(lines)
     assert {"results.json", "report.html", "summary.txt"} <= {p.name for p in (tmp_path / "p").iterdir()}
 
 
-@pytest.mark.parametrize(("argv", "sentence"), [
-    (["--cases", "0"], "0 is not between 1"), (["--cases", "two"], "is not a whole number"), (["--limit", "1"], "is not above 1"),
-    (["--real", "nowhere"], "there is no such file"), (["--out", ""], "--out is empty")])
+@pytest.mark.parametrize(
+    ("argv", "sentence"),
+    [
+        (["--cases", "0"], "0 is not between 1"),
+        (["--cases", "two"], "is not a whole number"),
+        (["--limit", "1"], "is not above 1"),
+        (["--real", "nowhere"], "there is no such file"),
+        (["--out", ""], "--out is empty"),
+    ],
+)
 def test_bad_input_is_one_sentence(argv, sentence, capsys):
     assert main(["prove", *argv]) == 2
     told = capsys.readouterr().err

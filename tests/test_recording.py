@@ -423,7 +423,10 @@ def test_a_converter_is_found_among_outliers():
     assert converter_step(np.round(y, 6)) == pytest.approx(step, rel=2e-3)
 
 
-@pytest.mark.parametrize("coarse, fine", [(0.0067, 5.113e-4), (0.001722, 2.5566e-4), (1.39806e-3, 2.5566e-4), (7.3415e-4, 2.5566e-4), (8.795e-4, 1.2783e-4)])
+@pytest.mark.parametrize(
+    "coarse, fine",
+    [(0.0067, 5.113e-4), (0.001722, 2.5566e-4), (1.39806e-3, 2.5566e-4), (7.3415e-4, 2.5566e-4), (8.795e-4, 1.2783e-4)],
+)
 def test_a_coarse_step_counts_before_the_converter_behind_it(coarse, fine):
     y = np.round(np.round(travel(4000, 2e-4, 0) / coarse) * coarse / fine) * fine
     assert converter_step(np.round(y, 6)) == pytest.approx(coarse, rel=1e-2)
@@ -454,10 +457,12 @@ def test_a_hold_is_known_by_the_leap_after_it_where_noise_does_not_show_it(grid)
     y = 0.26 + 0.2 * np.sin(4 * t) + 5e-5 * np.random.default_rng(0).normal(size=t.size)
     held = [(330, 350), (1250, 1262), (2450, 2490)]
     for first, last in held:
-        y[first + 1:last] = y[first]
+        y[first + 1 : last] = y[first]
     y = np.round(y / grid) * grid if grid else y
     found = [(s.start - 1, s.stop) for s in leapt_spans(y, grid, 8e-5)]
-    assert all(any(abs(a - first) <= 2 and b == last for a, b in found) for first, last in held) and len(found) == len(held)
+    assert all(any(abs(a - first) <= 2 and b == last for a, b in found) for first, last in held) and len(found) == len(
+        held
+    )
 
 
 def test_a_rudder_that_breaks_loose_is_no_hold():
@@ -468,7 +473,9 @@ def test_a_rudder_that_breaks_loose_is_no_hold():
 
 @pytest.mark.parametrize("resting_noise, found", [(2.5e-4, [(2000, 2600)]), (0.0, [])])
 def test_a_sensor_that_hangs_at_rest_is_told_by_the_noise_that_no_longer_moves_it(resting_noise, found):
-    """Noise of half a converter's step moves a reading every few samples; a rudder that comes to rest without noise is no hang."""
+    """Noise of half a converter's step moves a reading every few samples; a rudder that comes to rest without noise is
+    no hang.
+    """
     rng, grid, n = np.random.default_rng(5), 5e-4, 8000
     swing = 0.1 * np.sin(2 * np.pi * np.arange(2000) / 1000)
     noise = np.where(np.abs(np.arange(n) - n / 2) < 2000, resting_noise, 2.5e-4) * rng.standard_normal(n)
@@ -478,13 +485,21 @@ def test_a_sensor_that_hangs_at_rest_is_told_by_the_noise_that_no_longer_moves_i
     assert [(s.start, round(s.stop, -1)) for s in unmoved_spans(y, grid, 2.9e-4)] == found
 
 
-@pytest.mark.parametrize("counts, hold, noise, more", [([0, 1, 1, 2, 3, 4, 4, 4, 7, 7, 8, 9, 10, 10], 6, 0.49, 1), ([0, 0, 4, 4, 7, 7, 7, 11, 12, 13, 14, 15], 5, 0.663, 2)])
+@pytest.mark.parametrize(
+    "counts, hold, noise, more",
+    [
+        ([0, 1, 1, 2, 3, 4, 4, 4, 7, 7, 8, 9, 10, 10], 6, 0.49, 1),
+        ([0, 0, 4, 4, 7, 7, 7, 11, 12, 13, 14, 15], 5, 0.663, 2),
+    ],
+)
 def test_a_leap_of_few_counts_is_chance(counts, hold, noise, more):
-    """A rudder on its way: three alike, and at once some counts that noise and the way since make up, come about within some ten thousand samples."""
+    """A rudder on its way: three alike, and at once some counts that noise and the way since make up, come about within
+    some ten thousand samples.
+    """
     grid = 5.1133e-4
     y = grid * np.array(counts)
     assert leapt_spans(y, grid, noise * grid) == []
-    y[hold + 2:] += more * grid
+    y[hold + 2 :] += more * grid
     assert leapt_spans(y, grid, noise * grid) == [slice(hold, hold + 2)]
 
 
@@ -544,9 +559,18 @@ def test_a_sensor_that_drops_out_is_told():
     assert 8 <= int(words.split(" spans")[0].split()[-1]) <= 14
 
 
-@pytest.mark.parametrize("motion, speed", [
-    (lambda t: 0.0 * t, 0.0), (lambda t: 400.0 * t**2, 0.0), (lambda t: 2e4 * t**3, 0.0), (lambda t: np.where(t > 0.02, 300.0 * (t - 0.02) ** 2, 0.0), 0.0),
-    (lambda t: 3.0 * t, 3.0), (lambda t: 3.0 * t - 100.0 * t**2, 3.0), (lambda t: np.sin(60.0 * t) / 20.0 + 2e-4 * np.sin(9e2 * t), 3.18)])
+@pytest.mark.parametrize(
+    "motion, speed",
+    [
+        (lambda t: 0.0 * t, 0.0),
+        (lambda t: 400.0 * t**2, 0.0),
+        (lambda t: 2e4 * t**3, 0.0),
+        (lambda t: np.where(t > 0.02, 300.0 * (t - 0.02) ** 2, 0.0), 0.0),
+        (lambda t: 3.0 * t, 3.0),
+        (lambda t: 3.0 * t - 100.0 * t**2, 3.0),
+        (lambda t: np.sin(60.0 * t) / 20.0 + 2e-4 * np.sin(9e2 * t), 3.18),
+    ],
+)
 def test_the_speed_at_the_start_is_what_the_samples_show(motion, speed):
     t = np.arange(50) / 1e3
     low, high = start_seen(t, motion(t) + 1e-4 * np.random.default_rng(3).standard_normal(t.size), 1e-4)
@@ -555,10 +579,39 @@ def test_the_speed_at_the_start_is_what_the_samples_show(motion, speed):
 
 def test_a_rudder_that_is_thrown_from_rest_had_no_speed():
     t = np.arange(11) / 200.0
-    thrown = np.array([0.0, 1.39, 8.6, 21.14, 35.78, 51.07, 64.8, 77.1, 87.58, 95.83, 103.27]) * 1e-3  # rad, in a loop whose reference jumps
+    thrown = (
+        np.array([0.0, 1.39, 8.6, 21.14, 35.78, 51.07, 64.8, 77.1, 87.58, 95.83, 103.27]) * 1e-3
+    )  # rad, in a loop whose reference jumps
     assert start_seen(t, thrown, 1e-4) == (0.0, 0.0)
     assert start_seen(t, -3.0 * t, 1e-4)[1] < -2.0
     t = np.arange(25) / 500.0
-    through_a_shaft = np.array([0.0, 0.9, -0.3, 4.6, 19.0, 36.0, 49.9, 62.1, 80.6, 96.8, 115.4, 128.3, 142.5, 159.9, 174.6, 185.8, 199.3, 210.3, 220.2, 230.9, 243.6,
-                                249.5, 260.2, 267.2, 275.7])  # noise levels
+    through_a_shaft = np.array(
+        [
+            0.0,
+            0.9,
+            -0.3,
+            4.6,
+            19.0,
+            36.0,
+            49.9,
+            62.1,
+            80.6,
+            96.8,
+            115.4,
+            128.3,
+            142.5,
+            159.9,
+            174.6,
+            185.8,
+            199.3,
+            210.3,
+            220.2,
+            230.9,
+            243.6,
+            249.5,
+            260.2,
+            267.2,
+            275.7,
+        ]
+    )  # noise levels
     assert start_seen(t, 1.36e-4 * through_a_shaft, 1.36e-4) == (0.0, 0.0)

@@ -14,8 +14,18 @@ from ers_mj.proving import quick
 
 TABLE_1 = read_datasheet("table1")
 T = np.arange(0.0, 4.0, 1e-3)
-SCALES = Scales(position=0.4, low=0.15, high=0.4, speed=4.0, acceleration=110.0, input=10.0, sample_time=1e-3, noise=1e-4, quantum=0.0,
-                is_angle=True)
+SCALES = Scales(
+    position=0.4,
+    low=0.15,
+    high=0.4,
+    speed=4.0,
+    acceleration=110.0,
+    input=10.0,
+    sample_time=1e-3,
+    noise=1e-4,
+    quantum=0.0,
+    is_angle=True,
+)
 
 
 def table_1(**changes):
@@ -38,7 +48,11 @@ def test_presliding_equals_an_independent_dahl(name, x_s_deg, delta):
     u, shape = INPUTS[name](T), {"form": "Dahl", "bristle_damping_ratio": 0.0, "delta": delta}
     dahl = {"label": "presliding", "strength": x_s_deg, "shape": shape}
     truth = quick.simulate(dict(TABLE_1.parameters), [dahl], T, u, step=5e-6, stand=0.0).true
-    ours = ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.0, np.inf, delta]))]).simulate(T, u).theta
+    ours = (
+        ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.0, np.inf, delta]))])
+        .simulate(T, u)
+        .theta
+    )
     assert np.degrees(np.max(np.abs(ours - truth))) < 3e-3
 
 
@@ -49,38 +63,82 @@ def test_presliding_equals_an_independent_lugre(name, x_s_deg, w_d):
     u, shape = INPUTS[name](T), {**form, "bristle_damping_ratio": 0.4}
     lugre = {"label": "presliding", "strength": x_s_deg, "shape": shape}
     truth = quick.simulate(dict(TABLE_1.parameters), [lugre], T, u, step=5e-6, stand=0.0).true
-    ours = ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.4, w_d, np.inf]))]).simulate(T, u).theta
+    ours = (
+        ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.4, w_d, np.inf]))])
+        .simulate(T, u)
+        .theta
+    )
     assert np.degrees(np.max(np.abs(ours - truth))) < 3e-3
 
 
 @pytest.mark.parametrize("x_s_deg, delta", [(1.0, 1.5), (0.1, 1.0)])
 @pytest.mark.parametrize("name", ["multisine", "steps"])
 def test_a_shaft_beside_a_bristle_equals_an_independent_scheme(name, x_s_deg, delta):
-    """At a far smaller step, of other numbers: there the rudder's bristle is as stiff as if it bore the motor's friction as well."""
+    """At a far smaller step, of other numbers: there the rudder's bristle is as stiff as if it bore the motor's
+    friction as well.
+    """
     J, rho, phi, k, zeta = TABLE_1.parameters["J"], 0.6, 0.3, 30.0, 0.1
-    dahl = {"label": "presliding", "strength": x_s_deg, "shape": {"form": "Dahl", "bristle_damping_ratio": 0.0, "delta": delta}}
-    shaft = {"label": "shaft_compliance", "strength": np.degrees(1.0 / k), "shape": {"zeta": zeta, "motor_friction_share": phi}}
+    dahl = {
+        "label": "presliding",
+        "strength": x_s_deg,
+        "shape": {"form": "Dahl", "bristle_damping_ratio": 0.0, "delta": delta},
+    }
+    shaft = {
+        "label": "shaft_compliance",
+        "strength": np.degrees(1.0 / k),
+        "shape": {"zeta": zeta, "motor_friction_share": phi},
+    }
     u, shares = INPUTS[name](T), {"motor_inertia_share": rho, "motor_damping_share": rho}
     truth = quick.simulate(dict(TABLE_1.parameters) | shares, [shaft, dahl], T, u, step=5e-6, stand=0.0).true
-    effects = [("shaft_compliance", np.array([np.sqrt(k / J) / (2.0 * np.pi), zeta * np.sqrt(rho * (1.0 - rho)), rho, phi, np.inf])),
-               ("presliding", np.array([(1.0 - phi) * np.radians(x_s_deg), 0.0, np.inf, delta]))]
+    effects = [
+        (
+            "shaft_compliance",
+            np.array([np.sqrt(k / J) / (2.0 * np.pi), zeta * np.sqrt(rho * (1.0 - rho)), rho, phi, np.inf]),
+        ),
+        ("presliding", np.array([(1.0 - phi) * np.radians(x_s_deg), 0.0, np.inf, delta])),
+    ]
     ours = ReducedModel(table_1().coefficients, effects).simulate(T, u).theta
     rigid = ReducedModel(table_1().coefficients, effects[:1]).simulate(T, u).theta
     assert np.sqrt(np.mean((ours - truth) ** 2)) < 0.05 * np.sqrt(np.mean((rigid - truth) ** 2))
 
 
-@pytest.mark.parametrize("label, strength, shape, ours", [
-    ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08, np.inf]),
-    ("cogging", 0.04, {"cycles_per_motor_rev": 4, "phase": 0.7}, [-0.04 / 0.0031, 2.0 * np.pi / (4 * 22.26), 0.7, np.inf, np.inf])], ids=["friction", "cogging"])
+@pytest.mark.parametrize(
+    "label, strength, shape, ours",
+    [
+        ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08, np.inf]),
+        (
+            "cogging",
+            0.04,
+            {"cycles_per_motor_rev": 4, "phase": 0.7},
+            [-0.04 / 0.0031, 2.0 * np.pi / (4 * 22.26), 0.7, np.inf, np.inf],
+        ),
+    ],
+    ids=["friction", "cogging"],
+)
 @pytest.mark.parametrize("name", ["multisine", "steps"])
 def test_a_law_acts_on_its_own_body_beside_a_shaft(name, label, strength, shape, ours):
-    """The motor's share of a friction, and what the motor's magnets make of its own angle, equal an independent scheme at a far smaller step."""
+    """The motor's share of a friction, and what the motor's magnets make of its own angle, equal an independent scheme
+    at a far smaller step.
+    """
     J, rho, phi, k, zeta = TABLE_1.parameters["J"], 0.6, 0.3, 30.0, 0.1
-    shaft = {"label": "shaft_compliance", "strength": np.degrees(1.0 / k), "shape": {"zeta": zeta, "motor_friction_share": phi}}
+    shaft = {
+        "label": "shaft_compliance",
+        "strength": np.degrees(1.0 / k),
+        "shape": {"zeta": zeta, "motor_friction_share": phi},
+    }
     u, shares = INPUTS[name](T), {"motor_inertia_share": rho, "motor_damping_share": rho}
     law = {"label": label, "strength": strength, "shape": shape}
-    truth, plain = (quick.simulate(dict(TABLE_1.parameters) | shares, some, T, u, step=5e-6, stand=0.0).true for some in ([shaft, law], [shaft]))
-    effects = [("shaft_compliance", np.array([np.sqrt(k / J) / (2.0 * np.pi), zeta * np.sqrt(rho * (1.0 - rho)), rho, phi, np.inf])), (label, np.array(ours))]
+    truth, plain = (
+        quick.simulate(dict(TABLE_1.parameters) | shares, some, T, u, step=5e-6, stand=0.0).true
+        for some in ([shaft, law], [shaft])
+    )
+    effects = [
+        (
+            "shaft_compliance",
+            np.array([np.sqrt(k / J) / (2.0 * np.pi), zeta * np.sqrt(rho * (1.0 - rho)), rho, phi, np.inf]),
+        ),
+        (label, np.array(ours)),
+    ]
     found = ReducedModel(table_1().coefficients, effects).simulate(T, u).theta
     assert np.degrees(np.max(np.abs(found - truth))) < 1e-3 < 0.01 * np.degrees(np.max(np.abs(plain - truth)))
 
@@ -106,27 +164,37 @@ def test_nothing_creeps_in_the_stick_band():
     c = table_1().coefficients
     u = np.full(T.size, 0.9 * (c.c_1 + c.c_2_plus) / c.b)
     assert np.ptp(table_1().simulate(T, u).theta) == 0.0
-    away = table_1().simulate(T, 0.9 * c.c_2_plus / c.b * np.ones(T.size) + (c.c_1 + c.a_1 * 0.1) / c.b, start=(c.theta_0 + 0.1, 0.0))
+    away = table_1().simulate(
+        T, 0.9 * c.c_2_plus / c.b * np.ones(T.size) + (c.c_1 + c.a_1 * 0.1) / c.b, start=(c.theta_0 + 0.1, 0.0)
+    )
     assert np.ptp(away.theta) == 0.0
 
 
 def test_a_bent_bristle_holds_still():
-    """Constant forces bend it once, by about x_s at nine tenths of the friction, and it does not creep; the preload's corner still holds."""
+    """Constant forces bend it once, by about x_s at nine tenths of the friction, and it does not creep; the preload's
+    corner still holds.
+    """
     c = table_1().coefficients
     sprung = ReducedModel(c, [("presliding", np.array([0.008, 0.2, np.inf, np.inf]))])
-    away = sprung.simulate(T, (0.3 * c.c_2_plus + c.c_1 + c.a_1 * 0.1) / c.b * np.ones(T.size), start=(c.theta_0 + 0.1, 0.0)).theta
+    away = sprung.simulate(
+        T, (0.3 * c.c_2_plus + c.c_1 + c.a_1 * 0.1) / c.b * np.ones(T.size), start=(c.theta_0 + 0.1, 0.0)
+    ).theta
     assert 0.3 * 0.008 < away[-1] - away[0] < 2 * 0.008
     assert np.ptp(away[2000:]) < 1e-9
     assert np.ptp(sprung.simulate(T, np.full(T.size, 0.9 * c.c_1 / c.b)).theta) == 0.0
 
 
 def test_a_rudder_that_bounces_in_the_corner_on_its_bristle_is_simulated_to_the_end():
-    """At 200 Hz, under a friction that hardly changes along the travel, it bounces there more than EVENT_BUDGET times a sample."""
+    """At 200 Hz, under a friction that hardly changes along the travel, it bounces there more than EVENT_BUDGET times a
+    sample.
+    """
     c = lumped({"a_1": 36.0, "c_1": 188.0, "c_2": 112.0, "theta_0": 0.263, "a_2": 92.0, "b": 138.0, "tau_e": 0.00115})
     t = np.arange(0.0, 7.5, 5e-3)
     bristle = ("presliding", np.array([0.00096, 0.018, np.inf, 1.41]))
-    alone, wavy = (ReducedModel(c, [bristle, *more]).simulate(t, 0.3 * INPUTS["multisine"](t)).theta
-                   for more in ([], [("position_dependent_friction", np.array([0.2, np.inf, np.inf, 0.18, 0.0]))]))
+    alone, wavy = (
+        ReducedModel(c, [bristle, *more]).simulate(t, 0.3 * INPUTS["multisine"](t)).theta
+        for more in ([], [("position_dependent_friction", np.array([0.2, np.inf, np.inf, 0.18, 0.0]))])
+    )
     assert np.all(np.isfinite(wavy)) and np.max(np.abs(wavy - alone)) < 0.05 * np.ptp(alone)
 
 
@@ -159,18 +227,28 @@ def test_a_rigid_play_of_no_width_is_no_play():
     """Backlash with a tiny gap and a stiff contact tends to the one-body motion."""
     u = INPUTS["chirp"](T)
     one = table_1().simulate(T, u).theta
-    two = [ReducedModel(table_1().coefficients, [("backlash", np.array([gap, 0.5, 0.2, 400.0, 1.0]))]).simulate(T, u).theta
-           for gap in (4e-3, 1e-3)]
+    two = [
+        ReducedModel(table_1().coefficients, [("backlash", np.array([gap, 0.5, 0.2, 400.0, 1.0]))]).simulate(T, u).theta
+        for gap in (4e-3, 1e-3)
+    ]
     size = [np.sqrt(np.mean((x - one) ** 2)) for x in two]
     assert size[1] < 0.5 * size[0]
 
 
 def linear_motion(c, u):
-    """theta - theta_0 (N,) from rest by the matrix exponential: (theta, w), (theta_m, w_m) of a shaft, and j of a winding."""
+    """theta - theta_0 (N,) from rest by the matrix exponential: (theta, w), (theta_m, w_m) of a shaft, and j of a
+    winding.
+    """
     if c.two_body:
         k, d, mine, its = c.k_twist, c.d_twist, (1.0 - c.rho), c.rho
-        A = np.array([[0, 1, 0, 0], [-(c.a_1 + k) / mine, -((1.0 - c.beta) * c.a_mech_plus + d) / mine, k / mine, d / mine],
-                      [0, 0, 0, 1], [k / its, d / its, -k / its, -(c.beta * c.a_mech_plus + d) / its]])
+        A = np.array(
+            [
+                [0, 1, 0, 0],
+                [-(c.a_1 + k) / mine, -((1.0 - c.beta) * c.a_mech_plus + d) / mine, k / mine, d / mine],
+                [0, 0, 0, 1],
+                [k / its, d / its, -k / its, -(c.beta * c.a_mech_plus + d) / its],
+            ]
+        )
     else:
         its, A = 1.0, np.array([[0.0, 1.0], [-c.a_1, -c.a_mech_plus]])
     n, driven = A.shape[0], A.shape[0] - 1
@@ -191,7 +269,9 @@ def linear_motion(c, u):
 
 @pytest.mark.parametrize("name", ["steps", "multisine"])
 @pytest.mark.parametrize("tau", [0.0, 9.4e-4])
-@pytest.mark.parametrize("effects", [(), [("shaft_compliance", np.array([20.0, 0.1, 0.55, 0.15, np.inf]))]], ids=["rigid", "shaft"])
+@pytest.mark.parametrize(
+    "effects", [(), [("shaft_compliance", np.array([20.0, 0.1, 0.55, 0.15, np.inf]))]], ids=["rigid", "shaft"]
+)
 def test_without_dry_friction_it_is_the_linear_system_from_rest_on(name, tau, effects):
     """From rest at theta_0, where no force says which way it will go."""
     model = ReducedModel(table_1(c_1=0.0, c_2=0.0, tau_e=tau).coefficients, effects)
@@ -209,7 +289,9 @@ def test_an_inductance_that_falls_with_the_current_obeys_its_equation():
         return x[1], -c.a_1 * x[0] - c.a_mech_plus * x[1] + x[2], (c.b * 12.0 - c.a_emf * x[1] - x[2]) / 0.004 * faster
 
     exact = solve_ivp(slope, (0.0, t[-1]), np.zeros(3), t_eval=t, rtol=1e-9, atol=1e-10).y
-    falls, stays = (ReducedModel(c, [("inductance", np.array([0.004, j]))]).simulate(t, u).theta - c.theta_0 for j in (half, np.inf))
+    falls, stays = (
+        ReducedModel(c, [("inductance", np.array([0.004, j]))]).simulate(t, u).theta - c.theta_0 for j in (half, np.inf)
+    )
     assert np.max(np.abs(falls - exact[0])) < 0.02 * np.max(np.abs(stays - exact[0]))
 
 
@@ -217,15 +299,28 @@ def test_a_motor_that_creeps_to_rest_at_the_limit_of_its_friction_lets_the_servo
     rng = np.random.default_rng(1)
     t = np.arange(0.0, 3.0, 2e-3)
     for _ in range(30):
-        c = Coefficients(a_1=rng.uniform(0, 100), a_mech_plus=2.9, a_mech_minus=2.9, a_emf=rng.uniform(10, 100), b=88.0, c_2_plus=130.0,
-                         c_2_minus=130.0, tau_e=2e-3)
-        c = coupled(c, f=rng.uniform(15, 60), zeta=rng.uniform(0.1, 0.5), rho=rng.uniform(0.2, 0.8), phi=rng.uniform(0.1, 0.6))
+        c = Coefficients(
+            a_1=rng.uniform(0, 100),
+            a_mech_plus=2.9,
+            a_mech_minus=2.9,
+            a_emf=rng.uniform(10, 100),
+            b=88.0,
+            c_2_plus=130.0,
+            c_2_minus=130.0,
+            tau_e=2e-3,
+        )
+        c = coupled(
+            c, f=rng.uniform(15, 60), zeta=rng.uniform(0.1, 0.5), rho=rng.uniform(0.2, 0.8), phi=rng.uniform(0.1, 0.6)
+        )
         u = np.repeat(rng.uniform(-8, 8, 6), 250)
         assert np.all(np.isfinite(ReducedModel(c).theta(t, u, (0.1, 0.0))))
 
 
 def test_a_shaft_that_hardens_obeys_its_equations():
-    model = ReducedModel(table_1(c_1=0.0, c_2=0.0, tau_e=0.0).coefficients, [("shaft_compliance", np.array([12.0, 0.1, 0.55, 0.15, 0.02]))])
+    model = ReducedModel(
+        table_1(c_1=0.0, c_2=0.0, tau_e=0.0).coefficients,
+        [("shaft_compliance", np.array([12.0, 0.1, 0.55, 0.15, 0.02]))],
+    )
     c, u = Coefficients(*model._lowered[0]), np.full(T.size, 6.0)
 
     def slope(t, x):
@@ -240,7 +335,9 @@ def test_a_shaft_that_hardens_obeys_its_equations():
 
 
 def test_a_shaft_that_hardens_without_bound_ends_the_motion():
-    """Each step makes it stiffer, and the next one needs more Runge-Kutta steps than a lifetime has; up to there the motion is told."""
+    """Each step makes it stiffer, and the next one needs more Runge-Kutta steps than a lifetime has; up to there the
+    motion is told.
+    """
     shaft = ("shaft_compliance", np.array([9.5, 0.7, 0.39, 0.48, 7.8e-5]))
     plant, t = ReducedModel(table_1().coefficients, [shaft]), np.arange(100) / 200.0
     calm, thrown = (plant.theta(t, np.full(t.size, 4.0), (plant.coefficients.theta_0, speed)) for speed in (0.0, 1e5))

@@ -1,4 +1,6 @@
-"""What a model leaves beyond the noise is told by its memory, whatever the noise's size and whatever the converter does."""
+"""What a model leaves beyond the noise is told by its memory, whatever the noise's size and whatever the converter
+does.
+"""
 
 from dataclasses import replace
 
@@ -31,6 +33,7 @@ def test_the_power_of_a_faint_wave_is_read_whatever_the_noise(noise):
 @pytest.mark.parametrize("times", [0.0, 1.0, 40.0])
 def test_a_converter_leaves_no_mismatch(times):
     """The model that made the recordings, read as it is or by a converter of one or forty noise levels."""
+
     def sensor(y):
         return np.round(y / (times * NOISE)) * times * NOISE if times else y
 
@@ -40,29 +43,44 @@ def test_a_converter_leaves_no_mismatch(times):
 
 
 def test_a_mismatch_below_the_noise_is_seen():
-    traces = [trace(name, sensor=lambda y: y + NOISE * np.sin(600.0 * y), seed=k)
-              for k, name in enumerate(("multisine", "steps", "chirp"))]
+    traces = [
+        trace(name, sensor=lambda y: y + NOISE * np.sin(600.0 * y), seed=k)
+        for k, name in enumerate(("multisine", "steps", "chirp"))
+    ]
     start = started(traces)
     assert left_by_sensor(start.fit.model, start.traces)["output"] > 0.1
 
 
 def test_what_one_recording_alone_shows_is_not_left_elsewhere():
-    """A wave in one of three recordings is seen by the mean over all, and not by that over the others; a wave in each is seen by both."""
+    """A wave in one of three recordings is seen by the mean over all, and not by that over the others; a wave in each
+    is seen by both.
+    """
+
     def left(bent):
-        traces = [trace(name, sensor=lambda y, size=2.0 * (name in bent): y + size * NOISE * np.sin(600.0 * y), seed=k)
-                  for k, name in enumerate(("multisine", "steps", "chirp"))]
+        traces = [
+            trace(name, sensor=lambda y, size=2.0 * (name in bent): y + size * NOISE * np.sin(600.0 * y), seed=k)
+            for k, name in enumerate(("multisine", "steps", "chirp"))
+        ]
         model = started([trace("multisine")]).fit.model
         return left_by_sensor(model, traces)["output"], left_elsewhere(model, traces)
 
     one, every = left(("multisine",)), left(("multisine", "steps", "chirp"))
     assert one[0] > 0.1 and one[1] < 0.03
     assert every[0] > 0.3 and every[1] > 0.2
-    assert left_elsewhere(started([trace("multisine")]).fit.model, [trace("multisine", sensor=lambda y: y + 9.0 * NOISE * np.sin(600.0 * y))]) == 0.0
+    assert (
+        left_elsewhere(
+            started([trace("multisine")]).fit.model,
+            [trace("multisine", sensor=lambda y: y + 9.0 * NOISE * np.sin(600.0 * y))],
+        )
+        == 0.0
+    )
 
 
 @pytest.mark.parametrize("rate", [1000, 50, 10])
 def test_at_low_sample_rates_blocks_are_joined(rate):
-    """A slow mismatch of four noise levels is seen where a quarter of a second holds two samples as well as where it holds 250."""
+    """A slow mismatch of four noise levels is seen where a quarter of a second holds two samples as well as where it
+    holds 250.
+    """
     plant, t = ReducedModel(lumped(TRUTH)), np.arange(0.0, 15.0, 1.0 / rate)
     u = 3.0 * np.sign(np.sin(t))
     y = plant.simulate(t, u).measured + NOISE * np.random.default_rng(1).standard_normal(t.size)

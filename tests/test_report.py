@@ -56,7 +56,14 @@ def read(page: str) -> Reader:
 def view(name="run1.csv", held_out=False, n=900, **changes) -> RecordView:
     t = np.arange(n) * 1e-2
     y = 0.3 * np.sin(t)
-    fields = {"t": t, "u": 5 * np.cos(t), "measured": y, "before": y + 0.05 * np.sin(3 * t), "after": y + 1e-3, "shaded": ((1.0, 1.5), (1.52, 2.0))}
+    fields = {
+        "t": t,
+        "u": 5 * np.cos(t),
+        "measured": y,
+        "before": y + 0.05 * np.sin(3 * t),
+        "after": y + 1e-3,
+        "shaded": ((1.0, 1.5), (1.52, 2.0)),
+    }
     return RecordView(name, held_out, **{**fields, **changes})
 
 
@@ -64,30 +71,94 @@ def evidence(unit="rad") -> Evidence:
     rng = np.random.default_rng(3)
     rms = rng.uniform(size=(6, 4))
     rms[0] = np.nan
-    rungs = (Rung((), 0.0, 0.0, 0.05, False, "", 6), Rung(("stribeck",), 30.0, 5.0, 0.01, True, NASTY, 3),
-             Rung(("backlash", "end_stop"), 2.0, 0.3, None, False, "did not converge", 6))
+    rungs = (
+        Rung((), 0.0, 0.0, 0.05, False, "", 6),
+        Rung(("stribeck",), 30.0, 5.0, 0.01, True, NASTY, 3),
+        Rung(("backlash", "end_stop"), 2.0, 0.3, None, False, "did not converge", 6),
+    )
     maps = ResidualMap(np.linspace(-1, 1, 7), np.linspace(-2, 2, 5), rms, 0.1 * rms)
     return Evidence((view(), view("held.csv", True)), rungs, maps, 1e-3, unit, "V")
 
 
 def document(verdict="missing_physics", **changes) -> dict:
-    fit = {f"{kind}_rmse_{when}_rad": x for kind in ("train", "heldout", "recalibrated") for when, x in (("before", 0.05), ("after", 0.01))}
+    fit = {
+        f"{kind}_rmse_{when}_rad": x
+        for kind in ("train", "heldout", "recalibrated")
+        for when, x in (("before", 0.05), ("after", 0.01))
+    }
     number = {"value": 0.1, "unit": "N m", "ci95": [0.08, 0.12]}
     full = {
-        "version": 1, "verdict": verdict, "sentence": f"A sentence with {NASTY}.",
-        "where": [{"axis": "angle", "region": [0.1, 0.2], "unit": "rad", "label": None, "share_of_error": 0.78, "share_of_time": 0.09, "sentence": NASTY},
-                  {"axis": "subsystem", "region": None, "unit": None, "label": "load", "share_of_error": None, "share_of_time": None, "sentence": None}],
-        "missing": [{"effect": "stribeck", "sentence": NASTY, "subsystem": "load", "parameters": {"F_s": number, NASTY: number},
-                     "evidence": {"heldout_rmse_without_rad": 0.05, "heldout_rmse_with_rad": 0.01, "delta_bic": -40.0, "p_value": 1e-6},
-                     "alternatives": [{"effect": "presliding", "probability": 0.2, "why_not_excluded": NASTY}]}],
+        "version": 1,
+        "verdict": verdict,
+        "sentence": f"A sentence with {NASTY}.",
+        "where": [
+            {
+                "axis": "angle",
+                "region": [0.1, 0.2],
+                "unit": "rad",
+                "label": None,
+                "share_of_error": 0.78,
+                "share_of_time": 0.09,
+                "sentence": NASTY,
+            },
+            {
+                "axis": "subsystem",
+                "region": None,
+                "unit": None,
+                "label": "load",
+                "share_of_error": None,
+                "share_of_time": None,
+                "sentence": None,
+            },
+        ],
+        "missing": [
+            {
+                "effect": "stribeck",
+                "sentence": NASTY,
+                "subsystem": "load",
+                "parameters": {"F_s": number, NASTY: number},
+                "evidence": {
+                    "heldout_rmse_without_rad": 0.05,
+                    "heldout_rmse_with_rad": 0.01,
+                    "delta_bic": -40.0,
+                    "p_value": 1e-6,
+                },
+                "alternatives": [{"effect": "presliding", "probability": 0.2, "why_not_excluded": NASTY}],
+            }
+        ],
         "remainder": {"explained_share": 0.93, "significant": True, "sentence": NASTY},
-        "record_state": [{"name": "gain", "unit": "-", "values": [1.0, 1.16], "ci95": [[1.0, 1.0], [1.1, 1.2]], "sentence": NASTY}],
-        "fit": {**fit, "noise_floor_rad": 1e-3, "mujoco_heldout_rmse_before_rad": None, "mujoco_heldout_rmse_after_rad": None},
-        "parameters": {"J": {"value": 0.0031, "unit": "kg m^2", "ci95": [0.003, 0.0032], "datasheet": 0.0031, "identifiable": True},
-                       "k_s": {"value": None, "unit": "N m/rad", "ci95": None, "datasheet": 0.09, "identifiable": False}},
-        "next_recording": {"sentence": NASTY, "excitation": {"kind": "ramp", "amplitude_V": 3.8, "levels": [1, 2.5, None]}},
-        "data": {"files": [NASTY, "held.csv"], "sha256": ["ab" * 32, "cd" * 32], "output_unit": "rad", "input_unit": "V", "problems": [NASTY]},
-        "seed": 7, "versions": {"ers_mj": "0.1.0"},
+        "record_state": [
+            {"name": "gain", "unit": "-", "values": [1.0, 1.16], "ci95": [[1.0, 1.0], [1.1, 1.2]], "sentence": NASTY}
+        ],
+        "fit": {
+            **fit,
+            "noise_floor_rad": 1e-3,
+            "mujoco_heldout_rmse_before_rad": None,
+            "mujoco_heldout_rmse_after_rad": None,
+        },
+        "parameters": {
+            "J": {
+                "value": 0.0031,
+                "unit": "kg m^2",
+                "ci95": [0.003, 0.0032],
+                "datasheet": 0.0031,
+                "identifiable": True,
+            },
+            "k_s": {"value": None, "unit": "N m/rad", "ci95": None, "datasheet": 0.09, "identifiable": False},
+        },
+        "next_recording": {
+            "sentence": NASTY,
+            "excitation": {"kind": "ramp", "amplitude_V": 3.8, "levels": [1, 2.5, None]},
+        },
+        "data": {
+            "files": [NASTY, "held.csv"],
+            "sha256": ["ab" * 32, "cd" * 32],
+            "output_unit": "rad",
+            "input_unit": "V",
+            "problems": [NASTY],
+        },
+        "seed": 7,
+        "versions": {"ers_mj": "0.1.0"},
     }
     return full | changes
 
@@ -106,7 +177,9 @@ EMPTY = Evidence((), (), None, float("nan"), "rad", "V")
 @pytest.mark.parametrize("full", [True, False])
 def test_the_page_stands_alone_and_parses(verdict, full):
     doc = document(verdict) if verdict == "missing_physics" else document(verdict, missing=[])
-    page = report_page(doc if full else emptied(doc) | {"verdict": verdict, "sentence": "Nothing."}, evidence() if full else EMPTY)
+    page = report_page(
+        doc if full else emptied(doc) | {"verdict": verdict, "sentence": "Nothing."}, evidence() if full else EMPTY
+    )
     reader = read(page)
     assert not re.search(r"https?:", page)
     assert all(reference.startswith("#") for reference in reader.references)
@@ -115,8 +188,19 @@ def test_the_page_stands_alone_and_parses(verdict, full):
     assert VERDICTS[verdict] in page and verdict in page
 
 
-@pytest.mark.parametrize("changes", [{}, {"missing": [], "suspects": [{"effect": "end_stop", "sentence": "it might"}, "or this"]},
-                                     {"fit": {}}, {"parameters": {}}, {"record_state": []}, {"where": []}, {"data": {}}, {"next_recording": {}}])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"missing": [], "suspects": [{"effect": "end_stop", "sentence": "it might"}, "or this"]},
+        {"fit": {}},
+        {"parameters": {}},
+        {"record_state": []},
+        {"where": []},
+        {"data": {}},
+        {"next_recording": {}},
+    ],
+)
 def test_a_document_may_lack_parts(changes):
     read(report_page(document(**changes), Evidence((), evidence().ladder, None, 1e-3, "rad", "V")))
 
@@ -135,9 +219,20 @@ def test_all_text_is_escaped():
 
 def test_verdict_and_sentence_come_first_and_all_sections_follow_in_order():
     page = report_page(document(), evidence())
-    order = ["<h1>", "Measured and simulated", "Where it fails", "The physics that was left out", "Residual over angle and speed",
-             "The candidates", "How well it fits", "Parameters", "What differs between recordings", "Problems found in the data",
-             "What to record next", "<footer>"]
+    order = [
+        "<h1>",
+        "Measured and simulated",
+        "Where it fails",
+        "The physics that was left out",
+        "Residual over angle and speed",
+        "The candidates",
+        "How well it fits",
+        "Parameters",
+        "What differs between recordings",
+        "Problems found in the data",
+        "What to record next",
+        "<footer>",
+    ]
     places = [page.index(title) for title in order]
     assert places == sorted(places)
 
@@ -199,7 +294,10 @@ def test_spans_that_touch_become_one():
     assert list(figures.merged((), 0.1)) == []
 
 
-@pytest.mark.parametrize(("x", "text"), [(0, "0"), (1234.5, "1234"), (0.0031, "0.00310"), (3.1e-6, "3.10×10⁻⁶"), (-2.5, "−2.50"), (9.999e6, "1.00×10⁷")])
+@pytest.mark.parametrize(
+    ("x", "text"),
+    [(0, "0"), (1234.5, "1234"), (0.0031, "0.00310"), (3.1e-6, "3.10×10⁻⁶"), (-2.5, "−2.50"), (9.999e6, "1.00×10⁷")],
+)
 def test_figures(x, text):
     assert figure(x) == text
 
@@ -215,7 +313,10 @@ def test_an_error_beyond_the_noise_is_drawn_over_frequency():
     t, u = np.arange(6000) * 1e-3, random.standard_normal(6000)
     x = np.cumsum(u) * 1e-3
     traces = [make_trace("made", t, u, x * gain, np.ones(6000, bool), None, None, 1e-5, 0.0) for gain in (1.0, 1.1)]
-    told = [replace(evidence(), spectrum=mismatch(traces, [e, e], 1e-9)) for e in (0.1 * x + 1e-5 * random.standard_normal(6000), 1e-5 * random.standard_normal(6000))]
+    told = [
+        replace(evidence(), spectrum=mismatch(traces, [e, e], 1e-9))
+        for e in (0.1 * x + 1e-5 * random.standard_normal(6000), 1e-5 * random.standard_normal(6000))
+    ]
     drawn, silent = (report_page(document(), found) for found in told)
     assert "measured over simulated motion" in drawn and "measured over simulated motion" not in silent
     assert "measured over simulated motion" not in report_page(document(where=[]), told[0])

@@ -22,10 +22,20 @@ def stepped(plant, u):
     return rows.T
 
 
-@pytest.mark.parametrize(("effect", "options", "within"), [
-    (None, {}, 1e-11), (None, {"inductance": True}, 1e-11), (None, {"gap": 0.009}, 1e-6), ("input_delay:T_d=0.0023", {}, 1e-11),
-    ("end_stop:upper=0.4,lower=0.1", {}, 1e-11), ("voltage_saturation:u_max=3.5", {}, 1e-11), ("presliding:x_s=0.002,zeta=0.5", {}, 3e-6),
-    ("stribeck:dF_s=0.1,v_s=0.2", {}, 3e-5), ("current_limit:tau_max=1.2", {}, 1e-3)])
+@pytest.mark.parametrize(
+    ("effect", "options", "within"),
+    [
+        (None, {}, 1e-11),
+        (None, {"inductance": True}, 1e-11),
+        (None, {"gap": 0.009}, 1e-6),
+        ("input_delay:T_d=0.0023", {}, 1e-11),
+        ("end_stop:upper=0.4,lower=0.1", {}, 1e-11),
+        ("voltage_saturation:u_max=3.5", {}, 1e-11),
+        ("presliding:x_s=0.002,zeta=0.5", {}, 3e-6),
+        ("stribeck:dF_s=0.1,v_s=0.2", {}, 3e-5),
+        ("current_limit:tau_max=1.2", {}, 1e-3),
+    ],
+)
 def test_the_reduced_model_moves_as_in_one_go(effect, options, within):
     plant = build_plant(SHEET, effects=[parse_effect(effect)] if effect else (), **options)
     u = INPUTS["steps"](T)
@@ -36,15 +46,29 @@ def test_the_reduced_model_moves_as_in_one_go(effect, options, within):
 
 
 def test_two_bodies_beside_a_bristle_move_as_in_one_go():
-    plant = build_plant(SHEET, effects=[parse_effect("shaft_compliance:f_shaft=30"), parse_effect("presliding:x_s=0.002,zeta=0.5"),
-                                        parse_effect("input_delay:T_d=0.0023")])
+    plant = build_plant(
+        SHEET,
+        effects=[
+            parse_effect("shaft_compliance:f_shaft=30"),
+            parse_effect("presliding:x_s=0.002,zeta=0.5"),
+            parse_effect("input_delay:T_d=0.0023"),
+        ],
+    )
     u = INPUTS["steps"](T)
     assert np.abs(stepped(plant, u)[0] - plant.simulate(T, u).theta).max() < 1e-11
 
 
-@pytest.mark.parametrize(("effect", "options"), [
-    (None, {}), (None, {"inductance": True}), (None, {"gap": 0.009}), (None, {"linkage": "rod"}), ("input_delay:T_d=0.00232", {}),
-    ("stribeck:dF_s=0.1,v_s=0.2", {})])
+@pytest.mark.parametrize(
+    ("effect", "options"),
+    [
+        (None, {}),
+        (None, {"inductance": True}),
+        (None, {"gap": 0.009}),
+        (None, {"linkage": "rod"}),
+        ("input_delay:T_d=0.00232", {}),
+        ("stribeck:dF_s=0.1,v_s=0.2", {}),
+    ],
+)
 def test_the_mujoco_plant_moves_as_in_one_go(effect, options):
     plant = build_plant(SHEET, plant="mujoco", effects=[parse_effect(effect)] if effect else (), **options)
     u = INPUTS["steps"](T)

@@ -32,36 +32,61 @@ def test_where_much_is_missing_what_promises_least_is_not_screened_from_every_pl
     alone, both = (screen(places, pushed.traces, 1.0, (), True, False) for places in ([near], [near, far]))
     bar = screening.LESS * max(alone.promises.values())
     again = {name: len(both.begins[name]) for name in alone.begins if not (BY_NAME[name].dear or BY_NAME[name].once)}
-    assert all(count == 1 for name, count in again.items() if alone.promises[name] < bar) and set(again.values()) == {1, 2}
+    assert all(count == 1 for name, count in again.items() if alone.promises[name] < bar) and set(again.values()) == {
+        1,
+        2,
+    }
     assert all(again[name] == 2 for name in again if alone.promises[name] >= 0.5 * max(alone.promises.values()))
 
 
 def test_a_small_wave_is_promised_by_a_large_start():
-    """Cogging of 1 % of the friction: a start that is 30 times as large throws the rudder elsewhere, and tells only how small to try again."""
+    """Cogging of 1 % of the friction: a start that is 30 times as large throws the rudder elsewhere, and tells only how
+    small to try again.
+    """
     cog, traces = np.array([1.0, 2 * np.pi / 267, 1.3, np.inf, np.inf]), []
     for k, name in enumerate(("multisine", "ramp")):
         y = ReducedModel(lumped(TRUTH), [("cogging", cog)]).simulate(T, INPUTS[name](T)).measured
-        traces.append(trace_of(from_arrays(T, INPUTS[name](T), y + 1e-4 * np.random.default_rng(k).standard_normal(T.size), name=name), None))
+        traces.append(
+            trace_of(
+                from_arrays(T, INPUTS[name](T), y + 1e-4 * np.random.default_rng(k).standard_normal(T.size), name=name),
+                None,
+            )
+        )
     start = started(traces)
     place, traces = start.fit.model, start.traces
     e = residuals(place, traces, 5.0)
-    share, model = _promise(place, BY_NAME["cogging"], np.array([30.0, cog[1], 0.0, np.inf, np.inf]), 1.0, e, _targets(place, e, traces, 1.0)[1], traces)
+    share, model = _promise(
+        place,
+        BY_NAME["cogging"],
+        np.array([30.0, cog[1], 0.0, np.inf, np.inf]),
+        1.0,
+        e,
+        _targets(place, e, traces, 1.0)[1],
+        traces,
+    )
     A, _, phase = dict(model.effects)["cogging"][:3]
     assert share > 0.3 and abs(A * np.exp(1j * phase) - np.exp(1.3j)) < 0.3
 
 
 def test_a_tangent_that_runs_away_promises_nothing(pushed, monkeypatch):
-    """Beside a stiff bristle a law's tangent may leave all bounds: the start is passed over, and the other ones are compared."""
+    """Beside a stiff bristle a law's tangent may leave all bounds: the start is passed over, and the other ones are
+    compared.
+    """
     model, effect = pushed.fit.model, BY_NAME["load_dependent_friction"]
     run = run_of(model, pushed.traces, 5.0)
     starts = [size * effect.starts(model.scales)[0] for size in (1.0, 1.1, 1.2, 1.3, 1.4)]
     targets, changes = _targets(model, run.left, pushed.traces, 1.0)[1], type(model).changes
     assert len(_first_order(run, targets, pushed.traces, effect, starts)) == 5
-    monkeypatch.setattr(type(model), "changes", lambda *a: changes(*a) + np.where(np.arange(len(starts)) == lost, size, 0.0))
+    monkeypatch.setattr(
+        type(model), "changes", lambda *a: changes(*a) + np.where(np.arange(len(starts)) == lost, size, 0.0)
+    )
     for lost, size in ((0, np.inf), (0, np.nan), (2, 1e200)):
         told = _first_order(run, targets, pushed.traces, effect, starts)
         shares = [share for share, _ in told]
-        assert shares[lost] == 0.0 < np.min(np.delete(shares, lost)) and len(some := _hopeful(effect, starts, told, 3)) == 3
+        assert (
+            shares[lost] == 0.0 < np.min(np.delete(shares, lost))
+            and len(some := _hopeful(effect, starts, told, 3)) == 3
+        )
         assert all(start is not starts[lost] for start, _ in some)
 
 
@@ -69,13 +94,18 @@ def test_the_first_order_tells_the_size_at_which_a_secant_is_taken(pushed, monke
     """A drag of 20 times what acts, or half of it, is simulated once, at nearly the size that acts."""
     effect, tried = BY_NAME["quadratic_drag"], []
     acts = np.append(0.5, np.full(len(effect.parameters) - 1, np.inf))
-    model, traces = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}), recorded([("quadratic_drag", acts)])
+    model, traces = (
+        replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}),
+        recorded([("quadratic_drag", acts)]),
+    )
     run = run_of(model, traces, 5.0)
     targets = _targets(model, run.left, traces, 1.0)[1]
-    monkeypatch.setattr(screening, "residuals", lambda m, *a: tried.append(dict(m.effects)["quadratic_drag"][0]) or residuals(m, *a))
+    monkeypatch.setattr(
+        screening, "residuals", lambda m, *a: tried.append(dict(m.effects)["quadratic_drag"][0]) or residuals(m, *a)
+    )
     for times in (0.5, 1.0, 20.0):
         start = np.append(times * acts[0], acts[1:])
-        (share, size), = _first_order(run, targets, traces, effect, [start])
+        ((share, size),) = _first_order(run, targets, traces, effect, [start])
         promise, found = _promise(model, effect, start, size, run.left, targets, traces)
         assert share > 0.3 and promise > 0.3 and 0.5 < dict(found.effects)["quadratic_drag"][0] / acts[0] < 2.0
     assert len(tried) == 3 and np.ptp(tried) < 0.05 * np.mean(tried)
@@ -83,7 +113,10 @@ def test_the_first_order_tells_the_size_at_which_a_secant_is_taken(pushed, monke
 
 def test_waves_are_told_apart_by_half_the_samples(pushed):
     """The shares of gusts from samples 2 ms apart are those from all, 1 ms apart."""
-    gust, effect = ("periodic_gust", np.array([8.0, 3.1, 0.4, np.inf, np.inf, np.inf, np.inf])), BY_NAME["periodic_gust"]
+    gust, effect = (
+        ("periodic_gust", np.array([8.0, 3.1, 0.4, np.inf, np.inf, np.inf, np.inf])),
+        BY_NAME["periodic_gust"],
+    )
     traces = recorded([("periodic_gust", np.append(gust[1][:3], np.full(len(effect.parameters) - 3, np.inf)))])
     model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH})
     run = run_of(model, traces, 5.0)
@@ -95,46 +128,84 @@ def test_waves_are_told_apart_by_half_the_samples(pushed):
 
 
 def test_what_promises_next_to_nothing_to_first_order_is_not_simulated(pushed, monkeypatch):
-    """Beside a bias of the torque neither a slow sensor nor a dead zone is, and what is follows from the best starts."""
+    """Beside a bias of the torque neither a slow sensor nor a dead zone is, and what is follows from the best
+    starts.
+    """
     tried = []
-    monkeypatch.setattr(screening, "_promise", lambda place, effect, *a: tried.append(effect.name) or _promise(place, effect, *a))
+    monkeypatch.setattr(
+        screening, "_promise", lambda place, effect, *a: tried.append(effect.name) or _promise(place, effect, *a)
+    )
     found = screen([pushed.fit.model], pushed.traces, 1.0, (), False, False)
     assert "bias_torque" in tried and "bias_torque" in found.promising()
-    assert not {"sensor_lag", "drive_dead_zone"} & {*tried} and found.promises["sensor_lag"] < 0.1 * found.promises["bias_torque"]
+    assert (
+        not {"sensor_lag", "drive_dead_zone"} & {*tried}
+        and found.promises["sensor_lag"] < 0.1 * found.promises["bias_torque"]
+    )
 
 
 def test_a_promise_that_failed_is_no_measure_for_the_others():
-    promises = {"load_disturbance": 3.0, "load_dependent_friction": 0.97, "cogging": 0.4, "input_delay": 0.18, "gravity": 0.02}
+    promises = {
+        "load_disturbance": 3.0,
+        "load_dependent_friction": 0.97,
+        "cogging": 0.4,
+        "input_delay": 0.18,
+        "gravity": 0.02,
+    }
     found = Screened(promises, dict.fromkeys(promises, ()), 0.0, 4)
     assert found.promising() == ["load_disturbance", "load_dependent_friction", "cogging"]
-    assert found.promising({"load_dependent_friction"}) == ["load_disturbance", "load_dependent_friction", "cogging", "input_delay"]
+    assert found.promising({"load_dependent_friction"}) == [
+        "load_disturbance",
+        "load_dependent_friction",
+        "cogging",
+        "input_delay",
+    ]
 
 
 def test_beside_a_shaft_the_starts_of_a_wave_are_chosen_along_the_motion_of_one_body(pushed):
-    """A cog of a motor that a shaft of 20 Hz parts from the rudder: the start of the nearest period is among the few that are simulated."""
+    """A cog of a motor that a shaft of 20 Hz parts from the rudder: the start of the nearest period is among the few
+    that are simulated.
+    """
     period, shaft = 0.03, ("shaft_compliance", np.array([20.0, 0.1, 0.5, 0.2, np.inf]))
     traces = recorded([shaft, ("cogging", np.array([12.0, period, 0.4, np.inf, np.inf]))])
     model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}).with_effect(*shaft)
     run, effect = run_of(model, traces, 5.0), BY_NAME["cogging"]
     starts, targets = effect.starts(model.scales), _targets(model, run.left, traces, 1.0)[1]
-    chosen = [start[1] for start, _ in _hopeful(effect, starts, _first_order(*_sparse(run, targets, traces), effect, starts), 3)]
+    chosen = [
+        start[1]
+        for start, _ in _hopeful(effect, starts, _first_order(*_sparse(run, targets, traces), effect, starts), 3)
+    ]
     assert len(chosen) == 3 and min((start[1] for start in starts), key=lambda p: abs(1.0 / p - 1.0 / period)) in chosen
 
 
 def test_one_block_stands_out_among_bad_ones():
     misfit = np.concatenate([np.ones(150), np.full(50, 30.0)])
-    assert not stands_out(misfit, 1.0) and not stands_out(np.append(misfit, 500.0), 1.0) and stands_out(np.append(misfit, 1000.0), 1.0)
+    assert (
+        not stands_out(misfit, 1.0)
+        and not stands_out(np.append(misfit, 500.0), 1.0)
+        and stands_out(np.append(misfit, 1000.0), 1.0)
+    )
 
 
 def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
     u = np.where(T < 1.0, INPUTS["multisine"](T), 0.0)
     knock = np.array([-300.0, 2.24, 0.08, 0.0, np.inf])
     y = ReducedModel(lumped(TRUTH), [("load_disturbance", knock)]).simulate(T, u).measured
-    still = trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(9).standard_normal(T.size), name="still"), None)
-    model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}, scales=replace(pushed.fit.model.scales, recordings=1))
+    still = trace_of(
+        from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(9).standard_normal(T.size), name="still"), None
+    )
+    model = replace(
+        pushed.fit.model,
+        values={**pushed.fit.model.values, **TRUTH},
+        scales=replace(pushed.fit.model.scales, recordings=1),
+    )
     (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
     size, begin, length, record, fade = dict(begins[0].model.effects)["load_disturbance"]
-    assert size == pytest.approx(-300.0, rel=0.3) and begin == pytest.approx(2.24, abs=0.02) and length == pytest.approx(0.08, rel=0.3) and record == 0
+    assert (
+        size == pytest.approx(-300.0, rel=0.3)
+        and begin == pytest.approx(2.24, abs=0.02)
+        and length == pytest.approx(0.08, rel=0.3)
+        and record == 0
+    )
 
 
 @pytest.mark.parametrize("size, fade", [(-300.0, 0.1), (-600.0, 0.05)])
@@ -143,16 +214,28 @@ def test_a_knock_that_fades_is_found_where_it_throws_a_resting_rudder(pushed, si
     u = np.where(T < 1.0, INPUTS["multisine"](T), 0.0)
     knock = np.array([size, 2.24, np.inf, 0.0, fade])
     y = ReducedModel(lumped(TRUTH), [("load_disturbance", knock)]).simulate(T, u).measured
-    still = trace_of(from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(9).standard_normal(T.size), name="still"), None)
-    model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}, scales=replace(pushed.fit.model.scales, recordings=1))
+    still = trace_of(
+        from_arrays(T, u, y + 1.5e-4 * np.random.default_rng(9).standard_normal(T.size), name="still"), None
+    )
+    model = replace(
+        pushed.fit.model,
+        values={**pushed.fit.model.values, **TRUTH},
+        scales=replace(pushed.fit.model.scales, recordings=1),
+    )
     (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
     found = [dict(begin.model.effects)["load_disturbance"] for begin in begins]
     fading = next(p for p in found if np.isfinite(p[4]))
-    assert fading[0] == pytest.approx(size, rel=0.3) and fading[1] == pytest.approx(2.24, abs=0.02) and fading[4] == pytest.approx(fade, rel=0.3)
+    assert (
+        fading[0] == pytest.approx(size, rel=0.3)
+        and fading[1] == pytest.approx(2.24, abs=0.02)
+        and fading[4] == pytest.approx(fade, rel=0.3)
+    )
 
 
 def test_a_knock_is_tried_in_its_surroundings(pushed):
-    """What begins in the run's own state gains there what it gains in all of the recording; beside a memory all of it is simulated."""
+    """What begins in the run's own state gains there what it gains in all of the recording; beside a memory all of it
+    is simulated.
+    """
     run, trace = run_of(pushed.fit.model, pushed.traces, 5.0), pushed.traces[1]
     near = Surroundings(run, pushed.traces, 1.0)
     for moment in (0.02, 1.4, 2.95):
@@ -161,7 +244,10 @@ def test_a_knock_is_tried_in_its_surroundings(pushed):
         part, (level, without), *_ = near.of(1, moment)
         assert level == 1.0
         for some in (part, trace):
-            before, after = (float(np.sum(score(near.misfit(some, residuals_in(model, some, 1, 5.0)), 1.0))) for model in (run.model, knocked))
+            before, after = (
+                float(np.sum(score(near.misfit(some, residuals_in(model, some, 1, 5.0)), 1.0)))
+                for model in (run.model, knocked)
+            )
             assert some is trace or before == pytest.approx(without, abs=1e-9)
             gains.append(before - after)
         assert gains[0] == pytest.approx(gains[1], rel=0.02, abs=0.02) and abs(gains[0]) > 0.5
@@ -171,7 +257,10 @@ def test_a_knock_is_tried_in_its_surroundings(pushed):
 
 
 def test_a_knock_is_sought_on_to_where_it_throws_the_rudder():
-    """A shaft twists under less, which gains a little; what moves the rudder lies in a window of a sixth above its friction."""
+    """A shaft twists under less, which gains a little; what moves the rudder lies in a window of a sixth above its
+    friction.
+    """
+
     def gain(push):
         return 0.05 if push[0] < 60.0 else 9.0 if push[0] < 70.0 else -14.0
 
@@ -200,8 +289,12 @@ def test_a_knock_is_brought_nearer_within_its_bounds_and_no_longer_than_it_pays(
 def test_knocks_are_looked_for_where_a_recording_leaves_enough(pushed):
     noise = 0.9 * np.random.default_rng(1).standard_normal(sum(t.rows for t in pushed.traces))
     assert _hot(noise, pushed.traces, 1.0) == ()
-    noise[pushed.traces[0].rows + 1000:][:60] += 10.0
-    assert {(record, begin) for record, begin, _ in _hot(noise, pushed.traces, 1.0)} <= {(1, 0.75), (1, 1.0), *((1, 0.25 * k) for k in range(12))} != set()
+    noise[pushed.traces[0].rows + 1000 :][:60] += 10.0
+    assert (
+        {(record, begin) for record, begin, _ in _hot(noise, pushed.traces, 1.0)}
+        <= {(1, 0.75), (1, 1.0), *((1, 0.25 * k) for k in range(12))}
+        != set()
+    )
 
 
 def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
@@ -209,8 +302,14 @@ def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
     traces, t = [], T[::4]
     for k, name in enumerate(("multisine", "steps", "chirp")):
         u = INPUTS[name](t)
-        y = ReducedModel(lumped({**TRUTH, "tau_e": 1.1e-3}), [("inductance", np.array([2.0e-3, np.inf]))]).simulate(t, u).measured
-        traces.append(trace_of(from_arrays(t, u, y + 1.5e-4 * np.random.default_rng(k).standard_normal(t.size), name=name), None))
+        y = (
+            ReducedModel(lumped({**TRUTH, "tau_e": 1.1e-3}), [("inductance", np.array([2.0e-3, np.inf]))])
+            .simulate(t, u)
+            .measured
+        )
+        traces.append(
+            trace_of(from_arrays(t, u, y + 1.5e-4 * np.random.default_rng(k).standard_normal(t.size), name=name), None)
+        )
     start = baseline(traces, read_datasheet("table1"), True, 1)
     model = start.fit.model
     assert [f.name for f in model.layout() if model.at_bound(f)] == ["tau_e"]

@@ -1,4 +1,6 @@
-"""Frequency responses of recordings: a known system found again, noise and distortion told apart, and the gap of a model."""
+"""Frequency responses of recordings: a known system found again, noise and distortion told apart, and the gap of a
+model.
+"""
 
 from dataclasses import replace
 
@@ -26,10 +28,14 @@ def recorded(duration, *, datasheet=FREE, noise=np.radians(0.01), name="multisin
 
 
 def model(response, datasheet=FREE, **options):
-    return linearised(build_plant(datasheet, **options), RATE, SHEET.parameters["theta_0"] + 0.2).response(response.f_hz)
+    return linearised(build_plant(datasheet, **options), RATE, SHEET.parameters["theta_0"] + 0.2).response(
+        response.f_hz
+    )
 
 
-@pytest.mark.parametrize(("duration", "plant"), [(10.0, "reduced"), (10.0, "mujoco"), (15.0, "reduced"), (30.0, "reduced")])
+@pytest.mark.parametrize(
+    ("duration", "plant"), [(10.0, "reduced"), (10.0, "mujoco"), (15.0, "reduced"), (30.0, "reduced")]
+)
 def test_a_multisine_finds_the_linear_model(duration, plant):
     """The bar: 0.5 dB and 3 deg wherever the coherence is above 0.95."""
     response = frequency_response(recorded(duration, plant=plant))
@@ -47,9 +53,13 @@ def test_a_delay_that_the_model_lacks_is_a_linear_gap_at_the_top():
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize(("name", "duration"), [("chirp", 10.0), ("chirp", 4.0), ("steps", 7.0), ("steps", 4.0), ("square", 4.0)])
+@pytest.mark.parametrize(
+    ("name", "duration"), [("chirp", 10.0), ("chirp", 4.0), ("steps", 7.0), ("steps", 4.0), ("square", 4.0)]
+)
 def test_any_other_input_finds_it_too_within_its_stated_error(name, duration, seed):
-    """The multisine's bar for a sweep, steps and pulses, at every line that is told; the error is neither much smaller nor much larger than stated."""
+    """The multisine's bar for a sweep, steps and pulses, at every line that is told; the error is neither much smaller
+    nor much larger than stated.
+    """
     response = frequency_response(recorded(duration, name=name, seed=seed))
     found = gap(response, model(response))
     assert response.kind == "local" and found.lines == response.f_hz.size >= 6 and np.isnan(response.distortion).all()
@@ -65,7 +75,9 @@ def test_a_sweep_tells_a_delay_that_the_model_lacks():
 
 
 def periodic(periods, *, cubic=0.0, noise=0.0, n=2000):
-    """u and y of y = u + cubic u^3 behind a low-pass, over whole periods of a multisine with odd lines left out at random."""
+    """u and y of y = u + cubic u^3 behind a low-pass, over whole periods of a multisine with odd lines left out at
+    random.
+    """
     random = np.random.default_rng(3)
     lines = np.arange(5, 200, 6)
     t = np.arange(n)
@@ -81,7 +93,9 @@ def test_noise_and_distortion_are_told_apart():
     expected = 2 * 0.05 / np.sqrt(2000)  # the amplitude of white noise at one line of one period
     for response in (quiet, noisy):
         assert np.sqrt(np.mean(response.noise**2)) == pytest.approx(expected, rel=0.15) and response.periods == 8
-    assert np.median(noisy.distortion) > 5 * np.median(quiet.distortion) and noisy.coherence.min() < quiet.coherence.min()
+    assert (
+        np.median(noisy.distortion) > 5 * np.median(quiet.distortion) and noisy.coherence.min() < quiet.coherence.min()
+    )
 
 
 def test_the_best_linear_approximation_of_a_cube_is_its_slope_for_gaussian_motion():

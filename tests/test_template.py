@@ -29,12 +29,18 @@ def copy(tmp_path_factory):
         shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
     code = re.search(r"## Add an effect.*?```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S).group(1)
     (folder / "ers_mj" / "effects" / "eddy_brake.py").write_text(code)
-    return folder, {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), str(ROOT / "tests")]), "OPENBLAS_NUM_THREADS": "1"}
+    return folder, {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(folder), str(ROOT / "tests")]),
+        "OPENBLAS_NUM_THREADS": "1",
+    }
 
 
 def run(copy, *arguments):
     folder, environment = copy
-    return subprocess.run([sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, timeout=600
+    )
 
 
 def test_the_tests_that_every_effect_owes_find_it(copy):

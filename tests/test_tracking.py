@@ -1,4 +1,6 @@
-"""Parameters along a stream: found, followed, announced; a model that stops explaining it; text that comes in pieces; the command."""
+"""Parameters along a stream: found, followed, announced; a model that stops explaining it; text that comes in pieces;
+the command.
+"""
 
 import json
 import math
@@ -20,7 +22,9 @@ from ers_mj.tracking import EXPLAINED, HOP, OPENING, PATIENCE, SHORTEST, Tracker
 from ers_mj.watch_report import events, screen, units
 
 RATE, NOISE = 1000.0, math.radians(0.01)
-TRUTH = {k: v for k, v in read_datasheet("table1").to_lumped().items() if k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")}
+TRUTH = {
+    k: v for k, v in read_datasheet("table1").to_lumped().items() if k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
+}
 OFF = Datasheet(lumped={k: v * (1.0 if k == "theta_0" else 1.2) for k, v in TRUTH.items()})
 
 
@@ -42,7 +46,7 @@ def watched(t, u, y, piece=70, datasheet=OFF):
     head = round(OPENING * RATE)
     tracker, out = Tracker(opening(t[:head], u[:head], y[:head], datasheet, True)), []
     for k in range(0, t.size, piece):
-        out += tracker.push(t[k:k + piece], u[k:k + piece], y[k:k + piece])
+        out += tracker.push(t[k : k + piece], u[k : k + piece], y[k : k + piece])
     return out
 
 
@@ -60,7 +64,9 @@ def between(found, begin, end):
 
 def test_an_unchanged_servo_is_found_within_its_spread_and_never_flagged(life):
     calm = between(life[1], 1.0, 4.0)
-    assert len(calm) == pytest.approx(3.0 / HOP, abs=1) and all(e.misfit < EXPLAINED and not e.flag and not e.changed for e in calm)
+    assert len(calm) == pytest.approx(3.0 / HOP, abs=1) and all(
+        e.misfit < EXPLAINED and not e.flag and not e.changed for e in calm
+    )
     for name, spread in calm[-1].spread.items():
         miss = calm[-1].values[name] - TRUTH[name]
         assert abs(miss if name == "theta_0" else miss / TRUTH[name]) < 5 * spread < 0.05
@@ -104,7 +110,9 @@ def test_missing_samples_spikes_and_a_gap_in_time_are_no_change():
 def test_a_slow_drift_is_followed():
     share = 1 + 0.01 * np.arange(80) / 10
     found = watched(*stream(*((0.1, {"c_2": s * TRUTH["c_2"]}, 0.0) for s in share)))
-    assert not any(e.flag for e in found) and found[-1].values["c_2"] / TRUTH["c_2"] == pytest.approx(share[-1], abs=0.03)
+    assert not any(e.flag for e in found) and found[-1].values["c_2"] / TRUTH["c_2"] == pytest.approx(
+        share[-1], abs=0.03
+    )
 
 
 # -- text --------------------------------------------------------------------------------------------------------------
@@ -115,16 +123,29 @@ def test_lines_may_come_in_any_pieces():
     for size in (1, 7, 1000):
         stream, rows = Stream("s"), []
         for k in range(0, len(text), size):
-            rows.append(stream.feed(text[k:k + size]))
+            rows.append(stream.feed(text[k : k + size]))
         rows.append(stream.feed("\n"))
         t, u, y = (np.concatenate(column) for column in zip(*rows))
         assert t.tolist() == [0.0, 0.1, 0.2] and u.tolist() == [2.0, 2.0, 3.0]
-        assert np.degrees(y[[0, 2]]) == pytest.approx([1.5, -10.0]) and np.isnan(y[1]) and stream.units == {"t": "s", "u": "V", "y": "rad"}
+        assert (
+            np.degrees(y[[0, 2]]) == pytest.approx([1.5, -10.0])
+            and np.isnan(y[1])
+            and stream.units == {"t": "s", "u": "V", "y": "rad"}
+        )
 
 
-@pytest.mark.parametrize("body, told", [
-    ("1,2\n", "3"), ("0,1,0\n0,1,0\n", "repeats"), ("1,1,0\n0,1,0\n", "backwards"), ("0,x,0\n", "'x'"), ("0,inf,0\n", "infinite"), (",1,0\n", "missing"),
-    ("0,,0\n", "missing")])
+@pytest.mark.parametrize(
+    "body, told",
+    [
+        ("1,2\n", "3"),
+        ("0,1,0\n0,1,0\n", "repeats"),
+        ("1,1,0\n0,1,0\n", "backwards"),
+        ("0,x,0\n", "'x'"),
+        ("0,inf,0\n", "infinite"),
+        (",1,0\n", "missing"),
+        ("0,,0\n", "missing"),
+    ],
+)
 def test_rows_that_cannot_be_meant_are_refused(body, told):
     with pytest.raises(InputError, match=told):
         Stream("s").feed("t_s,u_V,theta_rad\n" + body)
@@ -135,7 +156,12 @@ def test_what_happens_is_told(life):
     for e in life[1]:
         told += events(last, e, shown)
         last = e
-    assert "friction c_2 has changed" in told[0] and "(+20 %)" in told[0] and told[1].startswith("FLAG") and told[-1] == "the model explains the stream again"
+    assert (
+        "friction c_2 has changed" in told[0]
+        and "(+20 %)" in told[0]
+        and told[1].startswith("FLAG")
+        and told[-1] == "the model explains the stream again"
+    )
     until = 1 + next(k for k, e in enumerate(life[1]) if e.flag)
     lines = screen("x.csv", life[1][:until], told, life[1][0].values, shown, 80)
     assert "does not explain" in lines[1] and any(line.startswith("  friction c_2") for line in lines)
@@ -152,7 +178,9 @@ def test_the_command_reads_a_file_once(life, tmp_path, capsys):
     (tmp_path / "s.csv").write_text(csv(life[0], slice(5500)))
     assert cli.main(["watch", str(tmp_path / "s.csv"), "--datasheet", "table1", "--once", "--json"]) == 0
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert [r["t_s"] for r in rows] == pytest.approx([SHORTEST + HOP * k for k in range(len(rows))], abs=2e-3) and "c_2" in {n for r in rows for n in r["changed"]}
+    assert [r["t_s"] for r in rows] == pytest.approx(
+        [SHORTEST + HOP * k for k in range(len(rows))], abs=2e-3
+    ) and "c_2" in {n for r in rows for n in r["changed"]}
     low, high = rows[30]["parameters"]["b"]["ci95"]
     assert low < rows[30]["parameters"]["b"]["value"] < high
 
@@ -161,8 +189,13 @@ def test_a_growing_file_is_followed_until_ctrl_c(life, tmp_path):
     file, text = tmp_path / "s.csv", csv(life[0], slice(3000))
     file.write_text(text[:1000])
     command = [sys.executable, "-m", "ers_mj", "watch", str(file), "--datasheet", "table1"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                               preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # which a shell's background job would ignore
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # which a shell's background job would ignore
     with file.open("a") as handle:
         handle.write(text[1000:])
     line = process.stdout.readline()
@@ -171,8 +204,16 @@ def test_a_growing_file_is_followed_until_ctrl_c(life, tmp_path):
     assert line.startswith("0.5 s") and "c_2" in line and process.returncode == 0 and errors == ""
 
 
-@pytest.mark.parametrize("text, told", [
-    ("", "ended after 0 s"), ("t_s,u_V,theta_rad\n0,1,0\n", "ended after 0 s"), ("t_s,u_V\n", "no output"), ("t_s,u_V,theta_rad\n0,1\n", "2 cells"), ("\0\1\n", "binary")])
+@pytest.mark.parametrize(
+    "text, told",
+    [
+        ("", "ended after 0 s"),
+        ("t_s,u_V,theta_rad\n0,1,0\n", "ended after 0 s"),
+        ("t_s,u_V\n", "no output"),
+        ("t_s,u_V,theta_rad\n0,1\n", "2 cells"),
+        ("\0\1\n", "binary"),
+    ],
+)
 def test_bad_input_is_one_sentence(text, told, tmp_path, capsys):
     (tmp_path / "s.csv").write_text(text)
     assert cli.main(["watch", str(tmp_path / "s.csv"), "--once"]) == 2

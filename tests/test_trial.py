@@ -30,13 +30,19 @@ def tried(controllers, plants, cases, conditions=Conditions(), **options):
     return {(t.controller, t.plant, t.case): t.measures for t in found}
 
 
-# -- the bars ------------------------------------------------------------------------------------------------------------
+# -- the bars
+# ------------------------------------------------------------------------------------------------------------
 
 
 def test_ftrc_settles_on_both_plants_and_survives_the_play():
     closed = tried(["ftrc"], ["reduced", "mujoco"], ["step"])
     for m in closed.values():
-        assert m.settling_time_s < 0.1 and m.overshoot_pct < 3 and m.steady_state_error_rad <= math.radians(0.01) and m.peak_u_V <= 24
+        assert (
+            m.settling_time_s < 0.1
+            and m.overshoot_pct < 3
+            and m.steady_state_error_rad <= math.radians(0.01)
+            and m.peak_u_V <= 24
+        )
     ahead, behind = (closed["ftrc", plant, "step"].settling_time_s for plant in ("reduced", "mujoco"))
     assert abs(ahead - behind) < 0.1 * ahead
     loose = tried(["ftrc"], ["mujoco"], ["step"], Conditions(gap=math.radians(0.5)))["ftrc", "mujoco", "step"]
@@ -70,17 +76,22 @@ def test_our_rival_needs_no_exact_model():
 
 
 def test_the_audited_figures():
-    """notes: literal (31) never settles; (39) rests off by its missing integral; the feed-forward makes the difference on the chirp."""
+    """notes: literal (31) never settles; (39) rests off by its missing integral; the feed-forward makes the difference
+    on the chirp.
+    """
     found = tried(list(CONTROLLERS), ["reduced"], ["step"])
     assert found["ftrc-literal", "reduced", "step"].settling_time_s is None
     assert math.degrees(found["hinf", "reduced", "step"].steady_state_error_rad) == pytest.approx(0.232, abs=0.005)
     assert found["pid-ff", "reduced", "step"].settling_time_s < found["pid", "reduced", "step"].settling_time_s < 0.085
-    chirp = tried(["ftrc", "pid", "pid-ff"], ["reduced"], ["chirp"], Conditions(amplitude=math.radians(3.0), rate_hz=5000.0))
+    chirp = tried(
+        ["ftrc", "pid", "pid-ff"], ["reduced"], ["chirp"], Conditions(amplitude=math.radians(3.0), rate_hz=5000.0)
+    )
     rmse = {law: m.rmse_rad for (law, _, _), m in chirp.items()}
     assert rmse["ftrc"] < 0.3 * rmse["pid"] and rmse["pid-ff"] == pytest.approx(rmse["ftrc"], rel=0.1)
 
 
-# -- conditions of the loop ------------------------------------------------------------------------------------------------
+# -- conditions of the loop
+# ------------------------------------------------------------------------------------------------
 
 
 def test_the_same_seed_gives_the_same_run_and_another_another():
@@ -88,18 +99,32 @@ def test_the_same_seed_gives_the_same_run_and_another_another():
     assert np.array_equal(runs[0], runs[1]) and not np.array_equal(runs[0], runs[2])
 
 
-@pytest.mark.parametrize("change", [{"u_max": 12.0}, {"effects": (("input_delay", {"T_d": 2e-3}),)}, {"inductance": True},
-                                    {"effects": (("sensor_lag", {"T": 1e-3}),)}, {"effects": (("stribeck", {"dF_s": 0.3, "v_s": 0.5}),)}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"u_max": 12.0},
+        {"effects": (("input_delay", {"T_d": 2e-3}),)},
+        {"inductance": True},
+        {"effects": (("sensor_lag", {"T": 1e-3}),)},
+        {"effects": (("stribeck", {"dF_s": 0.3, "v_s": 0.5}),)},
+    ],
+)
 def test_what_hampers_the_loop_slows_it(change):
     settings = {"rate_hz": 1000.0, "amplitude": math.radians(10.0 if "u_max" in change else 3.0)}
-    plain, worse = (tried(["time-optimal"], ["reduced"], ["chirp"], Conditions(**settings, **more))["time-optimal", "reduced", "chirp"]
-                    for more in ({}, change))
+    plain, worse = (
+        tried(["time-optimal"], ["reduced"], ["chirp"], Conditions(**settings, **more))[
+            "time-optimal", "reduced", "chirp"
+        ]
+        for more in ({}, change)
+    )
     assert worse.rmse_rad > 1.1 * plain.rmse_rad and worse.stable
 
 
 def test_a_loop_that_runs_away_is_given_up():
     design = replace(SHEET, parameters={}, lumped={**SHEET.to_lumped(), "b": -SERVO.b})
-    design = replace(design, lumped={k: v for k, v in design.lumped.items() if k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")})
+    design = replace(
+        design, lumped={k: v for k, v in design.lumped.items() if k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")}
+    )
     trial = try_out(SHEET, ["pid"], ["reduced"], ["step"], Conditions(rate_hz=1000.0), design=design)[0]
     assert not trial.measures.stable and trial.measures.rmse_rad is None and trial.as_document()["stable"] is False
     assert "no law" in headline([trial]) and claims([trial]) == []
@@ -108,15 +133,21 @@ def test_a_loop_that_runs_away_is_given_up():
 def test_the_sensor_reads_as_a_recording_would():
     t = np.arange(400) / 1000.0
     theta = np.sin(20 * t)
-    for name, values in (("sensor_lag", {"T": 0.004}), ("sensor_lag", {"T": 0.002, "T_d": 0.0053}), ("sensor_quantisation", {"step": 0.01}), ("sensor_dropout", {"rate": 20.0, "duration": 0.01}),
-                         ("sensor_nonlinearity", {"A": 0.02, "period": 0.3, "phase": 0.1})):
-        (_, p), = kernel_effects([(name, values)])
+    for name, values in (
+        ("sensor_lag", {"T": 0.004}),
+        ("sensor_lag", {"T": 0.002, "T_d": 0.0053}),
+        ("sensor_quantisation", {"step": 0.01}),
+        ("sensor_dropout", {"rate": 20.0, "duration": 0.01}),
+        ("sensor_nonlinearity", {"A": 0.02, "period": 0.3, "phase": 0.1}),
+    ):
+        ((_, p),) = kernel_effects([(name, values)])
         sensor = Sensor([(name, p)], t)
         one_by_one = np.array([sensor.read(x) for x in theta])
         np.testing.assert_allclose(one_by_one, BY_NAME[name].measure(p, t, theta), atol=1e-5, err_msg=name)
 
 
-# -- measures --------------------------------------------------------------------------------------------------------------
+# -- measures
+# --------------------------------------------------------------------------------------------------------------
 
 
 def run_of(theta, reference, jumps=(), u=None, drive=0.0):
@@ -154,7 +185,8 @@ def test_energy_is_voltage_times_current():
     assert energy(run, 10.0) == pytest.approx(2.0 * 3.0 * 1.0) and energy(run, None) is None
 
 
-# -- references --------------------------------------------------------------------------------------------------------------
+# -- references
+# --------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -187,30 +219,54 @@ def test_a_reference_from_a_file_has_causal_derivatives_and_its_jumps(tmp_path):
 
 
 def test_what_a_reference_needs_tells_whether_it_can_be_followed():
-    assert needed(named("chirp", math.radians(10), SERVO.theta_0, 1000.0), SERVO) > 24 > needed(named("chirp", math.radians(3), SERVO.theta_0, 1000.0), SERVO)
+    assert (
+        needed(named("chirp", math.radians(10), SERVO.theta_0, 1000.0), SERVO)
+        > 24
+        > needed(named("chirp", math.radians(3), SERVO.theta_0, 1000.0), SERVO)
+    )
 
 
-# -- the command ---------------------------------------------------------------------------------------------------------------
+# -- the command
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def test_json_has_the_contracts_keys_and_the_defaults(capsys):
     assert cli.main(["trial", "--controller", "ftrc,hinf", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert [(t["controller"], t["plant"], t["case"]) for t in told["trials"]] == [("ftrc", "reduced", "step"), ("hinf", "reduced", "step")]
+    assert [(t["controller"], t["plant"], t["case"]) for t in told["trials"]] == [
+        ("ftrc", "reduced", "step"),
+        ("hinf", "reduced", "step"),
+    ]
     keys = {"settling_time_s", "overshoot_pct", "steady_state_error_rad", "rmse_rad", "energy_J", "peak_u_V"}
     assert all(keys <= t.keys() for t in told["trials"]) and told["trials"][1]["settling_time_s"] is None
     assert told["trials"][0]["settling_time_s"] < 0.1 and told["conditions"]["rate_hz"] == 10_000.0
-    assert told["conditions"]["amplitude_rad"] == pytest.approx(math.radians(10)) and told["conditions"]["u_max_V"] == 24.0
+    assert (
+        told["conditions"]["amplitude_rad"] == pytest.approx(math.radians(10)) and told["conditions"]["u_max_V"] == 24.0
+    )
 
 
 def test_a_table_and_a_page_are_written(tmp_path, capsys):
-    arguments = ["trial", "--case", "square,chirp", "--rate-hz", "500", "--noise-deg", "0.01", "--out", str(tmp_path / "out")]
+    arguments = [
+        "trial",
+        "--case",
+        "square,chirp",
+        "--rate-hz",
+        "500",
+        "--noise-deg",
+        "0.01",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert cli.main(arguments) == 0
     out = capsys.readouterr().out
     assert "time-optimal" in out and " V, 24 V are there" in out and "report.html" in out
     page = read((tmp_path / "out" / "report.html").read_text())
     words = " ".join(page.words)
-    assert "The paper's claims" in words and "Square (Case 1), reduced plant" in words and len(page.ids) == len(set(page.ids))
+    assert (
+        "The paper's claims" in words
+        and "Square (Case 1), reduced plant" in words
+        and len(page.ids) == len(set(page.ids))
+    )
     assert not [x for x in page.references if not x.startswith("#")]
     assert json.loads((tmp_path / "out" / "trials.json").read_text())["notes"]
     assert cli.main(arguments) == 2 and "--force" in capsys.readouterr().err
@@ -219,31 +275,74 @@ def test_a_table_and_a_page_are_written(tmp_path, capsys):
 def test_a_model_with_its_effects_is_a_plant_and_a_design(tmp_path, capsys):
     model = tmp_path / "model.toml"
     write_model(model, replace(SHEET, effects=(("stribeck", {"dF_s": 0.1, "v_s": 0.2}),)))
-    assert cli.main(["trial", str(model), "--design", "table1", "--controller", "ftrc", "--plant", "reduced,mujoco", "--rate-hz", "1000", "--json"]) == 0
+    assert (
+        cli.main(
+            [
+                "trial",
+                str(model),
+                "--design",
+                "table1",
+                "--controller",
+                "ftrc",
+                "--plant",
+                "reduced,mujoco",
+                "--rate-hz",
+                "1000",
+                "--json",
+            ]
+        )
+        == 0
+    )
     told = json.loads(capsys.readouterr().out)
     errors = [t["rmse_rad"] for t in told["trials"]]
-    assert errors[0] == pytest.approx(errors[1], rel=0.02) and told["datasheet"] == "model.toml" and told["design"] == "table1"
+    assert (
+        errors[0] == pytest.approx(errors[1], rel=0.02)
+        and told["datasheet"] == "model.toml"
+        and told["design"] == "table1"
+    )
 
 
-@pytest.mark.parametrize(("arguments", "says"), [
-    (["--controller", "lqr"], "there is no 'lqr'; there are ftrc"), (["--plant", "adams"], "there are reduced, mujoco"),
-    (["--case", "sine"], "there is no 'sine'; there are step, square, ramp, chirp"), (["--case", "missing.csv"], "there is no such file"),
-    (["--controller", "pid,pid"], "twice"), (["--umax-V", "0"], "not above 0"), (["--rate-hz", "20"], "100 to"), (["--effect", "magic:x=1"], "no effect"),
-    (["--linkage", "wheel"], "wheel"), (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice"), (["--gains", "q=2"], "outside"),
-    (["--delay-ms", "1", "--effect", "input_delay:T_d=0.001"], "twice"), (["nothing.toml"], "no such file"), (["--amplitude-deg", "nan"], "finite"),
-    (["--amplitude-deg", "1e9"], "beyond 360"), (["--delay-ms", "1e9"], "samples at 10000 Hz"), (["--pid", "P=1,P=2"], "gives P twice"),
-    (["--gains", "k_1=1,k_1=2"], "gives k_1 twice"), (["--gains", "k_1=1e400"], "beyond 1e+09")])
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--controller", "lqr"], "there is no 'lqr'; there are ftrc"),
+        (["--plant", "adams"], "there are reduced, mujoco"),
+        (["--case", "sine"], "there is no 'sine'; there are step, square, ramp, chirp"),
+        (["--case", "missing.csv"], "there is no such file"),
+        (["--controller", "pid,pid"], "twice"),
+        (["--umax-V", "0"], "not above 0"),
+        (["--rate-hz", "20"], "100 to"),
+        (["--effect", "magic:x=1"], "no effect"),
+        (["--linkage", "wheel"], "wheel"),
+        (["--gap", "0.5", "--effect", "backlash:gap=0.01"], "twice"),
+        (["--gains", "q=2"], "outside"),
+        (["--delay-ms", "1", "--effect", "input_delay:T_d=0.001"], "twice"),
+        (["nothing.toml"], "no such file"),
+        (["--amplitude-deg", "nan"], "finite"),
+        (["--amplitude-deg", "1e9"], "beyond 360"),
+        (["--delay-ms", "1e9"], "samples at 10000 Hz"),
+        (["--pid", "P=1,P=2"], "gives P twice"),
+        (["--gains", "k_1=1,k_1=2"], "gives k_1 twice"),
+        (["--gains", "k_1=1e400"], "beyond 1e+09"),
+    ],
+)
 def test_bad_input_is_one_sentence_and_code_2(arguments, says, capsys):
     assert cli.main(["trial", "--json", *arguments]) == 2
     error = capsys.readouterr().err
     assert says in error and error.count("\n") == 1
 
 
-@pytest.mark.parametrize(("text", "says"), [("t_s,x\n0,1\n", "the columns are t_s, x"), ("t_s,theta_ref_deg\n0,1\n1,2\n", "100 to"),
-                                            ("t_s,theta_ref_deg\n" + "".join(f"{k},{'nan' if k == 7 else k}\n" for k in range(200)), "data row 8"),
-                                            ("t_s,theta_ref_deg\n" + "".join(f"{k * k},1\n" for k in range(200)), "not evenly spaced"),
-                                            ("t_s,theta_ref_deg\n" + "".join(f"{k}e-9,1\n" for k in range(200)), "1e-06 s or more"),
-                                            ("t_s,theta_ref_rad\n" + "".join(f"{k},1e9\n" for k in range(200)), "1000 rad at most")])
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("t_s,x\n0,1\n", "the columns are t_s, x"),
+        ("t_s,theta_ref_deg\n0,1\n1,2\n", "100 to"),
+        ("t_s,theta_ref_deg\n" + "".join(f"{k},{'nan' if k == 7 else k}\n" for k in range(200)), "data row 8"),
+        ("t_s,theta_ref_deg\n" + "".join(f"{k * k},1\n" for k in range(200)), "not evenly spaced"),
+        ("t_s,theta_ref_deg\n" + "".join(f"{k}e-9,1\n" for k in range(200)), "1e-06 s or more"),
+        ("t_s,theta_ref_rad\n" + "".join(f"{k},1e9\n" for k in range(200)), "1000 rad at most"),
+    ],
+)
 def test_a_bad_reference_is_refused(text, says, tmp_path, capsys):
     file = tmp_path / "bad.csv"
     file.write_text(text)

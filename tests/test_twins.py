@@ -13,12 +13,24 @@ from test_reduced import SCALES
 
 TOLERANCE = 0.05  # of the effect's own size
 VISIBLE = 0.2  # [deg] RMS
-SIZES = {  # where the first start of an effect is too small to be seen beside the two plants' own difference, or has not all of its terms
-    "inductance": [0.008, 300.0], "input_delay": [0.0043], "backlash": [0.012, 0.6, 0.2, 120.0, 0.2], "stribeck": [40.0, 0.6, 1.4, np.inf],
-    "end_stop": [0.15, 0.35, 100.0, 0.3], "sensor_quantisation": [0.0213], "voltage_saturation": [5.0, 8.0],
-    "load_disturbance": [150.0, 0.6, 0.5, 0.0, np.inf], "sensor_dropout": [4.0, 0.08], "sensor_lag": [0.01, 0.0103],
-    "cogging": [22.0, 0.125, 0.0, 0.3, 1.0], "sensor_nonlinearity": [0.2, 0.1, np.inf, np.inf, np.inf],
-    "shaft_compliance": [12.0, 0.1, 0.6, 0.2, 0.03], "torque_saturation": [0.5, 24.0], "running_in": [0.5, 0.5],
+# where the first start of an effect is too small to be seen beside the two plants' own difference, or has not all of
+# its terms
+SIZES = {
+    "inductance": [0.008, 300.0],
+    "input_delay": [0.0043],
+    "backlash": [0.012, 0.6, 0.2, 120.0, 0.2],
+    "stribeck": [40.0, 0.6, 1.4, np.inf],
+    "end_stop": [0.15, 0.35, 100.0, 0.3],
+    "sensor_quantisation": [0.0213],
+    "voltage_saturation": [5.0, 8.0],
+    "load_disturbance": [150.0, 0.6, 0.5, 0.0, np.inf],
+    "sensor_dropout": [4.0, 0.08],
+    "sensor_lag": [0.01, 0.0103],
+    "cogging": [22.0, 0.125, 0.0, 0.3, 1.0],
+    "sensor_nonlinearity": [0.2, 0.1, np.inf, np.inf, np.inf],
+    "shaft_compliance": [12.0, 0.1, 0.6, 0.2, 0.03],
+    "torque_saturation": [0.5, 24.0],
+    "running_in": [0.5, 0.5],
     "uneven_damping": [5.0, 3.0, 0.3, np.inf, np.inf, np.inf],
 }
 
@@ -45,8 +57,19 @@ def test_law_and_twin_agree(effect, road):
 
 
 def test_several_effects_at_once_agree():
-    chosen = [(e.name, values(e)) for e in EFFECTS if e.name in (
-        "voltage_saturation", "quadratic_drag", "asymmetric_friction", "load_dependent_friction", "gravity_imbalance", "end_stop")]
+    chosen = [
+        (e.name, values(e))
+        for e in EFFECTS
+        if e.name
+        in (
+            "voltage_saturation",
+            "quadratic_drag",
+            "asymmetric_friction",
+            "load_dependent_friction",
+            "gravity_imbalance",
+            "end_stop",
+        )
+    ]
     u = INPUTS["multisine"](T)
     law, without = ReducedModel(EQ_1, chosen).simulate(T, u), ReducedModel(EQ_1).simulate(T, u)
     twin = MechanicalPlant(EQ_1, chosen, parameters=SHEET.parameters).simulate(T, u)
@@ -79,12 +102,27 @@ def plain_form(name, p):
     return [np.inf if some in gone else v for some, v in zip(names, p, strict=True)]
 
 
-@pytest.mark.parametrize(("name", "p"), [("presliding", [0.005, 0.1, np.inf, 1.5]), ("presliding", [0.005, 0.1, np.inf, 2.0]), ("presliding", [0.02, 0.1, np.inf, 0.7]),
-                                         ("current_limit", [80.0, 0.3]), ("inductance", [0.008, 60.0]), ("hinge_moment_cubic", [300.0, 0.2]), ("quadratic_drag", [1.0, 2.6]),
-                                         ("asymmetric_friction", [30.0, 0.0, 0.2, 0.5]), ("stribeck", [80.0, 0.6, 2.0, 0.5]), ("load_disturbance", [250.0, 0.6, 0.5, 0.0, 0.1]), ("load_dependent_friction", [0.3, 60.0]),
-                                         ("periodic_gust", [40.0, 1.3, 0.4, 0.3, 0.5, 0.4, 1.0])])
+@pytest.mark.parametrize(
+    ("name", "p"),
+    [
+        ("presliding", [0.005, 0.1, np.inf, 1.5]),
+        ("presliding", [0.005, 0.1, np.inf, 2.0]),
+        ("presliding", [0.02, 0.1, np.inf, 0.7]),
+        ("current_limit", [80.0, 0.3]),
+        ("inductance", [0.008, 60.0]),
+        ("hinge_moment_cubic", [300.0, 0.2]),
+        ("quadratic_drag", [1.0, 2.6]),
+        ("asymmetric_friction", [30.0, 0.0, 0.2, 0.5]),
+        ("stribeck", [80.0, 0.6, 2.0, 0.5]),
+        ("load_disturbance", [250.0, 0.6, 0.5, 0.0, 0.1]),
+        ("load_dependent_friction", [0.3, 60.0]),
+        ("periodic_gust", [40.0, 1.3, 0.4, 0.3, 0.5, 0.4, 1.0]),
+    ],
+)
 def test_another_form_agrees(name, p):
-    """What the last number, absent in the plain form, makes of an effect, is in the twin as well: a bristle's exponent, what flows beyond a limit."""
+    """What the last number, absent in the plain form, makes of an effect, is in the twin as well: a bristle's exponent,
+    what flows beyond a limit.
+    """
     u = INPUTS["multisine"](T)
     law, plain = (ReducedModel(EQ_5, [(name, np.array(some))]).simulate(T, u) for some in (p, plain_form(name, p)))
     twin = MechanicalPlant(EQ_5, [(name, np.array(p))], parameters=SHEET.parameters).simulate(T, u)
@@ -95,7 +133,10 @@ def test_another_form_agrees(name, p):
 
 def test_a_shaft_beside_a_play_softens_its_contact():
     """Both at once are one play with the shaft's spring, in either plant and whichever is named first."""
-    both = [("backlash", np.array([0.012, 0.6, 0.2, 120.0, 0.2])), ("shaft_compliance", np.array([20.0, 0.2, 0.6, 0.2, np.inf]))]
+    both = [
+        ("backlash", np.array([0.012, 0.6, 0.2, 120.0, 0.2])),
+        ("shaft_compliance", np.array([20.0, 0.2, 0.6, 0.2, np.inf])),
+    ]
     u = INPUTS["multisine"](T)
     law, stiff = ReducedModel(EQ_5, both).simulate(T, u), ReducedModel(EQ_5, both[:1]).simulate(T, u)
     twin = MechanicalPlant(EQ_5, both, parameters=SHEET.parameters).simulate(T, u)
@@ -104,7 +145,9 @@ def test_a_shaft_beside_a_play_softens_its_contact():
     assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(T, u).theta - law.theta) < 1e-9
 
 
-@pytest.mark.parametrize("second", [("shaft_compliance", [25.0, 0.1, 0.6, 0.2, 0.02]), ("backlash", [0.012, 0.6, 0.2, 120.0, 0.2])])
+@pytest.mark.parametrize(
+    "second", [("shaft_compliance", [25.0, 0.1, 0.6, 0.2, 0.02]), ("backlash", [0.012, 0.6, 0.2, 120.0, 0.2])]
+)
 @pytest.mark.parametrize("bristle", [[0.005, 0.3, np.inf, np.inf], [0.01, 0.3, 1.0, 1.5]])
 def test_two_bodies_beside_a_bristle_agree(second, bristle):
     """What the bristle changes beside a play or a shaft is the same in either plant, whichever is named first."""
@@ -117,10 +160,23 @@ def test_two_bodies_beside_a_bristle_agree(second, bristle):
     assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(T, u).theta - law.theta) < 1e-9
 
 
-@pytest.mark.parametrize("name", ["cogging", "supply_sag", "thermal_drift", "variable_ratio", "load_dependent_friction", "stribeck", "position_dependent_friction"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "cogging",
+        "supply_sag",
+        "thermal_drift",
+        "variable_ratio",
+        "load_dependent_friction",
+        "stribeck",
+        "position_dependent_friction",
+    ],
+)
 @pytest.mark.parametrize("road", ["rudder", "lumped"])
 def test_a_law_acts_on_its_own_body_in_either_plant(name, road):
-    """Beside a soft shaft a drive's law acts on the motor, at its own angle and speed, and a friction on each body by its share."""
+    """Beside a soft shaft a drive's law acts on the motor, at its own angle and speed, and a friction on each body by
+    its share.
+    """
     both = [("shaft_compliance", np.array([12.0, 0.1, 0.6, 0.4, np.inf])), (name, values(BY_NAME[name]))]
     u = INPUTS["steps" if BY_NAME[name].friction else "multisine"](T)
     law, plain = ReducedModel(EQ_1, both).simulate(T, u), ReducedModel(EQ_1, both[:1]).simulate(T, u)
@@ -130,7 +186,9 @@ def test_a_law_acts_on_its_own_body_in_either_plant(name, road):
 
 
 def test_a_shaft_beside_a_play_does_not_harden():
-    shaft, play = (lambda c: BY_NAME["shaft_compliance"].coefficients(np.array([20.0, 0.2, 0.6, 0.2, 0.01]), c),
-                   lambda c: BY_NAME["backlash"].coefficients(np.array([0.012, 0.6, 0.2, 120.0, 0.2]), c))
+    shaft, play = (
+        lambda c: BY_NAME["shaft_compliance"].coefficients(np.array([20.0, 0.2, 0.6, 0.2, 0.01]), c),
+        lambda c: BY_NAME["backlash"].coefficients(np.array([0.012, 0.6, 0.2, 120.0, 0.2]), c),
+    )
     assert shaft(EQ_5).harden == pytest.approx(1e4)
     assert shaft(play(EQ_5)).harden == play(shaft(EQ_5)).harden == shaft(rigid_play(EQ_5, 0.01)).harden == 0.0

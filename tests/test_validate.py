@@ -15,13 +15,24 @@ from ers_mj.validation_report import validation_page
 from ers_mj.validity import as_document, called, degrees, departures, headline
 
 SHEET, HALF = read_datasheet("table1"), float(np.radians(0.5))
-PLAIN, PLAY, ROD, COIL = Condition(0.0, "constant", False), Condition(HALF, "constant", False), Condition(0.0, "rod", False), Condition(0.0, "constant", True)
+PLAIN, PLAY, ROD, COIL = (
+    Condition(0.0, "constant", False),
+    Condition(HALF, "constant", False),
+    Condition(0.0, "rod", False),
+    Condition(0.0, "constant", True),
+)
 
 
 def small_maps(patch) -> None:
     """Maps of four cells, half a second each."""
-    for name, value in {"AMPLITUDES": (1.2, 1.6), "FREQUENCIES_HZ": (2.0, 8.0), "SINE_S": 0.5, "PLAY_S": 0.3, "MAP_GAPS_DEG": (0.0, 0.5),
-                        "MAP_L_FACTORS": (0.0, 1.0)}.items():
+    for name, value in {
+        "AMPLITUDES": (1.2, 1.6),
+        "FREQUENCIES_HZ": (2.0, 8.0),
+        "SINE_S": 0.5,
+        "PLAY_S": 0.3,
+        "MAP_GAPS_DEG": (0.0, 0.5),
+        "MAP_L_FACTORS": (0.0, 1.0),
+    }.items():
         patch.setattr(validation, name, value)
 
 
@@ -44,7 +55,9 @@ def case(error: np.ndarray, angle: np.ndarray, condition: Condition = ROD) -> Ca
 
 def test_without_play_and_rod_the_reduced_model_is_mujocos():
     found = validate(SHEET, (0.0,), ("constant",), maps=False)
-    assert [(c.input, c.condition.inductance) for c in found.cases] == [(name, on) for on in (False, True) for name in INPUTS]
+    assert [(c.input, c.condition.inductance) for c in found.cases] == [
+        (name, on) for on in (False, True) for name in INPUTS
+    ]
     for each in found.cases:
         assert np.degrees(each.rms) <= (0.02 if each.condition.inductance else 0.01), each.input
         assert np.degrees(each.motion) > 2 and each.t.size == 10_000
@@ -57,7 +70,11 @@ def test_the_play_is_what_is_missing(short):
         else:
             assert each.with_play is None
     steps = {c.condition: c for c in short.cases if c.input == "steps"}
-    assert np.degrees(steps[PLAY].rms) > 0.1 and np.degrees(steps[ROD].rms) > 1 and np.degrees(rms(steps[COIL].error_eq_5)) > 0.05
+    assert (
+        np.degrees(steps[PLAY].rms) > 0.1
+        and np.degrees(steps[ROD].rms) > 1
+        and np.degrees(rms(steps[COIL].error_eq_5)) > 0.05
+    )
     assert steps[ROD].ratio[1] == pytest.approx(22.26) and min(steps[ROD].ratio) < 21
     assert steps[PLAIN].ratio == pytest.approx((22.26,) * 3)
 
@@ -71,7 +88,8 @@ def test_the_document_has_the_contracts_keys_and_every_combination(short):
     keys = {"input", "gap_rad", "linkage", "inductance", "rms_rad", "max_rad"}
     assert all(keys <= entry.keys() and entry["max_rad"] >= entry["rms_rad"] > 0 for entry in document["cases"])
     assert {(e["gap_rad"], e["linkage"], e["inductance"]) for e in document["cases"]} == {
-        (gap, linkage, on) for gap in (0.0, HALF) for linkage in ("constant", "rod") for on in (False, True)}
+        (gap, linkage, on) for gap in (0.0, HALF) for linkage in ("constant", "rod") for on in (False, True)
+    }
     assert np.shape(document["maps"]["play"]["rms_rad"]) == (2, 2) and len(document["maps"]["sines"]) == 3
 
 
@@ -83,14 +101,18 @@ def test_sentences_carry_the_numbers_of_the_cases(short):
         assert f"is off by {worst} on the {departure.worst.input}" in departure.findings[0].sentence
         assert f"by up to {worst} ({departure.worst.input})" in headline(short)
         assert {f.axis for f in departure.findings} == {"size", "reason", "angle", "rest", "amplitude", "frequency"}
-        assert all(0 <= x <= 1 for f in departure.findings for x in (f.share_of_error, f.share_of_time) if x is not None)
+        assert all(
+            0 <= x <= 1 for f in departure.findings for x in (f.share_of_error, f.share_of_time) if x is not None
+        )
     assert "22.3 at zero" in found[1].findings[1].sentence and "L/R = 1.03 ms" in found[2].findings[1].sentence
 
 
 def test_an_angle_is_named_where_the_error_lives_and_only_there():
     angle = np.radians(40 * np.sin(np.linspace(0, 20, 4000)))
-    for error, words in ((np.where(np.abs(angle) > np.radians(25), 0.01, 0.0), "100 % of the squared error lies beyond 25° from θ₀"),
-                         (np.full(angle.size, 0.01), "Spread over the travel")):
+    for error, words in (
+        (np.where(np.abs(angle) > np.radians(25), 0.01, 0.0), "100 % of the squared error lies beyond 25° from θ₀"),
+        (np.full(angle.size, 0.01), "Spread over the travel"),
+    ):
         found = departures(Validation((case(error, angle),), {"b": 80.0, "theta_0": 0.0}))
         (said,) = [f for f in found[0].findings if f.axis == "angle"]
         assert said.sentence.startswith(words)
@@ -100,7 +122,11 @@ def test_rest_is_told_from_motion():
     angle = np.concatenate([np.zeros(1000), np.linspace(0, 1, 1000)])
     error = np.concatenate([np.full(1000, 0.02), np.zeros(1000)])
     (said,) = [f for f in departures(Validation((case(error, angle),), {"b": 80.0}))[0].findings if f.axis == "rest"]
-    assert said.sentence.startswith("It persists at rest") and said.share_of_error > 0.99 and said.share_of_time == pytest.approx(0.5, abs=0.01)
+    assert (
+        said.sentence.startswith("It persists at rest")
+        and said.share_of_error > 0.99
+        and said.share_of_time == pytest.approx(0.5, abs=0.01)
+    )
 
 
 def test_conditions_in_words_and_the_maps_they_get():
@@ -157,14 +183,17 @@ def asked(short, tmp_path, monkeypatch):
     return calls
 
 
-@pytest.mark.parametrize(("argv", "conditions"), [
-    ("", ((0.0, HALF), ("constant", "rod"), (False, True))),
-    ("--gap 0.5", ((HALF,), ("constant",), (False,))),
-    ("--gap 0,0.5", ((0.0, HALF), ("constant",), (False,))),
-    ("--linkage rod,constant", ((0.0,), ("rod", "constant"), (False,))),
-    ("--inductance on", ((0.0,), ("constant",), (True,))),
-    ("--gap 0 --linkage constant --inductance off,on", ((0.0,), ("constant",), (False, True))),
-])
+@pytest.mark.parametrize(
+    ("argv", "conditions"),
+    [
+        ("", ((0.0, HALF), ("constant", "rod"), (False, True))),
+        ("--gap 0.5", ((HALF,), ("constant",), (False,))),
+        ("--gap 0,0.5", ((0.0, HALF), ("constant",), (False,))),
+        ("--linkage rod,constant", ((0.0,), ("rod", "constant"), (False,))),
+        ("--inductance on", ((0.0,), ("constant",), (True,))),
+        ("--gap 0 --linkage constant --inductance off,on", ((0.0,), ("constant",), (False, True))),
+    ],
+)
 def test_with_no_option_every_combination_else_the_defaults(argv, conditions, asked, capsys, tmp_path):
     assert cli.main(["validate", *argv.split(), "--json", "--jobs", "1", "--no-maps"]) == 0
     assert asked[0][:3] == conditions and asked[0][3]["maps"] is False and asked[0][3]["jobs"] == 1

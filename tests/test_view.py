@@ -45,13 +45,24 @@ def place(tmp_path, monkeypatch):
     """A folder with one model of every kind, a recording, and files that are none."""
     monkeypatch.chdir(tmp_path)
     write_model("play.toml", PLAY)
-    write_model("lumped.toml", Datasheet(lumped={"a_1": 27.0, "a_2": 70.0, "b": -90.0, "c_1": 129.0, "c_2": 105.0, "theta_0": 0.26}))
+    write_model(
+        "lumped.toml",
+        Datasheet(lumped={"a_1": 27.0, "a_2": 70.0, "b": -90.0, "c_1": 129.0, "c_2": 105.0, "theta_0": 0.26}),
+    )
     (tmp_path / "plant.xml").write_text(plant_of(PLAY).xml())
     write_recording("run.csv", {"t_s": T, "u_V": 4 * np.sin(20 * T), "theta_rad": 0.3 + 0.2 * np.sin(20 * T)})
     write_recording("slide.csv", {"t_s": T, "u_V": 4 * np.sin(20 * T), "x_m": 0.02 * np.sin(20 * T)})
-    for name, text in {"cut.xml": "<mujoco><body>", "robot.xml": "<robot/>", "words.xml": "hello", "empty.xml": "",
-                       "odd.xml": "<mujoco><magic/></mujoco>", "still.xml": "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>",
-                       "kept.png": "kept", "strange.toml": "[parameters]\nJJ = 1\n", "no_b.toml": "[parameters]\nk_s = 1\n"}.items():
+    for name, text in {
+        "cut.xml": "<mujoco><body>",
+        "robot.xml": "<robot/>",
+        "words.xml": "hello",
+        "empty.xml": "",
+        "odd.xml": "<mujoco><magic/></mujoco>",
+        "still.xml": "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>",
+        "kept.png": "kept",
+        "strange.toml": "[parameters]\nJJ = 1\n",
+        "no_b.toml": "[parameters]\nk_s = 1\n",
+    }.items():
         (tmp_path / name).write_text(text)
     return tmp_path
 
@@ -66,8 +77,17 @@ def pictures(path) -> list[np.ndarray]:
 
 
 @draws
-@pytest.mark.parametrize("model", ["table1", "table1 --linkage rod --gap 1", "play.toml", "lumped.toml", "plant.xml",
-                                   *(str(mjcf_folder() / f"{name}.xml") for name in ("scene", "rudder_rod", "rudder_constant"))])
+@pytest.mark.parametrize(
+    "model",
+    [
+        "table1",
+        "table1 --linkage rod --gap 1",
+        "play.toml",
+        "lumped.toml",
+        "plant.xml",
+        *(str(mjcf_folder() / f"{name}.xml") for name in ("scene", "rudder_rod", "rudder_constant")),
+    ],
+)
 def test_every_model_is_drawn_still_and_moving(model, place, capsys):
     assert cli.main(f"view {model} --render still.png --width 96 --json".split()) == 0
     assert json.loads(capsys.readouterr().out)["frames"] == 1
@@ -80,7 +100,9 @@ def test_every_model_is_drawn_still_and_moving(model, place, capsys):
 
 
 @draws
-@pytest.mark.parametrize("argv", ["play.toml --replay run.csv", "plant.xml --replay run.csv", "lumped.toml --replay slide.csv"])
+@pytest.mark.parametrize(
+    "argv", ["play.toml --replay run.csv", "plant.xml --replay run.csv", "lumped.toml --replay slide.csv"]
+)
 def test_a_recording_is_replayed(argv, place, capsys):
     assert cli.main(f"view {argv} --render film.gif {SMALL}".split()) == 0
     assert len(pictures("film.gif")) == 4
@@ -94,8 +116,9 @@ def test_the_ghost_stands_where_the_measurement_is():
     """A ghost at the simulated angle covers the rudder, one elsewhere adds a second rudder."""
     film = posed(plant_of(SHEET), np.zeros(1), np.array([0.2]))
     with Painter(film.model, 160, 120) as painter:
-        plain, same, other, none = (painter.draw(film.qpos[0], measured).astype(int) for measured in
-                                    (None, 0.2, -0.4, np.nan))
+        plain, same, other, none = (
+            painter.draw(film.qpos[0], measured).astype(int) for measured in (None, 0.2, -0.4, np.nan)
+        )
     changed = [(np.abs(x - plain).max(axis=2) > 20) for x in (same, other, none)]
     assert changed[2].sum() == 0 < changed[0].sum()
     assert (changed[1] & ~changed[0]).sum() > 200
@@ -116,7 +139,10 @@ def test_a_recording_starts_where_it_was_measured():
     assert film.theta[0] == pytest.approx(0.5) and film.measured[-1] == pytest.approx(y[-1])
 
 
-@pytest.mark.parametrize("sheet", [SHEET, Datasheet(lumped={"a_1": 27.0, "a_2": 70.0, "b": 90.0, "c_1": 129.0, "c_2": 105.0, "theta_0": 0.2})])
+@pytest.mark.parametrize(
+    "sheet",
+    [SHEET, Datasheet(lumped={"a_1": 27.0, "a_2": 70.0, "b": 90.0, "c_1": 129.0, "c_2": 105.0, "theta_0": 0.2})],
+)
 def test_a_plant_file_replays_as_the_plant_does(sheet, tmp_path):
     """From the same start, with speed, under the same input."""
     plant = plant_of(sheet)
@@ -135,16 +161,34 @@ def test_frames_are_evenly_spaced_and_no_longer_than_the_recording():
 
 
 BAD = {
-    "no display": "", "no such xml": "none.xml --render a.png", "cut": "cut.xml --render a.png", "robot": "robot.xml --render a.png",
-    "words": "words.xml --render a.png", "empty": "empty.xml --render a.png", "odd": "odd.xml --render a.png", "folder": ". --render a.png",
-    "no actuator": "still.xml --input steps --render a.gif", "no rudder": "still.xml --replay run.csv --render a.gif",
-    "linkage of xml": "plant.xml --linkage rod --render a.png", "gap of xml": "plant.xml --gap 1 --render a.png",
-    "rod of lumped": "lumped.toml --linkage rod --render a.png", "two plays": "play.toml --gap 1 --render a.png",
-    "no model": "none.toml --render a.png", "strange": "strange.toml --render a.png", "no b": "no_b.toml --render a.png",
-    "suffix": "--render a.jpg", "exists": "--render kept.png", "under a file": "--render kept.png/a.png", "input": "--input stepz --render a.gif",
-    "both": "--input steps --replay run.csv --render a.gif", "no recording": "--replay none.csv --render a.gif",
-    "map": "--map t_s=Time --render a.gif", "too long": "--duration 1e6 --render a.gif", "wide": "--width 99999 --render a.png",
-    "narrow": "--width 1 --render a.png", "linkage": "--linkage rope --render a.png",
+    "no display": "",
+    "no such xml": "none.xml --render a.png",
+    "cut": "cut.xml --render a.png",
+    "robot": "robot.xml --render a.png",
+    "words": "words.xml --render a.png",
+    "empty": "empty.xml --render a.png",
+    "odd": "odd.xml --render a.png",
+    "folder": ". --render a.png",
+    "no actuator": "still.xml --input steps --render a.gif",
+    "no rudder": "still.xml --replay run.csv --render a.gif",
+    "linkage of xml": "plant.xml --linkage rod --render a.png",
+    "gap of xml": "plant.xml --gap 1 --render a.png",
+    "rod of lumped": "lumped.toml --linkage rod --render a.png",
+    "two plays": "play.toml --gap 1 --render a.png",
+    "no model": "none.toml --render a.png",
+    "strange": "strange.toml --render a.png",
+    "no b": "no_b.toml --render a.png",
+    "suffix": "--render a.jpg",
+    "exists": "--render kept.png",
+    "under a file": "--render kept.png/a.png",
+    "input": "--input stepz --render a.gif",
+    "both": "--input steps --replay run.csv --render a.gif",
+    "no recording": "--replay none.csv --render a.gif",
+    "map": "--map t_s=Time --render a.gif",
+    "too long": "--duration 1e6 --render a.gif",
+    "wide": "--width 99999 --render a.png",
+    "narrow": "--width 1 --render a.png",
+    "linkage": "--linkage rope --render a.png",
 }
 
 
@@ -172,7 +216,9 @@ def test_a_report_shows_the_worst_moment_before_and_after(sheet):
     frames = frames_of(plant_of(sheet), evidence(0.02))
     worst = max(frames.moments, key=lambda frame: abs(frame.before - frame.measured))
     assert worst.t == pytest.approx(0.2, abs=1e-3) and frames.enlarged == 10 and len(frames.moments) == 3
-    before, after = (np.asarray(Image.open(io.BytesIO(x))).astype(int) for x in (worst.picture_before, worst.picture_after))
+    before, after = (
+        np.asarray(Image.open(io.BytesIO(x))).astype(int) for x in (worst.picture_before, worst.picture_after)
+    )
     assert before.shape == (360, 480, 3) and (np.abs(before - after).max(axis=2) > 60).sum() > 500
     page = report_page({}, evidence(0.02), frames)
     assert page.count("data:image/jpeg;base64,") == 6 and "10 times as large" in page
@@ -198,6 +244,7 @@ def test_without_egl_it_is_told_what_to_install(place, monkeypatch, capsys):
 
 def lack_egl(monkeypatch) -> None:
     """A machine without EGL: PyOpenGL fails as it does where the library is missing."""
+
     def context():
         raise AttributeError("'NoneType' object has no attribute 'eglQueryString'")
 

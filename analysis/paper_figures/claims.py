@@ -1,4 +1,6 @@
-"""The paper's claims of its controller beside what we measure: `python analysis/paper_figures/claims.py` writes docs/paper/README.md."""
+"""The paper's claims of its controller beside what we measure: `python analysis/paper_figures/claims.py` writes
+docs/paper/README.md.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,21 @@ from ers_mj.controllers import Gains
 from ers_mj.gains import conditions, settling_bound
 
 VERDICT = {True: "holds", False: "**does not hold**", None: "-"}
-WHERE = (("Eq. (5), 10 kHz, 10°", False, ("step", "chirp"), 10.0), ("Eq. (5), 10 kHz, 3°: within reach of 24 V", False, ("chirp",), 3.0),
-         ("MuJoCo, 1 kHz, noise 0.01°, 10°", True, ("square", "ramp", "chirp"), 10.0))
-SHOWN = (("07", "Figure 7, step on Eq. (5)"), ("08", "Figure 8, chirp on Eq. (5)"), ("11", "Figure 11, Case 1"), ("12", "Figure 12, Case 2"), ("13", "Figure 13, Case 3"),
-         ("14", "Figure 14, energy of Case 1"), ("15a", "Figure 15a, Case 1"), ("15b", "Figure 15b, Case 2"))
+WHERE = (
+    ("Eq. (5), 10 kHz, 10°", False, ("step", "chirp"), 10.0),
+    ("Eq. (5), 10 kHz, 3°: within reach of 24 V", False, ("chirp",), 3.0),
+    ("MuJoCo, 1 kHz, noise 0.01°, 10°", True, ("square", "ramp", "chirp"), 10.0),
+)
+SHOWN = (
+    ("07", "Figure 7, step on Eq. (5)"),
+    ("08", "Figure 8, chirp on Eq. (5)"),
+    ("11", "Figure 11, Case 1"),
+    ("12", "Figure 12, Case 2"),
+    ("13", "Figure 13, Case 3"),
+    ("14", "Figure 14, energy of Case 1"),
+    ("15a", "Figure 15a, Case 1"),
+    ("15b", "Figure 15b, Case 2"),
+)
 FINITE = """**Finite time** (`python analysis/finite_time.py`)
 
 With q = 97/99 the loop comes as near as with the linear law q = 1, three milliseconds sooner: 54 against 57 ms to a tenth of 10°. V_3 falls along every trajectory (where the
@@ -41,9 +54,23 @@ def main() -> None:
     lines = []
     for where, on_bench, cases, amplitude in WHERE:
         for claim in claims(trials(cases, on_bench, LAWS, amplitude)):
-            lines.append(f"| {where} | {claim.case} | {claim.claim} | {claim.measured.split(': ', 1)[1]} | {VERDICT[claim.holds]} |")
-    told = ["", _gains(), "", "What the paper names without equations (its adaptive law, the robust adaptive sliding mode of its reference 10) is not among the laws.", "",
-            FINITE, "", *(f"**{label}**\n\n![{label}](figure_{name}.png)\n" for name, label in SHOWN)]
+            lines.append(
+                f"| {where} | {claim.case} | {claim.claim} | {claim.measured.split(': ', 1)[1]} |"
+                f" {VERDICT[claim.holds]} |"
+            )
+    told = [
+        "",
+        _gains(),
+        "",
+        (
+            "What the paper names without equations (its adaptive law, the robust adaptive sliding mode of its"
+            " reference 10) is not among the laws."
+        ),
+        "",
+        FINITE,
+        "",
+        *(f"**{label}**\n\n![{label}](figure_{name}.png)\n" for name, label in SHOWN),
+    ]
     path = PICTURES / "README.md"
     path.write_text(LEAD + "\n".join([*lines, *told]), encoding="utf-8", newline="\n")
     print(path.read_text())
@@ -53,8 +80,12 @@ def _gains() -> str:
     """The proof's numbers in a paragraph."""
     m, bound = conditions(Gains()), settling_bound(Gains(), math.radians(10.0))
     printed = conditions(replace(Gains(), q=Fraction(96, 97)))
-    return (f"The printed m = (0.0075, 5.7594, 0.00034) belong to q = 97/99, for which (33)-(35) give ({', '.join(f'{x:.4g}' for x in m)}); the printed q = 96/97 gives "
-            f"({', '.join(f'{x:.4g}' for x in printed)}). The settling time that (37) guarantees for a step of 10° is {bound:.2g} s.")
+    return (
+        "The printed m = (0.0075, 5.7594, 0.00034) belong to q = 97/99, for which (33)-(35) give"
+        f" ({', '.join(f'{x:.4g}' for x in m)}); the printed q = 96/97 gives"
+        f" ({', '.join(f'{x:.4g}' for x in printed)}). The settling time that (37) guarantees for a step of 10° is"
+        f" {bound:.2g} s."
+    )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """What the scripts of this folder share: the trials behind a figure, their curves and bars, and where pictures go.
-
-The paper's figures 7 and 8 are simulations of Eq. (5) at 10 kHz; 11 to 15 were measured on its test bench, in whose place stands the MuJoCo plant here, with a
-sensor noise of 0.01 deg and a loop of 1 kHz. Beside the paper's three laws stands the fair rival, its PID with the feed-forward of FTRC.
+ The paper's figures 7 and 8 are simulations of Eq. (5) at 10 kHz; 11 to 15 were measured on its test bench, in whose
+place stands the MuJoCo plant here, with a sensor noise of 0.01 deg and a loop of 1 kHz. Beside the paper's three laws
+stands the fair rival, its PID with the feed-forward of FTRC.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ BENCH = Conditions(rate_hz=1000.0, noise=math.radians(0.01))
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "paper"
 
 
-def trials(cases: Sequence[str], on_bench: bool, laws: Sequence[str] = LAWS, amplitude_deg: float = 10.0) -> list[Trial]:
+def trials(
+    cases: Sequence[str], on_bench: bool, laws: Sequence[str] = LAWS, amplitude_deg: float = 10.0
+) -> list[Trial]:
     """The trials of a figure, on Eq. (5) or on the MuJoCo plant that stands for the test bench."""
     conditions = replace(BENCH if on_bench else SIMULATED, amplitude=math.radians(amplitude_deg))
     return try_out(read_datasheet("table1"), laws, ["mujoco" if on_bench else "reduced"], cases, conditions)
@@ -39,7 +41,9 @@ def curves(found: Sequence[Trial], name: str, until: float | None = None) -> Pat
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.8, 3.6), layout="constrained")
         response, error = figure.subplots(1, 2)
-        response.plot(reference.t[shown], np.degrees(reference.theta[shown]), color=MEASURED, linewidth=3.0, label="reference")
+        response.plot(
+            reference.t[shown], np.degrees(reference.theta[shown]), color=MEASURED, linewidth=3.0, label="reference"
+        )
         for trial in found:
             shade = COLOURS[trial.controller]
             response.plot(reference.t[shown], np.degrees(trial.run.theta[shown]), color=shade, label=trial.controller)
@@ -62,7 +66,14 @@ def bars(panels: Sequence[tuple[str, dict[str, float | None]]], name: str) -> Pa
         for ax, (label, values) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
             for k, (law, x) in enumerate(values.items()):
                 ax.bar(k, x or 0.0, color=COLOURS[law], width=0.65)
-                ax.annotate("never" if x is None else f"{x:.3g}", (k, x or 0.0), ha="center", va="bottom", fontsize=8.5, color=INK)
+                ax.annotate(
+                    "never" if x is None else f"{x:.3g}",
+                    (k, x or 0.0),
+                    ha="center",
+                    va="bottom",
+                    fontsize=8.5,
+                    color=INK,
+                )
             ax.set_xticks(range(len(values)), values, rotation=20)
             ax.set_title(label, color=INK)
             ax.grid(axis="x", visible=False)
@@ -84,5 +95,8 @@ def table(found: Sequence[Trial]) -> None:
     for t in found:
         m = t.measures
         settles = "never" if m.settling_time_s is None else f"{1e3 * m.settling_time_s:.1f} ms"
-        print(f"  {t.case:7} {t.controller:8} settles {settles:>9}  overshoot {m.overshoot_pct:6.2f} %  steady {math.degrees(m.steady_state_error_rad):7.4f} deg  "
-              f"RMSE {math.degrees(m.rmse_rad):7.4f} deg  energy {m.energy_J:7.2f} J")
+        print(
+            f"  {t.case:7} {t.controller:8} settles {settles:>9}  overshoot {m.overshoot_pct:6.2f} %  steady"
+            f" {math.degrees(m.steady_state_error_rad):7.4f} deg  RMSE {math.degrees(m.rmse_rad):7.4f} deg  energy"
+            f" {m.energy_J:7.2f} J"
+        )

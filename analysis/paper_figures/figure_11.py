@@ -1,4 +1,6 @@
-"""Figure 11: Case 1, the square wave, on the MuJoCo plant (captioned "step" in the paper): `python analysis/paper_figures/figure_11.py`."""
+"""Figure 11: Case 1, the square wave, on the MuJoCo plant (captioned "step" in the paper): `python
+analysis/paper_figures/figure_11.py`.
+"""
 
 from drawing import curves, table, trials
 

@@ -3,6 +3,19 @@
 What is slow to import is imported inside `run`, so that `ers --help` is quick.
 """
 
-from ers_mj.commands import demo, diagnose, excite, frequency, gains, identify, prove, simulate, trial, validate, view, watch
+from ers_mj.commands import (
+    demo,
+    diagnose,
+    excite,
+    frequency,
+    gains,
+    identify,
+    prove,
+    simulate,
+    trial,
+    validate,
+    view,
+    watch,
+)
 
 COMMANDS = (demo, diagnose, identify, simulate, validate, view, prove, trial, gains, frequency, watch, excite)

@@ -16,9 +16,11 @@ SHIPPED = "demo_data"
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "demo", help="diagnose the recordings inside the package",
+        "demo",
+        help="diagnose the recordings inside the package",
         description="Diagnose the recordings that ship inside the package: a rudder servo with a concealed effect.",
-        epilog="example: ers demo --out demo-results")
+        epilog="example: ers demo --out demo-results",
+    )
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -33,8 +35,12 @@ def run(arguments: argparse.Namespace) -> int:
     with as_file(files("ers_mj") / SHIPPED) as shipped:
         recordings, holdout = _shipped(shipped, "rec*.csv"), _shipped(shipped, "holdout*.csv")
         return diagnose_and_tell(
-            [read_recording(path) for path in recordings], [read_recording(path) for path in holdout],
-            read_datasheet(shipped / "datasheet.toml"), folder, arguments)
+            [read_recording(path) for path in recordings],
+            [read_recording(path) for path in holdout],
+            read_datasheet(shipped / "datasheet.toml"),
+            folder,
+            arguments,
+        )
 
 
 def _shipped(folder: Path, pattern: str) -> list[Path]:

@@ -21,15 +21,29 @@ FITS = (("training", "train"), ("held out", "heldout"), ("recalibrated", "recali
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "diagnose", help="find, name and model the missing physics",
+        "diagnose",
+        help="find, name and model the missing physics",
         description="Diagnose a servo from recordings: what did its simulation leave out?",
         epilog="examples:\n  ers diagnose run1.csv run2.csv --datasheet servo.toml --holdout run3.csv\n"
-               "  ers diagnose runs.parquet#run=17 --map t_s=Time --map theta_deg=Angle --json")
-    parser.add_argument("recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several")
-    parser.add_argument("--datasheet", metavar="TOML", help="what is known of the servo; table1 is the paper's (default: nothing)")
-    parser.add_argument("--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable")
-    parser.add_argument("--map", type=pair, action="append", default=[], metavar="name=column",
-                        help="take the column as this name, as in t_s=Time; repeatable")
+        "  ers diagnose runs.parquet#run=17 --map t_s=Time --map theta_deg=Angle --json",
+    )
+    parser.add_argument(
+        "recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several"
+    )
+    parser.add_argument(
+        "--datasheet", metavar="TOML", help="what is known of the servo; table1 is the paper's (default: nothing)"
+    )
+    parser.add_argument(
+        "--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable"
+    )
+    parser.add_argument(
+        "--map",
+        type=pair,
+        action="append",
+        default=[],
+        metavar="name=column",
+        help="take the column as this name, as in t_s=Time; repeatable",
+    )
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -48,15 +62,22 @@ def run(arguments: argparse.Namespace) -> int:
     return diagnose_and_tell(recordings, holdout, datasheet, folder, arguments)
 
 
-def diagnose_and_tell(recordings: list[Recording], holdout: list[Recording], datasheet: Datasheet | None,
-                      folder: Path | None, arguments: argparse.Namespace) -> int:
+def diagnose_and_tell(
+    recordings: list[Recording],
+    holdout: list[Recording],
+    datasheet: Datasheet | None,
+    folder: Path | None,
+    arguments: argparse.Namespace,
+) -> int:
     """The part that `diagnose` and `demo` share: from recordings to files and words."""
     refuse_twice(recordings, holdout)
     refuse_mixed_units([*recordings, *holdout])
     from ers_mj import diagnosis
 
     with Progress() as progress:
-        found = diagnosis.diagnose(recordings, datasheet, holdout, seed=arguments.seed, jobs=arguments.jobs, progress=progress)
+        found = diagnosis.diagnose(
+            recordings, datasheet, holdout, seed=arguments.seed, jobs=arguments.jobs, progress=progress
+        )
         document = plain(found.document)
         files = _write(folder, document, found, progress) if folder is not None else []
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
@@ -71,12 +92,16 @@ def _write(folder: Path, document: dict, found: object, progress: Progress) -> l
     progress("drawing the report", 1.0)
     page = report_page(document, found.evidence, frames_of(found.plant, found.evidence))
     following = (document.get("next_recording") or {}).get("excitation")
-    return write_results(folder, {
-        "diagnosis.json": lambda path: write_text(path, as_json(document) + "\n"),
-        "report.html": lambda path: write_text(path, page),
-        "model.toml": lambda path: write_model(path, found.model),
-        "plant.xml": lambda path: write_text(path, found.plant.xml()),
-    } | ({"next_recording.csv": lambda path: write_text(path, _input_table(following))} if following else {}))
+    return write_results(
+        folder,
+        {
+            "diagnosis.json": lambda path: write_text(path, as_json(document) + "\n"),
+            "report.html": lambda path: write_text(path, page),
+            "model.toml": lambda path: write_model(path, found.model),
+            "plant.xml": lambda path: write_text(path, found.plant.xml()),
+        }
+        | ({"next_recording.csv": lambda path: write_text(path, _input_table(following))} if following else {}),
+    )
 
 
 def _input_table(excitation: dict) -> str:
@@ -97,8 +122,10 @@ def refuse_twice(recordings: list[Recording], holdout: list[Recording]) -> None:
     for recording, held_out in [*((r, False) for r in recordings), *((r, True) for r in holdout)]:
         key = _identity(recording)
         if held_out and key in trained:
-            raise InputError(f"{recording.name}: is held out and also among the training recordings "
-                             f"(as {first[key]}), a recording cannot judge what it taught")
+            raise InputError(
+                f"{recording.name}: is held out and also among the training recordings "
+                f"(as {first[key]}), a recording cannot judge what it taught"
+            )
         if key in first:
             raise InputError(f"{recording.name}: is the same recording as {first[key]}, give it once")
         first[key] = recording.name
@@ -117,8 +144,10 @@ def refuse_mixed_units(recordings: list[Recording]) -> None:
             common = units.most_common(1)[0][0]
             odd = next(r for r in recordings if getattr(r, attribute) != common)
             other = next(r for r in recordings if getattr(r, attribute) == common)
-            raise InputError(f"{odd.name}: its {noun} is in {getattr(odd, attribute)} and that of {other.name} in {common}, "
-                             "recordings of one unit were expected")
+            raise InputError(
+                f"{odd.name}: its {noun} is in {getattr(odd, attribute)} and that of {other.name} in {common}, "
+                "recordings of one unit were expected"
+            )
 
 
 # -- the diagnosis in lines ---------------------------------------------------------------------------------------
@@ -134,7 +163,9 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     lines += _section("where", where[:3])
     state = [entry.get("sentence") for entry in document.get("record_state") or [] if entry.get("sentence")]
     lines += _section("differs between recordings", state)
-    lines += _section("problems in the data", [str(problem) for problem in (document.get("data") or {}).get("problems") or []][:6])
+    lines += _section(
+        "problems in the data", [str(problem) for problem in (document.get("data") or {}).get("problems") or []][:6]
+    )
     following = (document.get("next_recording") or {}).get("sentence")
     lines += _section("record next", [following] if following else [])
     return lines + _section("written", [str(path) for path in files])

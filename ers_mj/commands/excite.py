@@ -22,25 +22,81 @@ Z_95 = 1.96  # half-width of a 95 % interval over the standard deviation
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "excite", help="design the input that pins a servo's parameters best, within a rig's limits",
-        description="Design an input (multisines, chirps, squares, steps, pushes, or several in turn) within a rig's voltage and travel that leaves the\n"
-                    "narrowest intervals, by the Fisher information of the event-exact model, and say by how much they shrink against a named input.",
-        epilog="examples:\n  ers excite table1 --umax-V 24 --travel-deg 60 --current-noise-A 0.02 --for B --out next.csv\n"
-               "  ers excite model.toml --umax-V 12 --duration-s 5 --out next.csv && ers simulate model.toml --input next.csv --out rec.csv")
-    parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)")
-    parser.add_argument("--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage, either way (default 24)")
-    parser.add_argument("--travel-deg", type=number(above=0), default=60.0, metavar="X", help="how far the output may leave theta_0, either way (default 60)")
-    parser.add_argument("--duration-s", type=number(above=0), default=10.0, metavar="S", help="of the recording (default 10)")
-    parser.add_argument("--rate-hz", type=number(above=0), default=1000.0, metavar="N", help="sample rate (default 1000)")
-    parser.add_argument("--noise-deg", type=number(above=0), default=0.01, metavar="X", help="noise of the sensor, standard deviation (default 0.01)")
-    parser.add_argument("--current-noise-A", dest="current", type=number(above=0), metavar="X",
-                        help="the current is measured, with this noise (default: it is not)")
-    parser.add_argument("--inductance", choices=("on", "off"), default="on", help="whether the datasheet's L acts (default on)")
-    parser.add_argument("--for", dest="wanted", type=several(str, "name"), default=[], metavar="NAME,...",
-                        help="a_1 a_2 b c_1 c_2 theta_0 tau_e, or B K_e K_t R per inertia where they can be told (default all)")
-    parser.add_argument("--criterion", type=one_of(CRITERIA), default="A", metavar="A|D",
-                        help="least mean square of the intervals over those of --against, or least determinant (default A)")
-    parser.add_argument("--against", default="multisine", metavar="NAME", help="named input to compare with, cut off at --umax-V (default multisine)")
+        "excite",
+        help="design the input that pins a servo's parameters best, within a rig's limits",
+        description=(
+            "Design an input (multisines, chirps, squares, steps, pushes, or several in turn) within a rig's voltage"
+            " and travel that leaves the\nnarrowest intervals, by the Fisher information of the event-exact model, and"
+            " say by how much they shrink against a named input."
+        ),
+        epilog=(
+            "examples:\n  ers excite table1 --umax-V 24 --travel-deg 60 --current-noise-A 0.02 --for B --out next.csv\n"
+            "  ers excite model.toml --umax-V 12 --duration-s 5 --out next.csv && ers simulate model.toml --input"
+            " next.csv --out rec.csv"
+        ),
+    )
+    parser.add_argument(
+        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
+    )
+    parser.add_argument(
+        "--umax-V",
+        dest="umax",
+        type=number(above=0),
+        default=24.0,
+        metavar="X",
+        help="largest voltage, either way (default 24)",
+    )
+    parser.add_argument(
+        "--travel-deg",
+        type=number(above=0),
+        default=60.0,
+        metavar="X",
+        help="how far the output may leave theta_0, either way (default 60)",
+    )
+    parser.add_argument(
+        "--duration-s", type=number(above=0), default=10.0, metavar="S", help="of the recording (default 10)"
+    )
+    parser.add_argument(
+        "--rate-hz", type=number(above=0), default=1000.0, metavar="N", help="sample rate (default 1000)"
+    )
+    parser.add_argument(
+        "--noise-deg",
+        type=number(above=0),
+        default=0.01,
+        metavar="X",
+        help="noise of the sensor, standard deviation (default 0.01)",
+    )
+    parser.add_argument(
+        "--current-noise-A",
+        dest="current",
+        type=number(above=0),
+        metavar="X",
+        help="the current is measured, with this noise (default: it is not)",
+    )
+    parser.add_argument(
+        "--inductance", choices=("on", "off"), default="on", help="whether the datasheet's L acts (default on)"
+    )
+    parser.add_argument(
+        "--for",
+        dest="wanted",
+        type=several(str, "name"),
+        default=[],
+        metavar="NAME,...",
+        help="a_1 a_2 b c_1 c_2 theta_0 tau_e, or B K_e K_t R per inertia where they can be told (default all)",
+    )
+    parser.add_argument(
+        "--criterion",
+        type=one_of(CRITERIA),
+        default="A",
+        metavar="A|D",
+        help="least mean square of the intervals over those of --against, or least determinant (default A)",
+    )
+    parser.add_argument(
+        "--against",
+        default="multisine",
+        metavar="NAME",
+        help="named input to compare with, cut off at --umax-V (default multisine)",
+    )
     parser.add_argument("--out", required=True, metavar="FILE", help="the CSV file to write: t_s,u_V")
     parser.add_argument("--force", action="store_true", help="overwrite FILE")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -59,10 +115,20 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"--against: there is no input {arguments.against[:40]!r}; there are {', '.join(INPUTS)}")
     samples = arguments.duration_s * arguments.rate_hz
     if not FEWEST_SAMPLES <= samples <= MOST_SAMPLES:
-        raise InputError(f"{arguments.duration_s:g} s at {arguments.rate_hz:g} Hz are {samples:.3g} samples, {FEWEST_SAMPLES} to {MOST_SAMPLES} were expected")
+        raise InputError(
+            f"{arguments.duration_s:g} s at {arguments.rate_hz:g} Hz are {samples:.3g} samples, {FEWEST_SAMPLES} to"
+            f" {MOST_SAMPLES} were expected"
+        )
     datasheet = read_datasheet(arguments.model)
-    rig = Rig.of(datasheet.to_lumped().get("theta_0", 0.0), arguments.umax, math.radians(arguments.travel_deg), arguments.duration_s, arguments.rate_hz,
-                 math.radians(arguments.noise_deg), arguments.current)
+    rig = Rig.of(
+        datasheet.to_lumped().get("theta_0", 0.0),
+        arguments.umax,
+        math.radians(arguments.travel_deg),
+        arguments.duration_s,
+        arguments.rate_hz,
+        math.radians(arguments.noise_deg),
+        arguments.current,
+    )
     question = Question.of(datasheet, rig, arguments.wanted, arguments.criterion, arguments.inductance == "on")
     with Progress() as progress:
         before = reference(question, arguments.against)
@@ -77,27 +143,66 @@ def run(arguments: argparse.Namespace) -> int:
 def _document(arguments: argparse.Namespace, question: Question, before: Plan, plan: Plan) -> dict:
     from ers_mj.experiment import TOLD
 
-    rows = {name: {"meaning": TOLD[name][0], "relative": name != "theta_0",
-                   "against": Z_95 * before.spread[name], "designed": Z_95 * plan.spread[name], "ratio": plan.spread[name] / before.spread[name],
-                   "refits_against": Z_95 * before.found[name], "refits_designed": Z_95 * plan.found[name],
-                   "refits_ratio": plan.found[name] / before.found[name]} for name in question.wanted}
-    return {"out": arguments.out, "against": arguments.against, "current": arguments.current is not None, "criterion": arguments.criterion,
-            "parts": list(plan.parts), "half_width_95": rows, "duration_s": question.rig.limits.duration, "rate_hz": question.rig.limits.rate_hz}
+    rows = {
+        name: {
+            "meaning": TOLD[name][0],
+            "relative": name != "theta_0",
+            "against": Z_95 * before.spread[name],
+            "designed": Z_95 * plan.spread[name],
+            "ratio": plan.spread[name] / before.spread[name],
+            "refits_against": Z_95 * before.found[name],
+            "refits_designed": Z_95 * plan.found[name],
+            "refits_ratio": plan.found[name] / before.found[name],
+        }
+        for name in question.wanted
+    }
+    return {
+        "out": arguments.out,
+        "against": arguments.against,
+        "current": arguments.current is not None,
+        "criterion": arguments.criterion,
+        "parts": list(plan.parts),
+        "half_width_95": rows,
+        "duration_s": question.rig.limits.duration,
+        "rate_hz": question.rig.limits.rate_hz,
+    }
 
 
 def _told(document: dict) -> list[str]:
     from ers_mj.advice import asked
     from ers_mj.experiment import UNSEEN
 
-    parts = [f"Record the named {p['name']}, up to {p['amplitude']:.3g} V, for {p['duration_s']:.3g} s at {p['rate_hz']:.4g} Hz." if p["kind"] == "named"
-             else asked({**p, "input_unit": "V"}) for p in document["parts"]]
-    lines = ["", bold(" Then: ".join(parts)), "",
-             bold(f"  {'95 % interval, +-':28}{document['against']:>14}{'this input':>14}{'ratio':>9}{'promised':>11}")]
+    parts = [
+        (
+            f"Record the named {p['name']}, up to {p['amplitude']:.3g} V, for {p['duration_s']:.3g} s at"
+            f" {p['rate_hz']:.4g} Hz."
+            if p["kind"] == "named"
+            else asked({**p, "input_unit": "V"})
+        )
+        for p in document["parts"]
+    ]
+    lines = [
+        "",
+        bold(" Then: ".join(parts)),
+        "",
+        bold(f"  {'95 % interval, +-':28}{document['against']:>14}{'this input':>14}{'ratio':>9}{'promised':>11}"),
+    ]
     for name, row in document["half_width_95"].items():
         scale, unit = (100.0, " %") if row["relative"] else (math.degrees(1.0), "°")
-        widths = [f"{scale * row[key]:.3g}{unit}" if row[key] < Z_95 * UNSEEN or not row["relative"] else "not seen"
-                  for key in ("refits_against", "refits_designed")]
-        lines.append(f"  {name:8}{row['meaning']:20}{widths[0]:>14}{widths[1]:>14}{row['refits_ratio']:>9.2f}{row['ratio']:>11.2f}")
-    lines += ["", "Widths and ratio are what refits to simulated recordings find; promised is the ratio by Fisher's information"
-              + ("." if document["current"] else ", whose own\nwidths were 2 to 14 times too narrow where only the angle is measured.")]
+        widths = [
+            f"{scale * row[key]:.3g}{unit}" if row[key] < Z_95 * UNSEEN or not row["relative"] else "not seen"
+            for key in ("refits_against", "refits_designed")
+        ]
+        lines.append(
+            f"  {name:8}{row['meaning']:20}{widths[0]:>14}{widths[1]:>14}{row['refits_ratio']:>9.2f}{row['ratio']:>11.2f}"
+        )
+    lines += [
+        "",
+        "Widths and ratio are what refits to simulated recordings find; promised is the ratio by Fisher's information"
+        + (
+            "."
+            if document["current"]
+            else ", whose own\nwidths were 2 to 14 times too narrow where only the angle is measured."
+        ),
+    ]
     return [*lines, "", bold("written"), f"  {document['out']}"]

@@ -16,38 +16,115 @@ if TYPE_CHECKING:
     from ers_mj.trial import Conditions
 
 AHEAD = ("gain_margin_db", "phase_margin_deg", "sensitivity_peak", "bandwidth_hz")
-COLUMNS = (("gain margin [dB]", "gain_margin_db", ".1f"), ("phase margin [°]", "phase_margin_deg", ".1f"), ("crossover [Hz]", "gain_crossover_hz", ".1f"),
-           ("disk margin", "disk_margin", ".2f"), ("peak |S|", "sensitivity_peak", ".2f"), ("bandwidth [Hz]", "bandwidth_hz", ".1f"))
+COLUMNS = (
+    ("gain margin [dB]", "gain_margin_db", ".1f"),
+    ("phase margin [°]", "phase_margin_deg", ".1f"),
+    ("crossover [Hz]", "gain_crossover_hz", ".1f"),
+    ("disk margin", "disk_margin", ".2f"),
+    ("peak |S|", "sensitivity_peak", ".2f"),
+    ("bandwidth [Hz]", "bandwidth_hz", ".1f"),
+)
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "frequency", help="models, loops and recordings over frequency",
-        description="Margins, sensitivity and limit cycles of controllers around a plant, and the frequency response of recordings beside the models.",
-        epilog="examples:\n  ers frequency --controller ftrc,pid --plant reduced,mujoco\n"
-               "  ers frequency run1.csv --datasheet servo.toml --controller pid\n"
-               "  ers frequency --controller pid --pid P=2,D=0.05 --rate-hz 2000 --effect backlash:gap=0.0087,rho=0.64,f_contact=40,zeta=0.2 --json")
-    parser.add_argument("recordings", nargs="*", metavar="REC", help="recordings whose frequency response is set beside the models'")
-    parser.add_argument("--datasheet", default="table1", metavar="TOML", help="the plant: datasheet or model.toml with its effects (default table1)")
-    parser.add_argument("--design", metavar="TOML", help="what the controllers know of the plant (default the datasheet itself)")
-    parser.add_argument("--controller", type=several(str, "controller"), metavar="NAME,...", help="as of ers trial (default all)")
-    parser.add_argument("--plant", type=several(one_of(("reduced", "mujoco")), "plant"), default=["reduced"], metavar="reduced,mujoco", help="default reduced")
-    parser.add_argument("--amplitude-deg", type=number(above=0, most=TURN), default=1.0, metavar="X",
-                        help="of the rudder's sine at which what is not linear is described (default 1)")
-    parser.add_argument("--at-deg", type=number(least=-TURN, most=TURN), metavar="X",
-                        help="angle about which the loops are linearised (default 10 beyond theta_0)")
-    parser.add_argument("--rate-hz", type=number(above=0), default=10_000.0, metavar="N", help="sample rate of the loop (default 10000)")
-    parser.add_argument("--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage, for limit cycles (default 24)")
-    parser.add_argument("--gap", type=number(least=0, most=QUARTER), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
-    parser.add_argument("--linkage", choices=("constant", "rod"), default="constant", help="of MuJoCo's rudder (default constant)")
+        "frequency",
+        help="models, loops and recordings over frequency",
+        description=(
+            "Margins, sensitivity and limit cycles of controllers around a plant, and the frequency response of"
+            " recordings beside the models."
+        ),
+        epilog=(
+            "examples:\n  ers frequency --controller ftrc,pid --plant reduced,mujoco\n  ers frequency run1.csv"
+            " --datasheet servo.toml --controller pid\n  ers frequency --controller pid --pid P=2,D=0.05 --rate-hz 2000"
+            " --effect backlash:gap=0.0087,rho=0.64,f_contact=40,zeta=0.2 --json"
+        ),
+    )
+    parser.add_argument(
+        "recordings", nargs="*", metavar="REC", help="recordings whose frequency response is set beside the models'"
+    )
+    parser.add_argument(
+        "--datasheet",
+        default="table1",
+        metavar="TOML",
+        help="the plant: datasheet or model.toml with its effects (default table1)",
+    )
+    parser.add_argument(
+        "--design", metavar="TOML", help="what the controllers know of the plant (default the datasheet itself)"
+    )
+    parser.add_argument(
+        "--controller", type=several(str, "controller"), metavar="NAME,...", help="as of ers trial (default all)"
+    )
+    parser.add_argument(
+        "--plant",
+        type=several(one_of(("reduced", "mujoco")), "plant"),
+        default=["reduced"],
+        metavar="reduced,mujoco",
+        help="default reduced",
+    )
+    parser.add_argument(
+        "--amplitude-deg",
+        type=number(above=0, most=TURN),
+        default=1.0,
+        metavar="X",
+        help="of the rudder's sine at which what is not linear is described (default 1)",
+    )
+    parser.add_argument(
+        "--at-deg",
+        type=number(least=-TURN, most=TURN),
+        metavar="X",
+        help="angle about which the loops are linearised (default 10 beyond theta_0)",
+    )
+    parser.add_argument(
+        "--rate-hz", type=number(above=0), default=10_000.0, metavar="N", help="sample rate of the loop (default 10000)"
+    )
+    parser.add_argument(
+        "--umax-V",
+        dest="umax",
+        type=number(above=0),
+        default=24.0,
+        metavar="X",
+        help="largest voltage, for limit cycles (default 24)",
+    )
+    parser.add_argument(
+        "--gap", type=number(least=0, most=QUARTER), default=0.0, metavar="DEG", help="play of +-DEG (default 0)"
+    )
+    parser.add_argument(
+        "--linkage", choices=("constant", "rod"), default="constant", help="of MuJoCo's rudder (default constant)"
+    )
     parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME:key=value,...", help="physics to add to the plant, SI; repeatable")
-    parser.add_argument("--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)")
-    parser.add_argument("--filter-ms", type=number(least=0), default=0.5, metavar="X", help="time constant of the speed's filter (default 0.5)")
-    parser.add_argument("--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them")
-    parser.add_argument("--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)")
-    parser.add_argument("--map", action="append", type=pair, default=[], metavar="NAME=COLUMN", help="column of the recordings that holds NAME; repeatable")
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME:key=value,...",
+        help="physics to add to the plant, SI; repeatable",
+    )
+    parser.add_argument(
+        "--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)"
+    )
+    parser.add_argument(
+        "--filter-ms",
+        type=number(least=0),
+        default=0.5,
+        metavar="X",
+        help="time constant of the speed's filter (default 0.5)",
+    )
+    parser.add_argument(
+        "--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them"
+    )
+    parser.add_argument(
+        "--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)"
+    )
+    parser.add_argument(
+        "--map",
+        action="append",
+        type=pair,
+        default=[],
+        metavar="NAME=COLUMN",
+        help="column of the recordings that holds NAME; repeatable",
+    )
     add_out(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
     parser.set_defaults(run=run)
@@ -70,9 +147,16 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = [read_recording(spec, mapping(arguments.map)) for spec in arguments.recordings]
     with Progress() as progress:
         found = study(datasheet, controllers, arguments.plant, conditions, recordings, design=design, progress=progress)
-        document = plain(_document(found, conditions) | {
-            "controllers": {name: CONTROLLERS[name].sentence for name in controllers}, "datasheet": datasheet.name or arguments.datasheet,
-            "design": design.name or arguments.design, "problems": {r.name: list(r.problems) for r in recordings}, "versions": versions()})
+        document = plain(
+            _document(found, conditions)
+            | {
+                "controllers": {name: CONTROLLERS[name].sentence for name in controllers},
+                "datasheet": datasheet.name or arguments.datasheet,
+                "design": design.name or arguments.design,
+                "problems": {r.name: list(r.problems) for r in recordings},
+                "versions": versions(),
+            }
+        )
         files = _write(folder, document, found, progress) if folder is not None else []
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
     return 0
@@ -87,10 +171,18 @@ def _conditions(arguments: argparse.Namespace, datasheet: Datasheet) -> Conditio
     effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
     rest = datasheet.to_lumped().get("theta_0", 0.0)
     return Conditions(
-        amplitude=math.radians(arguments.amplitude_deg), start=rest + math.radians(10.0) if arguments.at_deg is None else math.radians(arguments.at_deg),
-        rate_hz=arguments.rate_hz, u_max=arguments.umax, gap=math.radians(arguments.gap), linkage=arguments.linkage,
-        inductance=arguments.inductance == "on", filter_s=1e-3 * arguments.filter_ms, gains=parse_gains(arguments.gains), pid=parse_pid(arguments.pid),
-        effects=tuple(effects))
+        amplitude=math.radians(arguments.amplitude_deg),
+        start=rest + math.radians(10.0) if arguments.at_deg is None else math.radians(arguments.at_deg),
+        rate_hz=arguments.rate_hz,
+        u_max=arguments.umax,
+        gap=math.radians(arguments.gap),
+        linkage=arguments.linkage,
+        inductance=arguments.inductance == "on",
+        filter_s=1e-3 * arguments.filter_ms,
+        gains=parse_gains(arguments.gains),
+        pid=parse_pid(arguments.pid),
+        effects=tuple(effects),
+    )
 
 
 def _document(found: Study, conditions: Conditions) -> dict:
@@ -98,7 +190,12 @@ def _document(found: Study, conditions: Conditions) -> dict:
     from ers_mj.frequency.telling import as_document, headline
 
     first = found.loops[0].as_document()
-    return {**{key: first[key] for key in AHEAD}, "sentence": headline(found), **as_document(found), "conditions": conditions.as_document()}
+    return {
+        **{key: first[key] for key in AHEAD},
+        "sentence": headline(found),
+        **as_document(found),
+        "conditions": conditions.as_document(),
+    }
 
 
 def _write(folder: Path, document: dict, found: Study, progress: Progress) -> list[Path]:
@@ -106,13 +203,17 @@ def _write(folder: Path, document: dict, found: Study, progress: Progress) -> li
 
     progress("drawing the report", 1.0)
     page = frequency_page(document, found)
-    return write_results(folder, {
-        "frequency.json": lambda path: write_text(path, as_json(document) + "\n"),
-        "report.html": lambda path: write_text(path, page),
-    })
+    return write_results(
+        folder,
+        {
+            "frequency.json": lambda path: write_text(path, as_json(document) + "\n"),
+            "report.html": lambda path: write_text(path, page),
+        },
+    )
 
 
-# -- in lines ------------------------------------------------------------------------------------------------------------
+# -- in lines
+# ------------------------------------------------------------------------------------------------------------
 
 
 def _told(document: dict, files: list[Path]) -> list[str]:
@@ -120,10 +221,16 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     lines = ["", bold(document["sentence"]), "", bold(f"{'loop':26}" + "".join(f"{head:>18}" for head, *_ in COLUMNS))]
     for loop in document["loops"]:
         cells = "".join(f"{_cell(loop[key], form):>18}" for _, key, form in COLUMNS)
-        lines.append(f"  {loop['controller'] + ', ' + loop['plant']:24}{cells}{'' if loop['stable'] else '   unstable'}")
+        lines.append(
+            f"  {loop['controller'] + ', ' + loop['plant']:24}{cells}{'' if loop['stable'] else '   unstable'}"
+        )
     lines += ["", bold("limit cycles"), *(f"  {sentence}" for sentence in document["cycle_sentences"])]
     if document["recordings"]:
-        lines += ["", bold("recordings"), *(f"  {sentence}" for r in document["recordings"] for sentence in r["sentences"])]
+        lines += [
+            "",
+            bold("recordings"),
+            *(f"  {sentence}" for r in document["recordings"] for sentence in r["sentences"]),
+        ]
     lines += ["", *document["notes"]] if document["notes"] else []
     return lines + (["", bold("written"), *(f"  {path}" for path in files)] if files else [])
 

@@ -19,18 +19,52 @@ DONE, CHECK_FAILED = 0, 1
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "gains", help="gains of the finite-time law: conditions, bound, search",
-        description="Check the finite-time law's gains against the conditions (33)-(35) of its proof, or search some for a wished settling time.\n"
-                    "Exit code 1 where the conditions fail.",
-        epilog="examples:\n  ers gains\n  ers gains --gains q=96/97\n  ers gains --gains k_2=60,k_3=630,gamma_3=30\n  ers gains model.toml --settling-ms 60")
-    parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)")
-    parser.add_argument("--gains", default="", metavar="NAME=X,...", help="q k_1 k_2 k_3 l gamma_1..gamma_7 (default Eq. (40) with q=97/99)")
-    parser.add_argument("--settling-ms", type=number(above=0), metavar="T", help="search k_2, k_3, l and gamma that settle within T, others kept")
-    parser.add_argument("--amplitude-deg", type=number(above=0, most=TURN), default=10.0, metavar="X",
-                        help="step that settling and bound belong to (default 10)")
-    parser.add_argument("--start-deg", type=number(least=-TURN, most=TURN), default=15.0, metavar="X", help="where it starts (default 15)")
-    parser.add_argument("--rate-hz", type=number(above=0), default=10_000.0, metavar="N", help="sample rate (default 10000)")
-    parser.add_argument("--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage (default 24)")
+        "gains",
+        help="gains of the finite-time law: conditions, bound, search",
+        description=(
+            "Check the finite-time law's gains against the conditions (33)-(35) of its proof, or search some for a"
+            " wished settling time.\nExit code 1 where the conditions fail."
+        ),
+        epilog=(
+            "examples:\n  ers gains\n  ers gains --gains q=96/97\n  ers gains --gains k_2=60,k_3=630,gamma_3=30\n  ers"
+            " gains model.toml --settling-ms 60"
+        ),
+    )
+    parser.add_argument(
+        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
+    )
+    parser.add_argument(
+        "--gains",
+        default="",
+        metavar="NAME=X,...",
+        help="q k_1 k_2 k_3 l gamma_1..gamma_7 (default Eq. (40) with q=97/99)",
+    )
+    parser.add_argument(
+        "--settling-ms",
+        type=number(above=0),
+        metavar="T",
+        help="search k_2, k_3, l and gamma that settle within T, others kept",
+    )
+    parser.add_argument(
+        "--amplitude-deg",
+        type=number(above=0, most=TURN),
+        default=10.0,
+        metavar="X",
+        help="step that settling and bound belong to (default 10)",
+    )
+    parser.add_argument(
+        "--start-deg",
+        type=number(least=-TURN, most=TURN),
+        default=15.0,
+        metavar="X",
+        help="where it starts (default 15)",
+    )
+    parser.add_argument(
+        "--rate-hz", type=number(above=0), default=10_000.0, metavar="N", help="sample rate (default 10000)"
+    )
+    parser.add_argument(
+        "--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage (default 24)"
+    )
     parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of the search's starts (default 0)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.set_defaults(run=run)
@@ -52,8 +86,15 @@ def run(arguments: argparse.Namespace) -> int:
             found = search(1e-3 * arguments.settling_ms, settle, gains, arguments.seed)
         gains, settling = found.gains, found.settling
     m, bound = conditions(gains), settling_bound(gains, math.radians(arguments.amplitude_deg))
-    document = {"gains": gains.as_document(), "m": list(m), "feasible": min(m) > 0, "settling_time_s": settling, "bound_s": bound, "remark": REMARK,
-                "wished_s": None if arguments.settling_ms is None else 1e-3 * arguments.settling_ms}
+    document = {
+        "gains": gains.as_document(),
+        "m": list(m),
+        "feasible": min(m) > 0,
+        "settling_time_s": settling,
+        "bound_s": bound,
+        "remark": REMARK,
+        "wished_s": None if arguments.settling_ms is None else 1e-3 * arguments.settling_ms,
+    }
     print(as_json(document) if arguments.json else "\n".join(_told(document, arguments)))
     return DONE if document["feasible"] else CHECK_FAILED
 
@@ -71,7 +112,9 @@ def _settle(datasheet: Datasheet, arguments: argparse.Namespace):
     aim = named("step", amplitude, start, arguments.rate_hz)
 
     def settle(gains: Gains) -> float | None:
-        ran = run_once(plant, "ftrc", known, aim, Conditions(amplitude, start, arguments.rate_hz, arguments.umax, gains=gains))
+        ran = run_once(
+            plant, "ftrc", known, aim, Conditions(amplitude, start, arguments.rate_hz, arguments.umax, gains=gains)
+        )
         return None if ran.lost else settling_time(ran)
 
     return settle
@@ -80,13 +123,27 @@ def _settle(datasheet: Datasheet, arguments: argparse.Namespace):
 def _told(document: dict, arguments: argparse.Namespace) -> list[str]:
     gains = document["gains"]
     gamma = ", ".join(f"{gains[f'gamma_{k}']:.4g}" for k in range(1, 8))
-    settles = "it does not settle" if document["settling_time_s"] is None else f"settles in {1e3 * document['settling_time_s']:.1f} ms"
-    lines = ["", bold("the conditions (33)-(35) hold" if document["feasible"] else
-                      "the conditions (33)-(35) do not hold: the proof says nothing of these gains"),
-             "", f"  q = {gains['q']}, k_1 = {gains['k_1']:.4g}, k_2 = {gains['k_2']:.4g}, k_3 = {gains['k_3']:.4g}, l = {gains['l']:.4g}",
-             f"  gamma = {gamma}",
-             *(f"  m_{k} = {x:.6g}{'' if x > 0 else '   not above zero'}" for k, x in enumerate(document["m"], start=1)),
-             f"  a step of {arguments.amplitude_deg:g}° on the reduced model: {settles} (2 %)"]
+    settles = (
+        "it does not settle"
+        if document["settling_time_s"] is None
+        else f"settles in {1e3 * document['settling_time_s']:.1f} ms"
+    )
+    lines = [
+        "",
+        bold(
+            "the conditions (33)-(35) hold"
+            if document["feasible"]
+            else "the conditions (33)-(35) do not hold: the proof says nothing of these gains"
+        ),
+        "",
+        (
+            f"  q = {gains['q']}, k_1 = {gains['k_1']:.4g}, k_2 = {gains['k_2']:.4g}, k_3 = {gains['k_3']:.4g}, l ="
+            f" {gains['l']:.4g}"
+        ),
+        f"  gamma = {gamma}",
+        *(f"  m_{k} = {x:.6g}{'' if x > 0 else '   not above zero'}" for k, x in enumerate(document["m"], start=1)),
+        f"  a step of {arguments.amplitude_deg:g}° on the reduced model: {settles} (2 %)",
+    ]
     if document["bound_s"] is not None:
         lines.append(f"  bound of (37): {document['bound_s']:.3g} s, {document['remark']}")
     return lines

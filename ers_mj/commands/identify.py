@@ -19,24 +19,77 @@ if TYPE_CHECKING:
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "identify", help="parameters with intervals, and which the recordings can tell",
-        description="Identify a servo's parameters from recordings: values, intervals, and which the recordings cannot tell.",
-        epilog="examples:\n  ers identify run1.csv --datasheet servo.toml\n"
-               "  ers identify run1.csv run2.csv --datasheet servo.toml --fix J=0.0031 --method iga --polish\n"
-               "  ers identify run1.csv --datasheet servo.toml --plant mujoco --json")
-    parser.add_argument("recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several")
-    parser.add_argument("--method", default="ls", metavar="NAME", help="ls, iga, iga-rotated, ga, pso, cma or de (default ls, trust-region least squares)")
-    parser.add_argument("--plant", type=one_of(("reduced", "mujoco")), default="reduced", metavar="reduced|mujoco", help="what is simulated (default reduced)")
-    parser.add_argument("--datasheet", metavar="TOML",
-                        help="what is known of the servo: where the search begins; table1 is the paper's (default: nothing, Eq. 6 from scratch)")
-    parser.add_argument("--fix", type=pair, action="append", default=[], metavar="NAME=VALUE", help="hold a parameter, as in J=0.0031; repeatable")
-    parser.add_argument("--bounds", type=pair, action="append", default=[], metavar="NAME=LOW:HIGH", help="search a parameter here; repeatable")
-    parser.add_argument("--within", type=several(number(above=0), "factor"), default=[0.2, 3.0], metavar="LOW,HIGH",
-                        help="search the others between these factors of what is known (default 0.2,3)")
-    parser.add_argument("--evaluations", type=whole(1), metavar="N", help="simulations at most (default 10000, in MuJoCo 400)")
+        "identify",
+        help="parameters with intervals, and which the recordings can tell",
+        description=(
+            "Identify a servo's parameters from recordings: values, intervals, and which the recordings cannot tell."
+        ),
+        epilog=(
+            "examples:\n  ers identify run1.csv --datasheet servo.toml\n"
+            "  ers identify run1.csv run2.csv --datasheet servo.toml --fix J=0.0031 --method iga --polish\n"
+            "  ers identify run1.csv --datasheet servo.toml --plant mujoco --json"
+        ),
+    )
+    parser.add_argument(
+        "recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several"
+    )
+    parser.add_argument(
+        "--method",
+        default="ls",
+        metavar="NAME",
+        help="ls, iga, iga-rotated, ga, pso, cma or de (default ls, trust-region least squares)",
+    )
+    parser.add_argument(
+        "--plant",
+        type=one_of(("reduced", "mujoco")),
+        default="reduced",
+        metavar="reduced|mujoco",
+        help="what is simulated (default reduced)",
+    )
+    parser.add_argument(
+        "--datasheet",
+        metavar="TOML",
+        help=(
+            "what is known of the servo: where the search begins; table1 is the paper's (default: nothing, Eq. 6 from"
+            " scratch)"
+        ),
+    )
+    parser.add_argument(
+        "--fix",
+        type=pair,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="hold a parameter, as in J=0.0031; repeatable",
+    )
+    parser.add_argument(
+        "--bounds",
+        type=pair,
+        action="append",
+        default=[],
+        metavar="NAME=LOW:HIGH",
+        help="search a parameter here; repeatable",
+    )
+    parser.add_argument(
+        "--within",
+        type=several(number(above=0), "factor"),
+        default=[0.2, 3.0],
+        metavar="LOW,HIGH",
+        help="search the others between these factors of what is known (default 0.2,3)",
+    )
+    parser.add_argument(
+        "--evaluations", type=whole(1), metavar="N", help="simulations at most (default 10000, in MuJoCo 400)"
+    )
     parser.add_argument("--timestep", type=number(above=0), metavar="S", help="MuJoCo's step [s] (default 5e-5)")
     parser.add_argument("--polish", action="store_true", help="let ls go on where another method ends")
-    parser.add_argument("--map", type=pair, action="append", default=[], metavar="name=column", help="take the column as this name, as in t_s=Time; repeatable")
+    parser.add_argument(
+        "--map",
+        type=pair,
+        action="append",
+        default=[],
+        metavar="name=column",
+        help="take the column as this name, as in t_s=Time; repeatable",
+    )
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -45,16 +98,33 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Identify, write, tell; 0 whatever comes out."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    names, fixed, bounds = mapping(arguments.map), _values(arguments.fix, "--fix", _value), _values(arguments.bounds, "--bounds", _ends)
+    names, fixed, bounds = (
+        mapping(arguments.map),
+        _values(arguments.fix, "--fix", _value),
+        _values(arguments.bounds, "--bounds", _ends),
+    )
     if len(arguments.within) != 2 or not arguments.within[0] < 1 < arguments.within[1]:
-        raise InputError(f"--within gives {', '.join(f'{x:g}' for x in arguments.within)}, a factor below one and one above it were expected")
+        raise InputError(
+            f"--within gives {', '.join(f'{x:g}' for x in arguments.within)}, a factor below one and one above it were"
+            " expected"
+        )
     from ers_mj.datasheet import read_datasheet
     from ers_mj.identifying.estimate import identify
     from ers_mj.identifying.finding import Settings
     from ers_mj.recording import read_recording
 
-    settings = Settings(arguments.method, arguments.plant, fixed, bounds, tuple(arguments.within), arguments.evaluations, arguments.polish,
-                        arguments.seed, arguments.jobs, **({"timestep": arguments.timestep} if arguments.timestep else {}))
+    settings = Settings(
+        arguments.method,
+        arguments.plant,
+        fixed,
+        bounds,
+        tuple(arguments.within),
+        arguments.evaluations,
+        arguments.polish,
+        arguments.seed,
+        arguments.jobs,
+        **({"timestep": arguments.timestep} if arguments.timestep else {}),
+    )
     datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
     recordings = [read_recording(spec, names) for spec in arguments.recordings]
     refuse_twice(recordings, [])
@@ -93,15 +163,33 @@ def _ends(name: str, text: str, option: str) -> tuple[float, float]:
 def _document(found: Identified, recordings: list[Recording]) -> dict:
     from ers_mj.commands.trial import versions
 
-    return {"method": found.settings.method, "plant": found.settings.plant, "sentence": found.sentence,
-            "parameters": {row.name: row.as_document() for row in found.rows},
-            "fitness": found.fitness, "evaluations": found.evaluations, "wall_s": found.wall_s,
-            "explains": found.explains, "misfit_sigma2": found.misfit, "warnings": list(found.warnings),
-            "structure": {"letters": list(found.structure.names), "rank": found.structure.rank, "null_space": found.structure.null,
-                          "singular_values": found.structure.singular},
-            "data": {"files": [r.name for r in recordings], "sha256": [r.sha256 for r in recordings], "output_unit": recordings[0].output_unit,
-                     "input_unit": recordings[0].input_unit, "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems]},
-            "seed": found.settings.seed, "versions": versions()}
+    return {
+        "method": found.settings.method,
+        "plant": found.settings.plant,
+        "sentence": found.sentence,
+        "parameters": {row.name: row.as_document() for row in found.rows},
+        "fitness": found.fitness,
+        "evaluations": found.evaluations,
+        "wall_s": found.wall_s,
+        "explains": found.explains,
+        "misfit_sigma2": found.misfit,
+        "warnings": list(found.warnings),
+        "structure": {
+            "letters": list(found.structure.names),
+            "rank": found.structure.rank,
+            "null_space": found.structure.null,
+            "singular_values": found.structure.singular,
+        },
+        "data": {
+            "files": [r.name for r in recordings],
+            "sha256": [r.sha256 for r in recordings],
+            "output_unit": recordings[0].output_unit,
+            "input_unit": recordings[0].input_unit,
+            "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems],
+        },
+        "seed": found.settings.seed,
+        "versions": versions(),
+    }
 
 
 def _write(folder: Path, document: dict, found: Identified, progress: Progress) -> list[Path]:
@@ -110,23 +198,38 @@ def _write(folder: Path, document: dict, found: Identified, progress: Progress) 
 
     progress("drawing the report", 1.0)
     page = identify_page(document, found)
-    return write_results(folder, {
-        "identify.json": lambda path: write_text(path, as_json(document) + "\n"),
-        "report.html": lambda path: write_text(path, page),
-        "model.toml": lambda path: write_model(path, found.model),
-    })
+    return write_results(
+        folder,
+        {
+            "identify.json": lambda path: write_text(path, as_json(document) + "\n"),
+            "report.html": lambda path: write_text(path, page),
+            "model.toml": lambda path: write_model(path, found.model),
+        },
+    )
 
 
 def _told(document: dict, files: list[Path]) -> list[str]:
     """What a terminal shows when all is done."""
-    lines = ["", bold(document["sentence"]), "", bold(f"  {'parameter':14}{'value':>14}{'95 % interval':>30}{'datasheet':>14}")]
+    lines = [
+        "",
+        bold(document["sentence"]),
+        "",
+        bold(f"  {'parameter':14}{'value':>14}{'95 % interval':>30}{'datasheet':>14}"),
+    ]
     for name, row in document["parameters"].items():
         value = "not told" if row["value"] is None else f"{row['value']:.5g}"
         low, high = row["ci95"]
         ends = f"{low:.5g} .. {high:.5g}" if low is not None and not row["fixed"] else "held" if row["fixed"] else ""
         sheet = "" if row["datasheet"] is None else f"{row['datasheet']:.5g}"
         lines.append(f"  {name:14}{value:>14}{ends:>30}{sheet:>14}  {row['unit']}")
-    lines += ["", f"{document['method']} on the {document['plant']} plant: fitness {document['fitness']:.3g}, {document['evaluations']} simulations, "
-              f"{document['wall_s']:.2f} s"]
-    lines += ["", bold("be careful"), *(f"  {warning}" for warning in document["warnings"])] if document["warnings"] else []
+    lines += [
+        "",
+        (
+            f"{document['method']} on the {document['plant']} plant: fitness {document['fitness']:.3g},"
+            f" {document['evaluations']} simulations, {document['wall_s']:.2f} s"
+        ),
+    ]
+    lines += (
+        ["", bold("be careful"), *(f"  {warning}" for warning in document["warnings"])] if document["warnings"] else []
+    )
     return lines + (["", bold("written"), *(f"  {path}" for path in files)] if files else [])

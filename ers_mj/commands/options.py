@@ -10,7 +10,10 @@ from pathlib import Path
 from ers_mj.errors import InputError
 
 DEFAULT_OUT = "ers-out"
-TURN, QUARTER = 360.0, 90.0  # [deg] that no rudder's step or angle goes beyond, and no play, noise or count of its sensor
+TURN, QUARTER = (
+    360.0,
+    90.0,
+)  # [deg] that no rudder's step or angle goes beyond, and no play, noise or count of its sensor
 
 
 def number(least: float | None = None, above: float | None = None, most: float | None = None):
@@ -88,13 +91,17 @@ def add_out(parser: argparse.ArgumentParser) -> None:
 
 def add_common(parser: argparse.ArgumentParser) -> None:
     """--seed, --jobs and --json."""
-    parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of everything drawn by chance (default 0)")
+    parser.add_argument(
+        "--seed", type=whole(0), default=0, metavar="N", help="seed of everything drawn by chance (default 0)"
+    )
     add_jobs_and_json(parser)
 
 
 def add_jobs_and_json(parser: argparse.ArgumentParser) -> None:
     """--jobs and --json."""
-    parser.add_argument("--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N", help="cores to use (default all)")
+    parser.add_argument(
+        "--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N", help="cores to use (default all)"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
 
 

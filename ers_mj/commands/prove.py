@@ -1,4 +1,6 @@
-"""`ers prove`: conceals effects in recordings made in MuJoCo, or in real ones, diagnoses them blind, and opens the truth."""
+"""`ers prove`: conceals effects in recordings made in MuJoCo, or in real ones, diagnoses them blind, and opens the
+truth.
+"""
 
 from __future__ import annotations
 
@@ -23,15 +25,29 @@ CASES, STOPPED = 20, 130
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "prove", help="conceal effects, diagnose them blind, score",
-        description="Measure what the diagnosis can do. Servos are drawn, effects concealed in them in other forms than the library's, recorded in\n"
-                    "MuJoCo; the truth is sealed and its hash printed; each case is diagnosed by a process that gets its files only; the truth is\n"
-                    "opened and the answers scored. A quarter of the cases hides nothing, half one effect, 15 % several, 10 % one that the\n"
-                    "library does not have. Stopped with Ctrl-C, the same command goes on where it was.",
-        epilog="examples:\n  ers prove --cases 40 --seed 7 --out proof\n  ers prove --real ../shared/data --cases 15 --out proof-real")
+        "prove",
+        help="conceal effects, diagnose them blind, score",
+        description=(
+            "Measure what the diagnosis can do. Servos are drawn, effects concealed in them in other forms than the"
+            " library's, recorded in\nMuJoCo; the truth is sealed and its hash printed; each case is diagnosed by a"
+            " process that gets its files only; the truth is\nopened and the answers scored. A quarter of the cases"
+            " hides nothing, half one effect, 15 % several, 10 % one that the\nlibrary does not have. Stopped with"
+            " Ctrl-C, the same command goes on where it was."
+        ),
+        epilog=(
+            "examples:\n  ers prove --cases 40 --seed 7 --out proof\n  ers prove --real ../shared/data --cases 15 --out"
+            " proof-real"
+        ),
+    )
     parser.add_argument("--cases", type=whole(1), metavar="N", help=f"how many (default {CASES})")
-    parser.add_argument("--real", metavar="FOLDER", help="conceal in real recordings: the folder that holds emps/, throttle/ and sts3215/")
-    parser.add_argument("--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)")
+    parser.add_argument(
+        "--real",
+        metavar="FOLDER",
+        help="conceal in real recordings: the folder that holds emps/, throttle/ and sts3215/",
+    )
+    parser.add_argument(
+        "--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)"
+    )
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -60,18 +76,36 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
 
     try:
         with Progress() as progress:
-            proof = conduct(folder, tasks, settings, force=arguments.force or arguments.out is None, jobs=arguments.jobs,
-                            limit=arguments.limit, tell=_tell, progress=progress)
+            proof = conduct(
+                folder,
+                tasks,
+                settings,
+                force=arguments.force or arguments.out is None,
+                jobs=arguments.jobs,
+                limit=arguments.limit,
+                tell=_tell,
+                progress=progress,
+            )
     except KeyboardInterrupt:
-        kept = f"{folder} keeps what was done, the same command goes on from there" if keeps else "nothing was kept, --out DIR would keep it"
+        kept = (
+            f"{folder} keeps what was done, the same command goes on from there"
+            if keeps
+            else "nothing was kept, --out DIR would keep it"
+        )
         print(f"ers: stopped; {kept}", file=sys.stderr)
         return STOPPED
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
     scores = scored(rows) if arguments.real is None else scored_real(rows)
-    results = plain({**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)})
+    results = plain(
+        {**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)}
+    )
     told = _told(results)
     files = _write(folder, results, rows, told) if keeps else []
-    print(as_json(results) if arguments.json else "\n".join([*told, *(["", bold("written"), *(f"  {path}" for path in files)] if files else [])]))
+    print(
+        as_json(results)
+        if arguments.json
+        else "\n".join([*told, *(["", bold("written"), *(f"  {path}" for path in files)] if files else [])])
+    )
     return 0
 
 
@@ -85,7 +119,12 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
         plans = real.plans(arguments.cases or len(real.COVERAGE), arguments.seed)
         real.refuse_missing(Path(arguments.real), plans)
         tasks = [Task(plan.name, real.make, (plan, Path(arguments.real).absolute(), arguments.seed)) for plan in plans]
-        return tasks, {"kind": "real", "seed": arguments.seed, "cases": len(plans), "folder": str(Path(arguments.real).absolute())}
+        return tasks, {
+            "kind": "real",
+            "seed": arguments.seed,
+            "cases": len(plans),
+            "folder": str(Path(arguments.real).absolute()),
+        }
     from ers_mj.proving import case
 
     plans = case.plans(arguments.cases or CASES, arguments.seed)
@@ -116,11 +155,14 @@ def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> li
 
     about = {"seed": results["seed"], "truth sealed as sha256": results["truth_sha256"], **results["versions"]}
     page = proof_page(results, rows, about)
-    return write_results(folder, {
-        "results.json": lambda path: write_text(path, as_json(results) + "\n"),
-        "report.html": lambda path: write_text(path, page),
-        "summary.txt": lambda path: write_text(path, "\n".join(told) + "\n"),
-    })
+    return write_results(
+        folder,
+        {
+            "results.json": lambda path: write_text(path, as_json(results) + "\n"),
+            "report.html": lambda path: write_text(path, page),
+            "summary.txt": lambda path: write_text(path, "\n".join(told) + "\n"),
+        },
+    )
 
 
 # -- the proof in lines ---------------------------------------------------------------------------------------------
@@ -137,12 +179,21 @@ def _told(results: dict) -> list[str]:
         lines += ["", bold("named right by class, against what the refit leaves [sigma]")]
     for b in results["accuracy"]:
         top = f"{b['to_sigma']:g}" if b["to_sigma"] else "more"
-        lines.append(f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]")
+        lines.append(
+            f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]"
+        )
     lines += _told_real(results) if "concealed_in_real" in results else _told_confusion(results["confusion"])
     over, cpu, pair, wall = (results[name] for name in ("error_over_floor", "cpu_s", "cpu_s_of_a_pair", "wall_s"))
-    lines += ["", f"held-out error over noise floor: median {over['median']:.3g}, 90 % below {over['p90']:.3g}"] if over.get("median") else [""]
+    lines += (
+        ["", f"held-out error over noise floor: median {over['median']:.3g}, 90 % below {over['p90']:.3g}"]
+        if over.get("median")
+        else [""]
+    )
     if cpu:
-        lines.append(f"time a case: median {cpu['median']:.1f} s of one processor, at most {cpu['max']:.1f} s (by the clock {wall['median']:.1f} and {wall['max']:.1f} s)")
+        lines.append(
+            f"time a case: median {cpu['median']:.1f} s of one processor, at most {cpu['max']:.1f} s (by the clock"
+            f" {wall['median']:.1f} and {wall['max']:.1f} s)"
+        )
     if pair:
         lines.append(f"a pair of effects: median {pair['median']:.1f} s, at most {pair['max']:.1f} s")
     if results["peak_MiB"]:
@@ -153,7 +204,10 @@ def _told(results: dict) -> list[str]:
 def _told_confusion(confusion: dict) -> list[str]:
     """What was named first of each that was concealed."""
     lines = ["", bold("concealed -> named first")]
-    return lines + [f"  {truth:58} {', '.join(f'{k} x {name}' if k > 1 else name for name, k in named.items())}" for truth, named in confusion.items()]
+    return lines + [
+        f"  {truth:58} {', '.join(f'{k} x {name}' if k > 1 else name for name, k in named.items())}"
+        for truth, named in confusion.items()
+    ]
 
 
 def _told_real(results: dict) -> list[str]:
@@ -164,5 +218,8 @@ def _told_real(results: dict) -> list[str]:
     lines += [f"  {rig:12} {', '.join(names) or 'nothing'}" for rig, names in results["own"].items()]
     lines += ["", bold("concealed in them")]
     for x in results["concealed_in_real"]:
-        lines.append(f"  {x['rig']:12} {x['concealed']:22} {x['strength']:<10.3g} {again(x):7} {', '.join(x['named']) or 'nothing'}")
+        lines.append(
+            f"  {x['rig']:12} {x['concealed']:22} {x['strength']:<10.3g} {again(x):7}"
+            f" {', '.join(x['named']) or 'nothing'}"
+        )
     return lines

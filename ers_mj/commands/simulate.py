@@ -22,20 +22,42 @@ MOST_SAMPLES = 20_000_000
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "simulate", help="write a recording with known truth", description="Simulate a servo: a recording with known truth.",
-        epilog="examples:\n  ers simulate --plant reduced --input steps --effect stribeck:dF_s=0.1,v_s=0.2 --noise-deg 0.01 --out rec.csv\n"
-               "  ers simulate --plant mujoco --linkage rod --gap 0.5 --inductance on --input chirp --out rec.csv\n"
-               "  ers simulate model.toml --plant reduced --input volts.csv --out rec.csv")
-    parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)")
+        "simulate",
+        help="write a recording with known truth",
+        description="Simulate a servo: a recording with known truth.",
+        epilog=(
+            "examples:\n  ers simulate --plant reduced --input steps --effect stribeck:dF_s=0.1,v_s=0.2 --noise-deg"
+            " 0.01 --out rec.csv\n  ers simulate --plant mujoco --linkage rod --gap 0.5 --inductance on --input chirp"
+            " --out rec.csv\n  ers simulate model.toml --plant reduced --input volts.csv --out rec.csv"
+        ),
+    )
+    parser.add_argument(
+        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
+    )
     parser.add_argument("--plant", choices=PLANTS, default="reduced", help="what to simulate (default reduced)")
-    parser.add_argument("--input", required=True, metavar="CSV|NAME", help="columns t_s,u_V, or multisine, chirp, ramp, steps, square")
+    parser.add_argument(
+        "--input", required=True, metavar="CSV|NAME", help="columns t_s,u_V, or multisine, chirp, ramp, steps, square"
+    )
     parser.add_argument("--gap", type=number(least=0), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
-    parser.add_argument("--play", choices=PLAYS, default="gap", help="a gap between two bodies, or the paper's Eq. (4) as printed (default gap)")
-    parser.add_argument("--linkage", choices=LINKAGES, default="constant", help="of the rudder; rod in mujoco only (default constant)")
+    parser.add_argument(
+        "--play",
+        choices=PLAYS,
+        default="gap",
+        help="a gap between two bodies, or the paper's Eq. (4) as printed (default gap)",
+    )
+    parser.add_argument(
+        "--linkage", choices=LINKAGES, default="constant", help="of the rudder; rod in mujoco only (default constant)"
+    )
     parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME:key=value,...", help="physics to add, SI; repeatable")
-    parser.add_argument("--noise-deg", type=number(least=0), default=0.0, metavar="X", help="sensor noise, standard deviation [deg]")
-    parser.add_argument("--rate-hz", type=number(above=0), metavar="N", help="sample rate of a named input (default 1000)")
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="NAME:key=value,...", help="physics to add, SI; repeatable"
+    )
+    parser.add_argument(
+        "--noise-deg", type=number(least=0), default=0.0, metavar="X", help="sensor noise, standard deviation [deg]"
+    )
+    parser.add_argument(
+        "--rate-hz", type=number(above=0), metavar="N", help="sample rate of a named input (default 1000)"
+    )
     parser.add_argument("--duration", type=number(above=0), metavar="S", help="of a named input [s] (default 10)")
     parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="seed of the noise (default 0)")
     parser.add_argument("--out", required=True, metavar="FILE", help="the CSV file to write")
@@ -55,9 +77,18 @@ def run(arguments: argparse.Namespace) -> int:
     effects = [parse_effect(text) for text in arguments.effect]
     t, u = _input(arguments)
     columns = simulate_recording(
-        datasheet, t, u, effects=effects, noise=math.radians(arguments.noise_deg), seed=arguments.seed,
-        plant=arguments.plant, gap=math.radians(arguments.gap), linkage=arguments.linkage, play=arguments.play,
-        inductance=arguments.inductance == "on")
+        datasheet,
+        t,
+        u,
+        effects=effects,
+        noise=math.radians(arguments.noise_deg),
+        seed=arguments.seed,
+        plant=arguments.plant,
+        gap=math.radians(arguments.gap),
+        linkage=arguments.linkage,
+        play=arguments.play,
+        inductance=arguments.inductance == "on",
+    )
     make_room(out)
     write_recording(out, columns)
     summary = _summary(arguments, columns, [*datasheet.effects, *effects])
@@ -91,27 +122,45 @@ def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
                 raise InputError(f"{option} is for named inputs ({', '.join(INPUTS)}), the file brings its own times")
         file = Path(arguments.input)
         if not file.exists() and not file.suffix:
-            raise InputError(f"--input {file}: there is no such file and no input of that name; there are {', '.join(INPUTS)}")
+            raise InputError(
+                f"--input {file}: there is no such file and no input of that name; there are {', '.join(INPUTS)}"
+            )
         return read_input(file)
     rate, duration = arguments.rate_hz or RATE_HZ, arguments.duration or DURATION
     if not 2 <= rate * duration <= MOST_SAMPLES:
-        raise InputError(f"{duration:g} s at {rate:g} Hz are {rate * duration:.3g} samples, 2 to {MOST_SAMPLES:.0e} were expected")
+        raise InputError(
+            f"{duration:g} s at {rate:g} Hz are {rate * duration:.3g} samples, 2 to {MOST_SAMPLES:.0e} were expected"
+        )
     t = np.arange(round(rate * duration)) / rate
     return t, INPUTS[arguments.input](t)
 
 
 def _summary(arguments: argparse.Namespace, columns: dict, effects: list) -> dict:
     t, theta = columns["t_s"], columns["theta_rad"]
-    return {"out": arguments.out, "plant": arguments.plant, "linkage": arguments.linkage, "input": arguments.input,
-            "inductance": arguments.inductance == "on", "gap_rad": math.radians(arguments.gap), "play": arguments.play, "samples": int(t.size),
-            "duration_s": float(t[-1] - t[0]), "noise_rad": math.radians(arguments.noise_deg), "seed": arguments.seed,
-            "effects": [{"name": name, "parameters": dict(values)} for name, values in effects],
-            "theta_rms_rad": float(theta.std()), "theta_min_rad": float(theta.min()), "theta_max_rad": float(theta.max())}
+    return {
+        "out": arguments.out,
+        "plant": arguments.plant,
+        "linkage": arguments.linkage,
+        "input": arguments.input,
+        "inductance": arguments.inductance == "on",
+        "gap_rad": math.radians(arguments.gap),
+        "play": arguments.play,
+        "samples": int(t.size),
+        "duration_s": float(t[-1] - t[0]),
+        "noise_rad": math.radians(arguments.noise_deg),
+        "seed": arguments.seed,
+        "effects": [{"name": name, "parameters": dict(values)} for name, values in effects],
+        "theta_rms_rad": float(theta.std()),
+        "theta_min_rad": float(theta.min()),
+        "theta_max_rad": float(theta.max()),
+    }
 
 
 def _told(summary: dict) -> str:
     added = [effect["name"] for effect in summary["effects"]]
     added += [f"a play of +-{math.degrees(summary['gap_rad']):.4g} deg"] if summary["gap_rad"] else []
     low, high = math.degrees(summary["theta_min_rad"]), math.degrees(summary["theta_max_rad"])
-    return (f"{summary['out']}: {summary['samples']} samples over {summary['duration_s']:.4g} s, "
-            f"{low:.1f} to {high:.1f} deg, {summary['plant']} plant, {', '.join(added) or 'no effect'}")
+    return (
+        f"{summary['out']}: {summary['samples']} samples over {summary['duration_s']:.4g} s, "
+        f"{low:.1f} to {high:.1f} deg, {summary['plant']} plant, {', '.join(added) or 'no effect'}"
+    )

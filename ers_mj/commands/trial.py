@@ -18,46 +18,133 @@ if TYPE_CHECKING:
     from ers_mj.trial import Conditions, Trial
 
 LINKAGES = ("constant", "rod")
-COLUMNS = (("settles [ms]", "settling_time_s", 1e3, ".1f"), ("overshoot [%]", "overshoot_pct", 1.0, ".2f"),
-           ("steady [°]", "steady_state_error_rad", math.degrees(1), ".4f"), ("RMSE [°]", "rmse_rad", math.degrees(1), ".4f"),
-           ("peak [V]", "peak_u_V", 1.0, ".1f"), ("RMS [V]", "rms_u_V", 1.0, ".2f"), ("chatter [V]", "chatter_V", 1.0, ".3f"),
-           ("energy [J]", "energy_J", 1.0, ".2f"))
+COLUMNS = (
+    ("settles [ms]", "settling_time_s", 1e3, ".1f"),
+    ("overshoot [%]", "overshoot_pct", 1.0, ".2f"),
+    ("steady [°]", "steady_state_error_rad", math.degrees(1), ".4f"),
+    ("RMSE [°]", "rmse_rad", math.degrees(1), ".4f"),
+    ("peak [V]", "peak_u_V", 1.0, ".1f"),
+    ("RMS [V]", "rms_u_V", 1.0, ".2f"),
+    ("chatter [V]", "chatter_V", 1.0, ".3f"),
+    ("energy [J]", "energy_J", 1.0, ".2f"),
+)
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "trial", help="controllers in a closed loop, on either plant",
+        "trial",
+        help="controllers in a closed loop, on either plant",
         description="Run controllers in a closed loop and measure them. Lists with commas run every combination.",
-        epilog="examples:\n  ers trial\n"
-               "  ers trial --controller ftrc,pid-ff,time-optimal --plant reduced,mujoco --case square,ramp,chirp --rate-hz 1000 --noise-deg 0.01\n"
-               "  ers trial model.toml --design datasheet.toml --case my_reference.csv --umax-V 12 --delay-ms 1 --out mine\n"
-               "  ers trial --plants 50 --scatter 1.25 --case step,chirp --rate-hz 1000\n"
-               "  ers trial --plant mujoco --gap 0.5 --inductance on --effect stribeck:dF_s=0.1,v_s=0.2 --json")
-    parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="the plant: datasheet or model.toml with its effects (default table1)")
-    parser.add_argument("--design", metavar="MODEL", help="what the controllers know of the plant (default the MODEL itself)")
-    parser.add_argument("--controller", type=several(str, "controller"), metavar="NAME,...",
-                        help="ftrc, ftrc-literal, pid, pid-ff, hinf, time-optimal (default all)")
-    parser.add_argument("--plant", type=several(str, "plant"), default=["reduced"], metavar="reduced,mujoco", help="default reduced")
-    parser.add_argument("--case", type=several(str, "case"), default=["step"], metavar="NAME|CSV,...",
-                        help="step, square, ramp, chirp, or a file with t_s and theta_ref_rad or theta_ref_deg (default step)")
-    parser.add_argument("--amplitude-deg", type=number(above=0, most=TURN), default=10.0, metavar="X", help="of the cases (default 10)")
-    parser.add_argument("--start-deg", type=number(least=-TURN, most=TURN), default=15.0, metavar="X", help="where the rudder rests at first (default 15)")
-    parser.add_argument("--rate-hz", type=number(above=0), metavar="N", help="sample rate of the loop (default 10000); a file brings its own")
-    parser.add_argument("--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage (default 24)")
-    parser.add_argument("--gap", type=number(least=0, most=QUARTER), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
+        epilog=(
+            "examples:\n  ers trial\n  ers trial --controller ftrc,pid-ff,time-optimal --plant reduced,mujoco --case"
+            " square,ramp,chirp --rate-hz 1000 --noise-deg 0.01\n  ers trial model.toml --design datasheet.toml --case"
+            " my_reference.csv --umax-V 12 --delay-ms 1 --out mine\n  ers trial --plants 50 --scatter 1.25 --case"
+            " step,chirp --rate-hz 1000\n  ers trial --plant mujoco --gap 0.5 --inductance on --effect"
+            " stribeck:dF_s=0.1,v_s=0.2 --json"
+        ),
+    )
+    parser.add_argument(
+        "model",
+        nargs="?",
+        default="table1",
+        metavar="MODEL",
+        help="the plant: datasheet or model.toml with its effects (default table1)",
+    )
+    parser.add_argument(
+        "--design", metavar="MODEL", help="what the controllers know of the plant (default the MODEL itself)"
+    )
+    parser.add_argument(
+        "--controller",
+        type=several(str, "controller"),
+        metavar="NAME,...",
+        help="ftrc, ftrc-literal, pid, pid-ff, hinf, time-optimal (default all)",
+    )
+    parser.add_argument(
+        "--plant", type=several(str, "plant"), default=["reduced"], metavar="reduced,mujoco", help="default reduced"
+    )
+    parser.add_argument(
+        "--case",
+        type=several(str, "case"),
+        default=["step"],
+        metavar="NAME|CSV,...",
+        help="step, square, ramp, chirp, or a file with t_s and theta_ref_rad or theta_ref_deg (default step)",
+    )
+    parser.add_argument(
+        "--amplitude-deg", type=number(above=0, most=TURN), default=10.0, metavar="X", help="of the cases (default 10)"
+    )
+    parser.add_argument(
+        "--start-deg",
+        type=number(least=-TURN, most=TURN),
+        default=15.0,
+        metavar="X",
+        help="where the rudder rests at first (default 15)",
+    )
+    parser.add_argument(
+        "--rate-hz",
+        type=number(above=0),
+        metavar="N",
+        help="sample rate of the loop (default 10000); a file brings its own",
+    )
+    parser.add_argument(
+        "--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage (default 24)"
+    )
+    parser.add_argument(
+        "--gap", type=number(least=0, most=QUARTER), default=0.0, metavar="DEG", help="play of +-DEG (default 0)"
+    )
     parser.add_argument("--linkage", choices=LINKAGES, default="constant", help="of MuJoCo's rudder (default constant)")
     parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME:key=value,...", help="physics to add to the plant, SI; repeatable")
-    parser.add_argument("--noise-deg", type=number(least=0, most=QUARTER), default=0.0, metavar="X", help="sensor noise, standard deviation (default 0)")
-    parser.add_argument("--quantum-deg", type=number(least=0, most=QUARTER), default=0.0, metavar="X", help="one count of the sensor (default 0)")
-    parser.add_argument("--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)")
-    parser.add_argument("--filter-ms", type=number(least=0), default=0.5, metavar="X", help="time constant of the speed's filter (default 0.5)")
-    parser.add_argument("--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them")
-    parser.add_argument("--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)")
-    parser.add_argument("--plants", type=whole(1), default=0, metavar="N",
-                        help="try N more servos too, their parameters and effects scattered, unknown to the controllers (default 0)")
-    parser.add_argument("--scatter", type=number(least=1), default=1.2, metavar="X", help="largest factor, up or down, of that (default 1.2)")
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME:key=value,...",
+        help="physics to add to the plant, SI; repeatable",
+    )
+    parser.add_argument(
+        "--noise-deg",
+        type=number(least=0, most=QUARTER),
+        default=0.0,
+        metavar="X",
+        help="sensor noise, standard deviation (default 0)",
+    )
+    parser.add_argument(
+        "--quantum-deg",
+        type=number(least=0, most=QUARTER),
+        default=0.0,
+        metavar="X",
+        help="one count of the sensor (default 0)",
+    )
+    parser.add_argument(
+        "--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)"
+    )
+    parser.add_argument(
+        "--filter-ms",
+        type=number(least=0),
+        default=0.5,
+        metavar="X",
+        help="time constant of the speed's filter (default 0.5)",
+    )
+    parser.add_argument(
+        "--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them"
+    )
+    parser.add_argument(
+        "--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)"
+    )
+    parser.add_argument(
+        "--plants",
+        type=whole(1),
+        default=0,
+        metavar="N",
+        help="try N more servos too, their parameters and effects scattered, unknown to the controllers (default 0)",
+    )
+    parser.add_argument(
+        "--scatter",
+        type=number(least=1),
+        default=1.2,
+        metavar="X",
+        help="largest factor, up or down, of that (default 1.2)",
+    )
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -78,26 +165,54 @@ def run(arguments: argparse.Namespace) -> int:
     design = datasheet if arguments.design is None else read_datasheet(arguments.design)
     conditions = _conditions(arguments)
     with Progress() as progress:
-        trials = try_out(datasheet, controllers, arguments.plant, arguments.case, conditions, design=design, progress=progress)
+        trials = try_out(
+            datasheet, controllers, arguments.plant, arguments.case, conditions, design=design, progress=progress
+        )
         spreads = _spreads(arguments, datasheet, controllers, conditions, design, progress)
-        document = plain({"trials": [t.as_document() for t in trials], "sentence": headline(trials), "notes": _notes(trials, design, conditions),
-                          "robustness": [x.as_document() for x in spreads], "scatter": arguments.scatter,
-                          "conditions": conditions.as_document(), "controllers": {name: CONTROLLERS[name].sentence for name in controllers},
-                          "datasheet": datasheet.name or arguments.model, "design": design.name or arguments.design, "versions": versions()})
+        document = plain(
+            {
+                "trials": [t.as_document() for t in trials],
+                "sentence": headline(trials),
+                "notes": _notes(trials, design, conditions),
+                "robustness": [x.as_document() for x in spreads],
+                "scatter": arguments.scatter,
+                "conditions": conditions.as_document(),
+                "controllers": {name: CONTROLLERS[name].sentence for name in controllers},
+                "datasheet": datasheet.name or arguments.model,
+                "design": design.name or arguments.design,
+                "versions": versions(),
+            }
+        )
         files = _write(folder, document, trials, spreads, progress) if folder is not None else []
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
     return 0
 
 
-def _spreads(arguments: argparse.Namespace, datasheet: Datasheet, controllers: list[str], conditions: Conditions, design: Datasheet,
-             progress: Progress) -> list[Spread]:
+def _spreads(
+    arguments: argparse.Namespace,
+    datasheet: Datasheet,
+    controllers: list[str],
+    conditions: Conditions,
+    design: Datasheet,
+    progress: Progress,
+) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
     from ers_mj.robustness import scatter
 
     if not arguments.plants:
         return []
-    return scatter(datasheet, controllers, arguments.plant, arguments.case, conditions, count=arguments.plants, spread=arguments.scatter, design=design,
-                   jobs=arguments.jobs, progress=progress)
+    return scatter(
+        datasheet,
+        controllers,
+        arguments.plant,
+        arguments.case,
+        conditions,
+        count=arguments.plants,
+        spread=arguments.scatter,
+        design=design,
+        jobs=arguments.jobs,
+        progress=progress,
+    )
 
 
 def refuse_unknown(option: str, names: Iterable[str], known: Iterable[str]) -> None:
@@ -116,7 +231,10 @@ def _refuse_cases(arguments: argparse.Namespace) -> None:
     files = [case for case in arguments.case if case not in CASES]
     for case in files:
         if not Path(case).exists() and not Path(case).suffix:
-            raise InputError(f"--case: there is no {case[:40]!r}; there are {', '.join(CASES)}, or a file, as in --case reference.csv")
+            raise InputError(
+                f"--case: there is no {case[:40]!r}; there are {', '.join(CASES)}, or a file, as in --case"
+                " reference.csv"
+            )
     if files and len(files) == len(arguments.case) and arguments.rate_hz is not None:
         raise InputError(f"--rate-hz is for {', '.join(CASES)}, the file brings its own times")
 
@@ -130,10 +248,20 @@ def _conditions(arguments: argparse.Namespace) -> Conditions:
     effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
     effects += [("sensor_quantisation", {"step": math.radians(arguments.quantum_deg)})] if arguments.quantum_deg else []
     return Conditions(
-        amplitude=math.radians(arguments.amplitude_deg), start=math.radians(arguments.start_deg), rate_hz=arguments.rate_hz or 10_000.0,
-        u_max=arguments.umax, gap=math.radians(arguments.gap), linkage=arguments.linkage, inductance=arguments.inductance == "on",
-        noise=math.radians(arguments.noise_deg), seed=arguments.seed, filter_s=1e-3 * arguments.filter_ms, gains=parse_gains(arguments.gains),
-        pid=parse_pid(arguments.pid), effects=tuple(effects))
+        amplitude=math.radians(arguments.amplitude_deg),
+        start=math.radians(arguments.start_deg),
+        rate_hz=arguments.rate_hz or 10_000.0,
+        u_max=arguments.umax,
+        gap=math.radians(arguments.gap),
+        linkage=arguments.linkage,
+        inductance=arguments.inductance == "on",
+        noise=math.radians(arguments.noise_deg),
+        seed=arguments.seed,
+        filter_s=1e-3 * arguments.filter_ms,
+        gains=parse_gains(arguments.gains),
+        pid=parse_pid(arguments.pid),
+        effects=tuple(effects),
+    )
 
 
 def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> list[str]:
@@ -145,7 +273,10 @@ def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> li
     for aim in {t.case: t.run.reference for t in trials}.values():
         volts = needed(aim, known)
         if volts > conditions.u_max:
-            notes.append(f"The {aim.name} asks for up to {volts:.3g} V, {conditions.u_max:g} V are there: no law can follow it throughout.")
+            notes.append(
+                f"The {aim.name} asks for up to {volts:.3g} V, {conditions.u_max:g} V are there: no law can follow it"
+                " throughout."
+            )
     return notes
 
 
@@ -163,10 +294,13 @@ def _write(folder: Path, document: dict, trials: list[Trial], spreads: list[Spre
 
     progress("drawing the report", 1.0)
     page = trial_page(document, trials, spreads)
-    return write_results(folder, {
-        "trials.json": lambda path: write_text(path, as_json(document) + "\n"),
-        "report.html": lambda path: write_text(path, page),
-    })
+    return write_results(
+        folder,
+        {
+            "trials.json": lambda path: write_text(path, as_json(document) + "\n"),
+            "report.html": lambda path: write_text(path, page),
+        },
+    )
 
 
 # -- the trials in lines --------------------------------------------------------------------------------------------
@@ -180,7 +314,11 @@ def _told(document: dict, files: list[Path]) -> list[str]:
         lines += ["", bold(f"{f'{case}, {plant} plant':26}" + "".join(f"{head:>15}" for head, *_ in COLUMNS))]
         for t in document["trials"]:
             if (t["case"], t["plant"]) == (case, plant):
-                cells = "".join(f"{cell(t, *column):>15}" for column in COLUMNS) if t["stable"] else f"{'unstable: it was given up':>30}"
+                cells = (
+                    "".join(f"{cell(t, *column):>15}" for column in COLUMNS)
+                    if t["stable"]
+                    else f"{'unstable: it was given up':>30}"
+                )
                 lines.append(f"  {t['controller']:24}{cells}")
     lines += _spread_lines(document)
     lines += ["", *document["notes"]] if document["notes"] else []
@@ -193,7 +331,12 @@ def _spread_lines(document: dict) -> list[str]:
     for case, plant in dict.fromkeys((s["case"], s["plant"]) for s in document["robustness"]):
         group = [s for s in document["robustness"] if (s["case"], s["plant"]) == (case, plant)]
         head = f"{case}, {plant}, {group[0]['plants']} servos"
-        lines += ["", bold(f"{head:26}{'RMSE [°] 5 / 50 / 95 %':>30}{'settles [ms] 5 / 50 / 95 %':>30}{'never':>8}{'unstable':>10}")]
+        lines += [
+            "",
+            bold(
+                f"{head:26}{'RMSE [°] 5 / 50 / 95 %':>30}{'settles [ms] 5 / 50 / 95 %':>30}{'never':>8}{'unstable':>10}"
+            ),
+        ]
         for s in group:
             shown = (("rmse_rad", degree, ".4f"), ("settling_time_s", 1e3, ".1f"))
             cells = "".join(f"{_three(s['measures'][key], factor, form):>30}" for key, factor, form in shown)
@@ -202,7 +345,11 @@ def _spread_lines(document: dict) -> list[str]:
 
 
 def _three(quantiles: dict | None, factor: float, form: str) -> str:
-    return "-" if quantiles is None else " / ".join(f"{factor * quantiles[key]:{form}}" for key in ("q05", "median", "q95"))
+    return (
+        "-"
+        if quantiles is None
+        else " / ".join(f"{factor * quantiles[key]:{form}}" for key in ("q05", "median", "q95"))
+    )
 
 
 def cell(trial: dict, head: str, key: str, factor: float, form: str) -> str:

@@ -21,15 +21,36 @@ NAME = 38  # characters of a row's name
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "validate", help="the reduced model against the MuJoCo plant",
-        description="Say where and why the reduced model, Eq. (6), stops being valid: MuJoCo has the play, the rod, the inductance, it has not.\n"
-                    "With none of --gap, --linkage, --inductance every combination of 0 and 0.5 deg, both linkages, off and on.",
-        epilog="examples:\n  ers validate\n  ers validate --gap 0.1,0.5,1 --inductance off,on --out play\n"
-               "  ers validate --gap 0 --linkage constant --json")
-    parser.add_argument("--datasheet", default="table1", metavar="TOML", help="datasheet or model.toml (default table1, the paper's)")
-    parser.add_argument("--gap", type=several(number(least=0), "gap"), metavar="DEG,...", help="play of +-DEG (default 0)")
-    parser.add_argument("--linkage", type=several(one_of(LINKAGES), "linkage"), metavar="constant,rod", help="of MuJoCo's rudder (default constant)")
-    parser.add_argument("--inductance", type=several(one_of(SWITCH), "switch"), metavar="off,on", help="whether L acts, in both plants (default off)")
+        "validate",
+        help="the reduced model against the MuJoCo plant",
+        description=(
+            "Say where and why the reduced model, Eq. (6), stops being valid: MuJoCo has the play, the rod, the"
+            " inductance, it has not.\nWith none of --gap, --linkage, --inductance every combination of 0 and 0.5 deg,"
+            " both linkages, off and on."
+        ),
+        epilog=(
+            "examples:\n  ers validate\n  ers validate --gap 0.1,0.5,1 --inductance off,on --out play\n"
+            "  ers validate --gap 0 --linkage constant --json"
+        ),
+    )
+    parser.add_argument(
+        "--datasheet", default="table1", metavar="TOML", help="datasheet or model.toml (default table1, the paper's)"
+    )
+    parser.add_argument(
+        "--gap", type=several(number(least=0), "gap"), metavar="DEG,...", help="play of +-DEG (default 0)"
+    )
+    parser.add_argument(
+        "--linkage",
+        type=several(one_of(LINKAGES), "linkage"),
+        metavar="constant,rod",
+        help="of MuJoCo's rudder (default constant)",
+    )
+    parser.add_argument(
+        "--inductance",
+        type=several(one_of(SWITCH), "switch"),
+        metavar="off,on",
+        help="whether L acts, in both plants (default off)",
+    )
     parser.add_argument("--no-maps", action="store_true", help="leave the validity maps out, a third of the time")
     add_out(parser)
     add_jobs_and_json(parser)
@@ -46,8 +67,17 @@ def run(arguments: argparse.Namespace) -> int:
     datasheet = read_datasheet(arguments.datasheet)
     gaps, linkages, inductances, left_out = _asked(arguments, datasheet)
     with Progress() as progress:
-        found = validate(datasheet, gaps, linkages, inductances, maps=not arguments.no_maps, jobs=arguments.jobs, progress=progress)
-        document = plain({**as_document(found), "left_out": left_out, "datasheet": datasheet.name or arguments.datasheet, "versions": _versions()})
+        found = validate(
+            datasheet, gaps, linkages, inductances, maps=not arguments.no_maps, jobs=arguments.jobs, progress=progress
+        )
+        document = plain(
+            {
+                **as_document(found),
+                "left_out": left_out,
+                "datasheet": datasheet.name or arguments.datasheet,
+                "versions": _versions(),
+            }
+        )
         files = _write(folder, document, found, progress) if folder is not None else []
     print(as_json(document) if arguments.json else "\n".join(_told(found, document, files)))
     return 0
@@ -59,8 +89,12 @@ def _asked(arguments: argparse.Namespace, datasheet: Datasheet) -> tuple[list, l
         from ers_mj.validation import possible
 
         return possible(datasheet)
-    return ([math.radians(x) for x in arguments.gap or (0.0,)], arguments.linkage or ["constant"],
-            [x == "on" for x in arguments.inductance or ("off",)], [])
+    return (
+        [math.radians(x) for x in arguments.gap or (0.0,)],
+        arguments.linkage or ["constant"],
+        [x == "on" for x in arguments.inductance or ("off",)],
+        [],
+    )
 
 
 def _versions() -> dict[str, str]:
@@ -76,10 +110,13 @@ def _write(folder: Path, document: dict, found: Validation, progress: Progress) 
 
     progress("drawing the report", 1.0)
     page = validation_page(found, {"datasheet": document["datasheet"], **document["versions"]})
-    return write_results(folder, {
-        "validation.json": lambda path: write_text(path, as_json(document) + "\n"),
-        "report.html": lambda path: write_text(path, page),
-    })
+    return write_results(
+        folder,
+        {
+            "validation.json": lambda path: write_text(path, as_json(document) + "\n"),
+            "report.html": lambda path: write_text(path, page),
+        },
+    )
 
 
 # -- the validation in lines ----------------------------------------------------------------------------------------
@@ -106,4 +143,10 @@ def _told_table(found: Validation) -> list[str]:
         cases = {case.input: case for case in found.cases if case.condition == condition}
         cells = [f"{degrees(cases[x].rms)}{'*' if cases[x].rms > VALID * cases[x].motion else ' '}" for x in inputs]
         lines.append(f"  {spoken(condition):{NAME - 2}}" + "".join(f"{cell:>11}" for cell in cells))
-    return [*lines, f"  * more than {100 * VALID:.0f} % of the motion; the reduced model is Eq. (6), or Eq. (1) where the inductance is on"]
+    return [
+        *lines,
+        (
+            f"  * more than {100 * VALID:.0f} % of the motion; the reduced model is Eq. (6), or Eq. (1) where the"
+            " inductance is on"
+        ),
+    ]

@@ -28,20 +28,54 @@ INPUT = "square"  # what a .gif without input or recording shows: out, home, and
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "view", help="show the plant in three dimensions",
-        description="The plant in MuJoCo's viewer, or in a picture. A recording is replayed: what was measured is the translucent rudder.",
-        epilog="examples:\n  ers view --linkage rod\n  ers view model.toml --replay run1.csv --render replay.gif\n"
-               "  ers view plant.xml --input steps --render steps.gif")
-    parser.add_argument("model", nargs="?", default="table1", metavar="MODEL", help="datasheet, model.toml or plant.xml (default table1)")
+        "view",
+        help="show the plant in three dimensions",
+        description=(
+            "The plant in MuJoCo's viewer, or in a picture. A recording is replayed: what was measured is the"
+            " translucent rudder."
+        ),
+        epilog=(
+            "examples:\n  ers view --linkage rod\n  ers view model.toml --replay run1.csv --render replay.gif\n"
+            "  ers view plant.xml --input steps --render steps.gif"
+        ),
+    )
+    parser.add_argument(
+        "model",
+        nargs="?",
+        default="table1",
+        metavar="MODEL",
+        help="datasheet, model.toml or plant.xml (default table1)",
+    )
     parser.add_argument("--linkage", choices=LINKAGES, help="of the rudder (default constant)")
     parser.add_argument("--gap", type=number(least=0), metavar="DEG", help="play of +-DEG (default 0)")
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--replay", metavar="REC", help="replay this recording: measured and simulated")
-    shown.add_argument("--input", metavar="NAME", help=f"simulate multisine, chirp, ramp, steps or square (a .gif's default: {INPUT})")
-    parser.add_argument("--map", type=pair, action="append", default=[], metavar="name=column", help="of the recording, as in t_s=Time; repeatable")
-    parser.add_argument("--duration", type=number(above=0), default=DURATION, metavar="S", help=f"shown of the motion [s] (default {DURATION:g})")
-    parser.add_argument("--render", metavar="FILE", help="a picture, .png or .gif, instead of the window; a .png shows the rest position, "
-                        "the end of an input, or where a recording and its simulation differ most")
+    shown.add_argument(
+        "--input", metavar="NAME", help=f"simulate multisine, chirp, ramp, steps or square (a .gif's default: {INPUT})"
+    )
+    parser.add_argument(
+        "--map",
+        type=pair,
+        action="append",
+        default=[],
+        metavar="name=column",
+        help="of the recording, as in t_s=Time; repeatable",
+    )
+    parser.add_argument(
+        "--duration",
+        type=number(above=0),
+        default=DURATION,
+        metavar="S",
+        help=f"shown of the motion [s] (default {DURATION:g})",
+    )
+    parser.add_argument(
+        "--render",
+        metavar="FILE",
+        help=(
+            "a picture, .png or .gif, instead of the window; a .png shows the rest position, "
+            "the end of an input, or where a recording and its simulation differ most"
+        ),
+    )
     parser.add_argument("--width", type=whole(16), metavar="N", help="of the picture [pixels] (default 960, .gif 480)")
     parser.add_argument("--force", action="store_true", help="overwrite FILE")
     parser.add_argument("--json", action="store_true", help="print a summary as one JSON object")
@@ -132,7 +166,9 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
     moments = replay.moments_of(t, FPS, arguments.duration)
     if _is_mjcf(arguments.model):
         return model_file.simulated_file(model_file.read_plant(Path(arguments.model)), t, u, moments)
-    plant = replay.plant_of(read_datasheet(arguments.model), arguments.linkage or "constant", math.radians(arguments.gap or 0.0))
+    plant = replay.plant_of(
+        read_datasheet(arguments.model), arguments.linkage or "constant", math.radians(arguments.gap or 0.0)
+    )
     return replay.simulated(plant, t, u, moments)
 
 
@@ -143,7 +179,9 @@ def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
 
     moments, unit = replay.moments_of(recording.t, FPS, arguments.duration), recording.output_unit
     if _is_mjcf(arguments.model):
-        return model_file.recorded_file(model_file.read_plant(Path(arguments.model)), trace_of(recording, None), moments, unit)
+        return model_file.recorded_file(
+            model_file.read_plant(Path(arguments.model)), trace_of(recording, None), moments, unit
+        )
     sheet = read_datasheet(arguments.model)
     plant = replay.plant_of(sheet, arguments.linkage or "constant", math.radians(arguments.gap or 0.0), unit)
     return replay.recorded(plant, trace_of(recording, sheet.parameters.get("J")), moments, unit)
@@ -168,11 +206,25 @@ def _render(replay: Replay, out: Path, width: int | None) -> dict:
 
 
 def _summary(arguments: argparse.Namespace, replay: Replay) -> dict:
-    return {"model": arguments.model, "replay": arguments.replay, "frames": int(replay.t.size), "fps": FPS,
-            "from_s": float(replay.t[0]), "to_s": float(replay.t[-1]), "output_unit": replay.output_unit,
-            "theta": [float(x) for x in (replay.theta[0], replay.theta[-1])]}
+    return {
+        "model": arguments.model,
+        "replay": arguments.replay,
+        "frames": int(replay.t.size),
+        "fps": FPS,
+        "from_s": float(replay.t[0]),
+        "to_s": float(replay.t[-1]),
+        "output_unit": replay.output_unit,
+        "theta": [float(x) for x in (replay.theta[0], replay.theta[-1])],
+    }
 
 
 def _told(summary: dict) -> str:
-    frames = "one picture" if summary["frames"] == 1 else f"{summary['frames']} pictures, {summary['to_s'] - summary['from_s']:.3g} s"
-    return f"{summary['render']}: {frames}, {summary['width']} x {summary['height']} pixels, {summary['bytes'] / 1e3:.0f} kB"
+    frames = (
+        "one picture"
+        if summary["frames"] == 1
+        else f"{summary['frames']} pictures, {summary['to_s'] - summary['from_s']:.3g} s"
+    )
+    return (
+        f"{summary['render']}: {frames}, {summary['width']} x {summary['height']} pixels,"
+        f" {summary['bytes'] / 1e3:.0f} kB"
+    )

@@ -30,17 +30,43 @@ HISTORY, EVENTS = 400, 6  # estimates and events that the screen remembers
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
     parser = commands.add_parser(
-        "watch", help="follow a running servo's parameters, and flag when the model stops explaining it",
-        description="Follow Eq. (6)'s parameters along a stream of samples: CSV with a header, in a recording's columns t_s, u_V, theta_rad (or others that\n"
-                    "ers diagnose takes). A file is followed as it grows until Ctrl-C. Changes of parameters are announced; a flag rises when no parameters\n"
-                    "explain the stream. Without excitation nothing is told: the voltage should keep the output moving through stick and slip.",
-        epilog="examples:\n  ers watch rig.csv --datasheet servo.toml\n  my_logger | ers watch - --json\n  ers watch run1.csv --once")
+        "watch",
+        help="follow a running servo's parameters, and flag when the model stops explaining it",
+        description=(
+            "Follow Eq. (6)'s parameters along a stream of samples: CSV with a header, in a recording's columns t_s,"
+            " u_V, theta_rad (or others that\ners diagnose takes). A file is followed as it grows until Ctrl-C. Changes"
+            " of parameters are announced; a flag rises when no parameters\nexplain the stream. Without excitation"
+            " nothing is told: the voltage should keep the output moving through stick and slip."
+        ),
+        epilog=(
+            "examples:\n  ers watch rig.csv --datasheet servo.toml\n  my_logger | ers watch - --json\n  ers watch"
+            " run1.csv --once"
+        ),
+    )
     parser.add_argument("stream", metavar="FILE|-", help="a CSV file that may grow, or - for standard input")
-    parser.add_argument("--datasheet", metavar="TOML",
-                        help="what is known of the servo, or a model.toml; table1 for the paper's (default: learn it from the first 5 s)")
-    parser.add_argument("--map", action="append", default=[], type=pair, metavar="NAME=COLUMN", help="take a column of another name; repeatable")
+    parser.add_argument(
+        "--datasheet",
+        metavar="TOML",
+        help=(
+            "what is known of the servo, or a model.toml; table1 for the paper's (default: learn it from the first 5 s)"
+        ),
+    )
+    parser.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        type=pair,
+        metavar="NAME=COLUMN",
+        help="take a column of another name; repeatable",
+    )
     parser.add_argument("--once", action="store_true", help="stop at the end of the file instead of waiting for more")
-    parser.add_argument("--every", type=number(above=0), default=1.0, metavar="S", help="a line every S seconds of the stream, in a pipe (default 1)")
+    parser.add_argument(
+        "--every",
+        type=number(above=0),
+        default=1.0,
+        metavar="S",
+        help="a line every S seconds of the stream, in a pipe (default 1)",
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object a line for every estimate (0.1 s)")
     parser.set_defaults(run=run)
 
@@ -106,15 +132,21 @@ def _estimates(stream, pieces: Iterator[str], datasheet, show) -> Iterator[Estim
             begun = tuple(np.append(a, b) for a, b in zip(begun, samples))
             if not begun[0].size or begun[0][-1] - begun[0][0] < needed or not is_moving(*begun[1:]):
                 show.wait(begun[0])
-                begun = tuple(x[np.searchsorted(begun[0], begun[0][-1] - 2 * needed) :] for x in begun) if begun[0].size else begun
+                begun = (
+                    tuple(x[np.searchsorted(begun[0], begun[0][-1] - 2 * needed) :] for x in begun)
+                    if begun[0].size
+                    else begun
+                )
                 continue
             tracker, samples = Tracker(opening(*begun, datasheet, stream.units["y"] == "rad")), begun
             show.begin(stream.units, datasheet)
         yield from tracker.push(*samples)
     if tracker is None:
         seconds = begun[0][-1] - begun[0][0] if begun[0].size else 0.0
-        raise InputError(f"{stream.name}: ended after {seconds:.3g} s, at least {needed:g} s of motion under a changing input were expected"
-                         + ("" if stream.units else " and a header before them"))
+        raise InputError(
+            f"{stream.name}: ended after {seconds:.3g} s, at least {needed:g} s of motion under a changing input were"
+            " expected" + ("" if stream.units else " and a header before them")
+        )
 
 
 class _Lines:
@@ -155,7 +187,12 @@ class _Machine(_Lines):
     def __call__(self, now: Estimate) -> None:
         from ers_mj.watch_report import as_document, events
 
-        print(json.dumps(plain(as_document(now, events(self._last, now, self._shown))), ensure_ascii=False, allow_nan=False), flush=True)
+        print(
+            json.dumps(
+                plain(as_document(now, events(self._last, now, self._shown))), ensure_ascii=False, allow_nan=False
+            ),
+            flush=True,
+        )
         self._last = now
 
 
@@ -170,7 +207,10 @@ class _Screen(_Lines):
 
     def wait(self, t) -> None:
         seconds = t[-1] - t[0] if t.size else 0.0
-        self._draw([f"ers watch  {self._name}", f"  waiting for motion under a changing input ({seconds:.1f} s seen)"], force=False)
+        self._draw(
+            [f"ers watch  {self._name}", f"  waiting for motion under a changing input ({seconds:.1f} s seen)"],
+            force=False,
+        )
 
     def __call__(self, now: Estimate) -> None:
         from ers_mj.watch_report import events, screen

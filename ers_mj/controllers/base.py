@@ -1,8 +1,8 @@
 """What every controller is: reference with its derivatives and one measurement in, one voltage out, sample by sample.
-
-A member of this folder declares ``name``, ``sentence`` and ``law``. The base brings what all of them need alike: the filtered difference that
-makes a speed of the measured angle, the integral, the saturation, and an integral that stands still while the saturation would only
-deepen. The letters are Eq. (7)'s: x1 = int x2 dt, x2 = theta_r - theta, x3 = theta_r' - w.
+ A member of this folder declares ``name``, ``sentence`` and ``law``. The base brings what all of them need alike: the
+filtered difference that makes a speed of the measured angle, the integral, the saturation, and an integral that stands
+still while the saturation would only deepen. The letters are Eq. (7)'s: x1 = int x2 dt, x2 = theta_r - theta, x3 =
+theta_r' - w.
 """
 
 from __future__ import annotations
@@ -61,27 +61,38 @@ class Servo:
         """
         lumped = datasheet.to_lumped()
         if "b" not in lumped:
-            raise InputError(f"{datasheet.name or 'the datasheet'}: no controller follows from it, it needs b, or J, K_t and R from which b follows")
+            raise InputError(
+                f"{datasheet.name or 'the datasheet'}: no controller follows from it, it needs b, or J, K_t and R from"
+                " which b follows"
+            )
         return cls(**{letter: lumped[letter] for letter in LETTERS if letter in lumped})
 
     def spring(self, theta: float) -> float:
-        """Spring and preload a_1 (theta - theta_0) + c_1 Sgn(theta - theta_0) [rad/s^2], the sign smooth over SIDE_BAND."""
+        """Spring and preload a_1 (theta - theta_0) + c_1 Sgn(theta - theta_0) [rad/s^2], the sign smooth over
+        SIDE_BAND.
+        """
         phi = theta - self.theta_0
         return self.a_1 * phi + self.c_1 * math.tanh(phi / SIDE_BAND)
 
     def friction(self, omega: float, x2: float) -> float:
-        """c_2 Sgn(w) [rad/s^2], stick-aware: where the rudder rests, in proportion to the error that it should leave."""
+        """c_2 Sgn(w) [rad/s^2], stick-aware: where the rudder rests, in proportion to the error that it should
+        leave.
+        """
         if abs(omega) > SLIP:
             return math.copysign(self.c_2, omega)
         return self.c_2 * min(max(x2 / STICK_BAND, -1.0), 1.0)
 
     def feed_forward(self, s: State) -> float:
-        """theta_r'' + a_1 (theta - theta_0) + a_2 w + c_1 Sgn(theta - theta_0) + c_2 Sgn(w) [rad/s^2]: the torque of the wanted motion."""
+        """theta_r'' + a_1 (theta - theta_0) + a_2 w + c_1 Sgn(theta - theta_0) + c_2 Sgn(w) [rad/s^2]: the torque of
+        the wanted motion.
+        """
         return s.aim.alpha + self.spring(s.theta) + self.a_2 * s.omega + self.friction(s.omega, s.x2)
 
     @cached_property
     def printed_gain(self) -> float:
-        """By how much the paper's gains in V/deg, meant for Table 1's servo, are multiplied: the same acceleration for the same error, in V/rad."""
+        """By how much the paper's gains in V/deg, meant for Table 1's servo, are multiplied: the same acceleration for
+        the same error, in V/rad.
+        """
         return math.degrees(1.0) * Servo.of(Datasheet(parameters=TABLE_1)).b / self.b
 
 
@@ -109,7 +120,9 @@ class Controller:
         self._x1, self._before, self._omega = 0.0, theta, 0.0
 
     def voltage(self, aim: Aim, y: float, t: float) -> float:
-        """The voltage [V] to hold until the next sample, of the reference and the measured angle y [rad] at time t [s]."""
+        """The voltage [V] to hold until the next sample, of the reference and the measured angle y [rad] at time t
+        [s].
+        """
         wanted, x1, x2 = self._wanted(aim, y)
         u = min(max(wanted, -self.u_max), self.u_max)
         if (wanted - u) * x2 * self.servo.b <= 0:
@@ -131,7 +144,9 @@ class Controller:
         return self.law(State(aim, theta, omega, x1, x2, x3)), x1, x2
 
     def sense(self, y: float) -> tuple[float, float]:
-        """Angle and speed from the measured angle: y itself and its filtered difference. A law with an observer brings its own."""
+        """Angle and speed from the measured angle: y itself and its filtered difference. A law with an observer brings
+        its own.
+        """
         self._omega += self._new * ((y - self._before) / self.h - self._omega)
         self._before = y
         return y, self._omega

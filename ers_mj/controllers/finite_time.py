@@ -21,7 +21,8 @@ NAMES = ("q", "k_1", "k_2", "k_3", "l", *(f"gamma_{k}" for k in range(1, 8)))
 class Gains:
     """Eq. (40), with the odd/odd q that the text demands and that the printed m_1..m_3 belong to.
 
-    q in (2/3, 1); k_1 [1/s], k_2 [1/s], k_3 [1/s] as q -> 1; l and gamma_1..gamma_7 stand in the conditions (33)-(35) alone.
+    q in (2/3, 1); k_1 [1/s], k_2 [1/s], k_3 [1/s] as q -> 1; l and gamma_1..gamma_7 stand in the conditions (33)-(35)
+    alone.
     """
 
     q: Fraction = Fraction(97, 99)
@@ -38,12 +39,20 @@ class Gains:
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} = {getattr(self, name):g} is not above zero")
         if len(self.gamma) != 7 or min(self.gamma) <= 0:
-            raise InputError(f"gamma is {', '.join(f'{x:g}' for x in self.gamma)}, seven values above zero were expected")
+            raise InputError(
+                f"gamma is {', '.join(f'{x:g}' for x in self.gamma)}, seven values above zero were expected"
+            )
 
     def as_document(self) -> dict[str, float | str]:
         """By name."""
-        return {"q": str(self.q), "k_1": self.k_1, "k_2": self.k_2, "k_3": self.k_3, "l": self.l,
-                **{f"gamma_{k}": x for k, x in enumerate(self.gamma, start=1)}}
+        return {
+            "q": str(self.q),
+            "k_1": self.k_1,
+            "k_2": self.k_2,
+            "k_3": self.k_3,
+            "l": self.l,
+            **{f"gamma_{k}": x for k, x in enumerate(self.gamma, start=1)},
+        }
 
 
 def parse_gains(text: str) -> Gains:
@@ -61,7 +70,9 @@ def parse_gains(text: str) -> Gains:
         try:
             x = Fraction(value)
         except (ValueError, ZeroDivisionError):
-            raise InputError(f"--gains: {key} is {value[:40]!r}, a number or a fraction was expected, as in q=97/99") from None
+            raise InputError(
+                f"--gains: {key} is {value[:40]!r}, a number or a fraction was expected, as in q=97/99"
+            ) from None
         if key in named:
             raise InputError(f"--gains gives {key} twice, once was expected")
         named.add(key)

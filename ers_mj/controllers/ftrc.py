@@ -7,10 +7,11 @@ from ers_mj.controllers.finite_time import FiniteTime, Gains
 
 
 class Ftrc(Controller):
-    """u = (1/b) {theta_r'' + a_1 (theta_r - theta_0 - x2) + a_2 (theta_r' - x3) + c_1 Sgn(theta - theta_0) + c_2 Sgn(w) + k_3 sig(xi_3, 3q - 2)}.
+    """u = (1/b) {theta_r'' + a_1 (theta_r - theta_0 - x2) + a_2 (theta_r' - x3) + c_1 Sgn(theta - theta_0) + c_2 Sgn(w)
+    + k_3 sig(xi_3, 3q - 2)}.
 
-    (31) as printed leaves out the first five terms, without which (32) does not follow. The friction's sign is stick-aware. The paper's adaptive
-    law, which it names and does not give, is not in it.
+    (31) as printed leaves out the first five terms, without which (32) does not follow. The friction's sign is
+    stick-aware. The paper's adaptive law, which it names and does not give, is not in it.
     """
 
     name = "ftrc"

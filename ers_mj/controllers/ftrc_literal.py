@@ -7,7 +7,9 @@ from ers_mj.controllers.finite_time import FiniteTime, Gains
 
 
 class FtrcLiteral(Controller):
-    """Eq. (31): u = (1/b) {-a_1 x2 - a_2 x3 + k_3 sig(xi_3, 3q - 2)}. Nothing in it knows of friction, preload or the reference's acceleration."""
+    """Eq. (31): u = (1/b) {-a_1 x2 - a_2 x3 + k_3 sig(xi_3, 3q - 2)}. Nothing in it knows of friction, preload or the
+    reference's acceleration.
+    """
 
     name = "ftrc-literal"
     sentence = "finite-time law as printed in (31), without feed-forward"

@@ -13,8 +13,9 @@ ALPHA = 0.15  # [V s^2/rad], twelve times 1/b of Table 1
 class HInf(Controller):
     """Eq. (39) with the signs that stabilise: u = 0.15 theta_r'' + 0.5 w + 14 x2 + 0.6 x3, feedback in degrees.
 
-    It has neither integral nor friction compensation: what holds the rudder is paid in error. Its acceleration term is taken in radians, the smaller
-    reading, and is still twelve times what the plant needs. The paper gives the law alone, not the synthesis behind it.
+    It has neither integral nor friction compensation: what holds the rudder is paid in error. Its acceleration term is
+    taken in radians, the smaller reading, and is still twelve times what the plant needs. The paper gives the law
+    alone, not the synthesis behind it.
     """
 
     name = "hinf"

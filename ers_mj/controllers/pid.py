@@ -10,7 +10,9 @@ from ers_mj.errors import InputError
 
 @dataclass(frozen=True)
 class PidGains:
-    """Eq. (38)'s gains: P [V/deg], I [V/(deg s)], D [V s/deg] for Table 1's servo; in V/rad the rudder would never break away."""
+    """Eq. (38)'s gains: P [V/deg], I [V/(deg s)], D [V s/deg] for Table 1's servo; in V/rad the rudder would never
+    break away.
+    """
 
     P: float = 5.0
     I: float = 1.2  # noqa: E741  the letter that it has everywhere
@@ -31,7 +33,9 @@ def parse_pid(text: str) -> PidGains:
     for pair in filter(None, (part.strip() for part in text.split(","))):
         key, _, value = (part.strip() for part in pair.partition("="))
         if key not in PidGains.__dataclass_fields__:
-            raise InputError(f"--pid: there is no gain {key[:40]!r}; there are {', '.join(PidGains.__dataclass_fields__)}")
+            raise InputError(
+                f"--pid: there is no gain {key[:40]!r}; there are {', '.join(PidGains.__dataclass_fields__)}"
+            )
         if key in given:
             raise InputError(f"--pid gives {key} twice, once was expected")
         try:
@@ -46,7 +50,8 @@ def parse_pid(text: str) -> PidGains:
 class Pid(Controller):
     """Eq. (38) with the signs that stabilise: u = 5 x2 + 1.2 x1 + 0.1 x3 + tau_fa + tau_spa, errors in degrees.
 
-    As printed, with minus signs and x2 = theta_r - theta, it feeds back positively. tau_fa and tau_spa are friction, spring and preload in volts.
+    As printed, with minus signs and x2 = theta_r - theta, it feeds back positively. tau_fa and tau_spa are friction,
+    spring and preload in volts.
     """
 
     name = "pid"

@@ -1,12 +1,13 @@
 """A modern rival: time-optimal far from the reference, linear near it, on an observer that knows stick and slip.
 
-    measurement -> Kalman observer of (theta, w, d) with stick and slip -> wanted speed -> wanted acceleration -> inverse model -> voltage
-
-The wanted speed of closing is Workman's proximate time-optimal profile: v(x2) = lambda x2 near the reference, sqrt(2 alpha A |x2|) - v_s far from
-it, joined with equal slope; A is what brakes with the voltage that the reference's own needs leave, and with friction and damping. A
-reference that leaves none is followed in phase, its acceleration raised and its position let go: the amplitude cannot be had. The
-disturbance d [rad/s^2] takes the integral's place. Causal: of the reference it knows what every other law here knows. Its
-observer stands where the others have the filter of ``filter_s``.
+    measurement -> Kalman observer of (theta, w, d) with stick and slip -> wanted speed -> wanted acceleration ->
+    inverse model -> voltage
+ The wanted speed of closing is Workman's proximate time-optimal profile: v(x2) = lambda x2 near the reference, sqrt(2
+alpha A |x2|) - v_s far from it, joined with equal slope; A is what brakes with the voltage that the reference's own
+needs leave, and with friction and damping. A reference that leaves none is followed in phase, its acceleration raised
+and its position let go: the amplitude cannot be had. The disturbance d [rad/s^2] takes the integral's place. Causal: of
+the reference it knows what every other law here knows. Its observer stands where the others have the filter of
+``filter_s``.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ SURE_SLIP = 0.5  # [rad/s] above which the estimated speed tells the friction's 
 
 
 class TimeOptimal(Controller):
-    """a = theta_r'' + k_w (v(x2) + x3); u = (1/b) {a + a_1 (theta - theta_0) + a_2 w + c_1 Sgn(theta - theta_0) + c_2 Sgn(w) - d}, at mid-sample."""
+    """a = theta_r'' + k_w (v(x2) + x3); u = (1/b) {a + a_1 (theta - theta_0) + a_2 w + c_1 Sgn(theta - theta_0) + c_2
+    Sgn(w) - d}, at mid-sample.
+    """
 
     name = "time-optimal"
     sentence = "proximate time-optimal servo on a Kalman observer with stick and slip (ours)"
@@ -66,7 +69,9 @@ class TimeOptimal(Controller):
         return self._theta, self._speed
 
     def sent(self, u: float) -> None:
-        """Predict the state at the next sample: linear flow, exact, under the friction and preload of the present mode."""
+        """Predict the state at the next sample: linear flow, exact, under the friction and preload of the present
+        mode.
+        """
         servo, phi, w = self.servo, self._theta - self.servo.theta_0, self._speed
         push = servo.b * u + self._d
         side = math.tanh(phi / (0.2 * SIDE_BAND))
@@ -84,22 +89,30 @@ class TimeOptimal(Controller):
 
     def law(self, s: State) -> float:
         servo = self.servo
-        alpha = s.aim.alpha if self._alpha is None else s.aim.alpha + 0.5 * (s.aim.alpha - self._alpha)  # at mid-sample, extrapolated
+        alpha = (
+            s.aim.alpha if self._alpha is None else s.aim.alpha + 0.5 * (s.aim.alpha - self._alpha)
+        )  # at mid-sample, extrapolated
         self._alpha = s.aim.alpha
         spare, full = self._spare(s.aim), abs(servo.b) * self.u_max
         free = min(max(1.0 + spare / (SLACK * full), 0.0), 1.0)
         boost = 1.0 + min(max(-spare / full, 0.0), BOOST)
-        aid = servo.c_2 + 0.5 * servo.a_2 * abs(s.omega)  # what friction and damping brake, the speed's half on the way down
+        aid = servo.c_2 + 0.5 * servo.a_2 * abs(
+            s.omega
+        )  # what friction and damping brake, the speed's half on the way down
         wanted = _profile(s.x2, LAZY + free * (self.closing - LAZY), TRUST * max(spare + free * aid, ROOM * full))
         a = boost * alpha + self.k_w * (wanted + s.x3)
         omega, theta = s.omega + 0.5 * self.h * a, s.theta + 0.5 * self.h * s.omega
         return (a + servo.spring(theta) + servo.a_2 * omega + servo.c_2 * self._slip(s, wanted) - self._d) / servo.b
 
     def _spare(self, aim: Aim) -> float:
-        """Acceleration [rad/s^2] that the reference's own needs leave of the full voltage, their peak forgotten over MEMORY."""
+        """Acceleration [rad/s^2] that the reference's own needs leave of the full voltage, their peak forgotten over
+        MEMORY.
+        """
         servo = self.servo
         slip = math.copysign(servo.c_2, aim.omega) if aim.omega else 0.0
-        self._need = max(abs(aim.alpha + servo.spring(aim.theta) + servo.a_2 * aim.omega + slip), self._need * self._forget)
+        self._need = max(
+            abs(aim.alpha + servo.spring(aim.theta) + servo.a_2 * aim.omega + slip), self._need * self._forget
+        )
         return abs(servo.b) * self.u_max - self._need
 
     def _slip(self, s: State, wanted: float) -> float:

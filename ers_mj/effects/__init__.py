@@ -5,7 +5,18 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-from ers_mj.effects.base import Coefficients, Drive, Effect, Friction, Load, Parameter, Scales, Sensor, Transmission, Twin
+from ers_mj.effects.base import (
+    Coefficients,
+    Drive,
+    Effect,
+    Friction,
+    Load,
+    Parameter,
+    Scales,
+    Sensor,
+    Transmission,
+    Twin,
+)
 
 
 def _members() -> tuple[Effect, ...]:
@@ -14,8 +25,11 @@ def _members() -> tuple[Effect, ...]:
     found = []
     for info in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f"{__name__}.{info.name}")
-        found += [cls() for cls in vars(module).values() if isinstance(cls, type)
-                  and issubclass(cls, Effect) and cls.__module__ == module.__name__ and cls.name]
+        found += [
+            cls()
+            for cls in vars(module).values()
+            if isinstance(cls, type) and issubclass(cls, Effect) and cls.__module__ == module.__name__ and cls.name
+        ]
     return tuple(sorted(found, key=lambda e: ([isinstance(e, f) for f in families].index(True), e.name)))
 
 
@@ -30,5 +44,19 @@ EQUIVALENT: tuple[frozenset[str], ...] = (
     frozenset({"cogging", "transmission_ripple"}),
 )
 
-__all__ = ["BY_NAME", "EFFECTS", "EQUIVALENT", "SUSPECTS", "Coefficients", "Drive", "Effect", "Friction", "Load", "Parameter",
-           "Scales", "Sensor", "Transmission", "Twin"]
+__all__ = [
+    "BY_NAME",
+    "EFFECTS",
+    "EQUIVALENT",
+    "SUSPECTS",
+    "Coefficients",
+    "Drive",
+    "Effect",
+    "Friction",
+    "Load",
+    "Parameter",
+    "Scales",
+    "Sensor",
+    "Transmission",
+    "Twin",
+]

@@ -5,7 +5,9 @@ import numpy as np
 from ers_mj.effects.base import Parameter, Transmission, coupled
 
 SPRINGY = 0.5  # damping ratio up to which a shaft is a spring, and a play as wide as nothing
-SEEN = 0.38  # of what the contact gives way under the friction, from which a play is seen as one: concealed shafts look like up to 0.36 of it, plays like 0.40 and more
+# of what the contact gives way under the friction, from which a play is seen as one: concealed shafts look like up to
+# 0.36 of it, plays like 0.40 and more
+SEEN = 0.38
 
 
 class Backlash(Transmission):
@@ -17,12 +19,16 @@ class Backlash(Transmission):
 
     name = "backlash"
     sentence = "the rudder has a play of ±{gap} against its drive"
-    mjcf = ("the joint gap, its limit a spring-damper (negative solref) that does not pull; the "
-            "shares of inertia, damping and friction on the rocker")
+    mjcf = (
+        "the joint gap, its limit a spring-damper (negative solref) that does not pull; the "
+        "shares of inertia, damping and friction on the rocker"
+    )
     parameters = (
         Parameter("gap", "position", "half-width of the play"),
         Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.2, upper=0.9, absent=0.5),
-        Parameter("phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1),
+        Parameter(
+            "phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1
+        ),
         Parameter("f_contact", "frequency", "contact's natural frequency", lower=40.0, upper=1000.0, absent=120.0),
         Parameter("zeta", "ratio", "contact's damping ratio", lower=0.05, upper=2.0, absent=0.2),
     )
@@ -30,8 +36,7 @@ class Backlash(Transmission):
 
     def starts(self, scales):
         contact = min(120.0, 0.5 / scales.sample_time)
-        return [np.array([part * scales.position, 0.6, 0.2, contact, 0.2])
-                for part in (0.003, 0.01, 0.03, 0.1)]
+        return [np.array([part * scales.position, 0.6, 0.2, contact, 0.2]) for part in (0.003, 0.01, 0.03, 0.1)]
 
     def grown(self, name, p, scales):
         """A twisting shaft is a contact without play: one as wide as the noise, or a third of that."""
@@ -45,7 +50,9 @@ class Backlash(Transmission):
         return p[0] >= SEEN * friction / (2.0 * np.pi * p[3]) ** 2
 
     def really(self, p, friction):
-        """A play less wide than its contact gives way under the friction is not seen as one: a shaft, stiffer the more it twists."""
+        """A play less wide than its contact gives way under the friction is not seen as one: a shaft, stiffer the more
+        it twists.
+        """
         return self.name if self.seen(p, friction) else "shaft_compliance"
 
     def coefficients(self, p, c):

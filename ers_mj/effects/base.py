@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     import mujoco
 
 LEAST_IRON = 0.25  # share of an inductance that no current saturates
-RETURNS = 0.95  # periods of a torque that returns with the angle which the travel must hold, overshoots set aside: less is a spring, a weight or a cubic
+# periods of a torque that returns with the angle which the travel must hold, overshoots set aside: less is a spring, a
+# weight or a cubic
+RETURNS = 0.95
 
 
 class Coefficients(NamedTuple):
@@ -30,12 +32,13 @@ class Coefficients(NamedTuple):
 
     Units: output unit (rad, m, V ...) and s; b in output unit / s^2 per input unit. The second body takes the shares
     ``rho`` of the inertia, ``beta`` of the mechanical damping and ``phi`` of the friction to the motor's side of a
-    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or, without
-    a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3).
+    spring-damper (``k_twist`` [1/s^2], ``d_twist`` [1/s], per total inertia) that is slack within +-``gap``, or,
+    without a gap, gets stiffer the more it is twisted: k_twist (x + ``harden`` x^3).
 
-    Where ``k_bristle`` [1/s^2] is not 0 (effect ``presliding``) a bristle carries the rudder's Coulomb friction; its damping is ``d_bristle`` [1/s] times
-    exp(-(w / fade)^2), and it gives way as in Dahl (1968): its bend moves with (1 - force over level)^``dahl`` of the rudder's speed. Of one body (rho = 0
-    beside two_body) the bristle's foot is the second one; beside a motor's side the rudder's bristle has the share 1 - phi of level, stiffness and damping.
+    Where ``k_bristle`` [1/s^2] is not 0 (effect ``presliding``) a bristle carries the rudder's Coulomb friction; its
+    damping is ``d_bristle`` [1/s] times exp(-(w / fade)^2), and it gives way as in Dahl (1968): its bend moves with (1
+    - force over level)^``dahl`` of the rudder's speed. Of one body (rho = 0 beside two_body) the bristle's foot is the
+    second one; beside a motor's side the rudder's bristle has the share 1 - phi of level, stiffness and damping.
 
     Where the inductance falls with the current tau_e is divided by 1 + (``fall`` j)^2, until LEAST_IRON of it is left.
     """
@@ -89,7 +92,8 @@ class Scales:
     friction level (or the drive's, where there is none), ``input`` the peak |u|, ``sample_time`` [s], ``noise`` and
     ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
     recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
-    behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
+    behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of
+    one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
     """
 
     position: float
@@ -116,9 +120,10 @@ class Parameter:
     """One number of an effect.
 
     ``kind`` names its dimension: torque, damping, stiffness, drag, cubic (all carried per inertia), position, speed,
-    input, time, frequency, phase, ratio, count, per_position, per_position_squared, supply. ``positive`` parameters are fitted in their
-    logarithm; those not ``fitted`` keep the value they start with; those ``per_record`` are another number in every recording; those
-    ``on_travel`` are places that the travel reaches, or nearly; those ``recorded`` act through what a recording measured, so that ``--effect`` has no such.
+    input, time, frequency, phase, ratio, count, per_position, per_position_squared, supply. ``positive`` parameters are
+    fitted in their logarithm; those not ``fitted`` keep the value they start with; those ``per_record`` are another
+    number in every recording; those ``on_travel`` are places that the travel reaches, or nearly; those ``recorded`` act
+    through what a recording measured, so that ``--effect`` has no such.
     """
 
     name: str
@@ -138,10 +143,10 @@ class Parameter:
 class Twin:
     """Where an effect writes its MJCF realisation.
 
-    ``spec`` is the model so far; ``inertia`` the J [kg m^2, or 1 where lumped] that turns an acceleration into a torque;
-    ``is_angle`` whether the output turns (hinges) or slides; ``ampere`` the drive acceleration of one unit of the motor's
-    force. Named alike in every model: body ``rudder``, tendon ``rudder_angle`` (the absolute output), actuators ``motor``
-    (ctrl in input units) and ``load``.
+    ``spec`` is the model so far; ``inertia`` the J [kg m^2, or 1 where lumped] that turns an acceleration into a
+    torque; ``is_angle`` whether the output turns (hinges) or slides; ``ampere`` the drive acceleration of one unit of
+    the motor's force. Named alike in every model: body ``rudder``, tendon ``rudder_angle`` (the absolute output),
+    actuators ``motor`` (ctrl in input units) and ``load``.
     """
 
     spec: mujoco.MjSpec
@@ -154,34 +159,62 @@ class Twin:
 class Effect:
     """Abstract base: a piece of physics that the reduced model of Eq. (6) leaves out.
 
-    ``torque(p, theta, w, j, t)``, ``friction(p, level, theta, w, j, direction)`` and ``inertia(p, theta)``, which gives the inertia over that of
-    the plain plant and half its slope by theta, are compiled laws (or None); an inertia acts beside a torque or a friction, of one body.
-    ``memory(p, theta, w, j, h)`` is what the fifth constant becomes within a sample of length h, and begins at 0;
-    ``coefficients``, ``command`` and ``measure`` act outside the integrator. All are the identity unless overridden.
-    ``mjcf`` says in a sentence how a MuJoCo model shows the effect; ``edit_spec`` does it. What acts through
-    ``coefficients`` needs no more: the model is written from them. A law without a twin is applied step by step.
+    ``torque(p, theta, w, j, t)``, ``friction(p, level, theta, w, j, direction)`` and ``inertia(p, theta)``, which gives
+    the inertia over that of the plain plant and half its slope by theta, are compiled laws (or None); an inertia acts
+    beside a torque or a friction, of one body. ``memory(p, theta, w, j, h)`` is what the fifth constant becomes within
+    a sample of length h, and begins at 0; ``coefficients``, ``command`` and ``measure`` act outside the integrator. All
+    are the identity unless overridden. ``mjcf`` says in a sentence how a MuJoCo model shows the effect; ``edit_spec``
+    does it. What acts through ``coefficients`` needs no more: the model is written from them. A law without a twin is
+    applied step by step.
     """
 
     name: ClassVar[str] = ""
     sentence: ClassVar[str] = ""
     subsystem: ClassVar[str] = ""
     mjcf: ClassVar[str] = ""
-    named: ClassVar[bool] = True  # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see mimics.py)
+    named: ClassVar[bool] = (
+        # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see mimics.py)
+        True
+    )
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
-    redundant: ClassVar[int] = 0  # of its numbers, how many only stand in for the baseline's own, so that they explain nothing more
-    curves: ClassVar[str] = ""  # the effect of which it is a form that changes along the travel by what its size tells, so that either may be the better one
-    wave: ClassVar[tuple[tuple[int, ...], int] | None] = None  # amplitudes (of which a start has one) and phase: the screening finds both from two quarter periods
-    fewest_turns: ClassVar[float] = 0.8  # periods of a wave over position within the travel: a longer one is no wave but a slope
+    redundant: ClassVar[int] = (
+        0  # of its numbers, how many only stand in for the baseline's own, so that they explain nothing more
+    )
+    curves: ClassVar[
+        str
+        # the effect of which it is a form that changes along the travel by what its size tells, so that either may be the
+        # better one
+    ] = ""
+    wave: ClassVar[tuple[tuple[int, ...], int] | None] = (
+        None  # amplitudes (of which a start has one) and phase: the screening finds both from two quarter periods
+    )
+    fewest_turns: ClassVar[float] = (
+        0.8  # periods of a wave over position within the travel: a longer one is no wave but a slope
+    )
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
-    tangible: ClassVar[bool] = True  # whether tangents of a motion tell what its own numbers do to it (see plants/tangents.py)
-    dear: ClassVar[bool] = False  # a simulation takes many times as long as others: refitted only where it promises most
-    step: ClassVar[float] = 1e-4  # of transformed parameters, over which differences of its simulation tell a slope: more where it bounces
-    needs: ClassVar[tuple[tuple[str, ...], ...]] = ()  # of each of these one number at least, or it does nothing; () where any one will do
+    tangible: ClassVar[bool] = (
+        True  # whether tangents of a motion tell what its own numbers do to it (see plants/tangents.py)
+    )
+    dear: ClassVar[bool] = (
+        False  # a simulation takes many times as long as others: refitted only where it promises most
+    )
+    step: ClassVar[float] = (
+        1e-4  # of transformed parameters, over which differences of its simulation tell a slope: more where it bounces
+    )
+    needs: ClassVar[
+        tuple[tuple[str, ...], ...]
+    ] = ()  # of each of these one number at least, or it does nothing; () where any one will do
     together: ClassVar[tuple[tuple[str, ...], ...]] = ()  # numbers that say something only together
     sized: ClassVar[int] = 0  # leading parameters to which the effect is proportional: a start may be scaled in them
-    follows_current: ClassVar[bool] = False  # its law changes as fast as the current, or within a small angle: half the segment length
-    at_motor: ClassVar[bool] = False  # its torque and memory are the motor's, at whose angle and speed they are taken where a play or a shaft parts it from the rudder
+    follows_current: ClassVar[bool] = (
+        False  # its law changes as fast as the current, or within a small angle: half the segment length
+    )
+    at_motor: ClassVar[bool] = (
+        # its torque and memory are the motor's, at whose angle and speed they are taken where a play or a shaft parts
+        # it from the rudder
+        False
+    )
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
@@ -206,7 +239,7 @@ class Effect:
     @property
     def signed(self) -> bool:
         """Whether the effect may act either way along a start."""
-        return self.sized > 0 and not any(p.positive for p in self.parameters[:self.sized])
+        return self.sized > 0 and not any(p.positive for p in self.parameters[: self.sized])
 
     def absent(self) -> np.ndarray:
         """Parameter values (k,) at which the effect vanishes, so that models nest."""
@@ -217,11 +250,15 @@ class Effect:
         raise NotImplementedError
 
     def grown(self, name: str, p: np.ndarray, scales: Scales) -> list[np.ndarray]:
-        """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of this one."""
+        """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of
+        this one.
+        """
         return []
 
     def seen(self, p: np.ndarray, friction: float) -> bool:
-        """Whether these numbers, beside a Coulomb friction c_2, are clearly not those of an effect that is a limit of this one (see grown)."""
+        """Whether these numbers, beside a Coulomb friction c_2, are clearly not those of an effect that is a limit of
+        this one (see grown).
+        """
         return False
 
     def shows(self, p: np.ndarray, scales: Scales) -> bool:
@@ -229,7 +266,9 @@ class Effect:
         return True
 
     def really(self, p: np.ndarray, friction: float) -> str:
-        """Name of the effect of which these numbers, beside a Coulomb friction c_2, are a form: its own but where it is hardly there."""
+        """Name of the effect of which these numbers, beside a Coulomb friction c_2, are a form: its own but where it is
+        hardly there.
+        """
         return self.name
 
     def coefficients(self, p: np.ndarray, c: Coefficients) -> Coefficients:
@@ -261,7 +300,9 @@ class Effect:
         return y
 
     def winding(self, p: np.ndarray, c: Coefficients, t: np.ndarray, motion: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """n K_t i / J (N,) of the winding's current where the law takes it from the drive acceleration j (N,) of a motion (N, 4)."""
+        """n K_t i / J (N,) of the winding's current where the law takes it from the drive acceleration j (N,) of a
+        motion (N, 4).
+        """
         return j
 
     def edit_spec(self, p: np.ndarray, c: Coefficients, twin: Twin) -> bool:
@@ -306,18 +347,22 @@ class Sensor(Effect):
     subsystem = "sensor"
 
 
-def coupled(c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap: float = 0.0, harden: float = 0.0) -> Coefficients:
-    """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta, slack within +-gap,
-    or stiffer by harden [1/output unit^2].
+def coupled(
+    c: Coefficients, f: float, zeta: float, rho: float, phi: float, gap: float = 0.0, harden: float = 0.0
+) -> Coefficients:
+    """Two bodies on a spring-damper of natural frequency f [Hz] (against the total inertia) and damping ratio zeta,
+    slack within +-gap, or stiffer by harden [1/output unit^2].
 
-    Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones named. Beside a
-    slack nothing hardens.
+    Where c has two bodies already, the springs, the dampers and the slacks are in series; the shares are the last ones
+    named. Beside a slack nothing hardens.
     """
     k, d = (2 * np.pi * f) ** 2, 4 * np.pi * zeta * f
     if c.has_motor_side and c.k_twist > 0:
         k, d = k * c.k_twist / (k + c.k_twist), d * c.d_twist / (d + c.d_twist)
     slack = c.gap + gap
-    return c._replace(two_body=1.0, gap=slack, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d, harden=0.0 if slack > 0 else harden)
+    return c._replace(
+        two_body=1.0, gap=slack, rho=rho, beta=rho, phi=phi, k_twist=k, d_twist=d, harden=0.0 if slack > 0 else harden
+    )
 
 
 def recursive(decay: np.ndarray, driven: np.ndarray) -> np.ndarray:

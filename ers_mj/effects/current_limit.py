@@ -8,8 +8,9 @@ GROWN = 0.1  # share of the excess that still flows, from which it is fitted
 
 
 class CurrentLimit(Drive):
-    """The motor's torque at the output, n K_t i, stays within +-tau_max, or exceeds it by the share ``beyond`` of what it would without a limit: a drive
-    that takes voltage back in proportion to the excess (foldback). The limiter is faster than the winding.
+    """The motor's torque at the output, n K_t i, stays within +-tau_max, or exceeds it by the share ``beyond`` of what
+    it would without a limit: a drive that takes voltage back in proportion to the excess (foldback). The limiter is
+    faster than the winding.
     """
 
     name = "current_limit"
@@ -17,7 +18,14 @@ class CurrentLimit(Drive):
     mjcf = "the forcerange of the motor (the saturation of a dcmotor); beyond it, set step by step by the load actuator"
     parameters = (
         Parameter("tau_max", "torque", "largest motor torque n K_t i at the output", absent=np.inf),
-        Parameter("beyond", "ratio", "share of the excess that still flows (infinite: none)", lower=0.002, upper=0.9, absent=np.inf),
+        Parameter(
+            "beyond",
+            "ratio",
+            "share of the excess that still flows (infinite: none)",
+            lower=0.002,
+            upper=0.9,
+            absent=np.inf,
+        ),
     )
     needs, follows_current = (("tau_max",),), True
 

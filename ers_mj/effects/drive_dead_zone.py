@@ -8,8 +8,8 @@ SLOPE = 30.0  # at which a drive that wakes up with the whole command returns to
 
 
 class DriveDeadZone(Drive):
-    """The terminals see nothing within +-d and u - lost Sgn(u) outside: the dead time of a bridge (lost = d, where it is not
-    given) or a threshold below which the drive sleeps (lost = 0).
+    """The terminals see nothing within +-d and u - lost Sgn(u) outside: the dead time of a bridge (lost = d, where it
+    is not given) or a threshold below which the drive sleeps (lost = 0).
 
     With ``lost`` the way back is a line of slope SLOPE and not a jump, so that the misfit stays continuous in d.
     """
@@ -19,13 +19,23 @@ class DriveDeadZone(Drive):
     mjcf = "none: the command is processed before it reaches ctrl"
     parameters = (
         Parameter("d", "input", "half-width of the dead zone"),
-        Parameter("lost", "input", "what is still missing outside it (all of d where none is given)", positive=False, lower=0.0, absent=np.inf),
+        Parameter(
+            "lost",
+            "input",
+            "what is still missing outside it (all of d where none is given)",
+            positive=False,
+            lower=0.0,
+            absent=np.inf,
+        ),
     )
     tries = 3
 
     def starts(self, scales):
         widths = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32]) * scales.input
-        return [*(np.array([d * scales.input, np.inf]) for d in (0.02, 0.002)), *(np.array([d, 0.05 * d]) for d in widths)]
+        return [
+            *(np.array([d * scales.input, np.inf]) for d in (0.02, 0.002)),
+            *(np.array([d, 0.05 * d]) for d in widths),
+        ]
 
     def command(self, p, u):
         size, lost = np.abs(u), min(p[-1], p[0])

@@ -21,7 +21,10 @@ class GravityImbalance(Load):
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),
     )
     sized, tries = 2, 3
-    redundant, curves = 1, "bias_torque"  # its slope is the spring's; how it bends follows from its size at the middle of the travel
+    redundant, curves = (
+        1,
+        "bias_torque",
+    )  # its slope is the spring's; how it bends follows from its size at the middle of the travel
 
     def starts(self, scales):
         """At the middle of the travel: a torque, a stiffness, and both either way."""
@@ -46,6 +49,12 @@ class GravityImbalance(Load):
             body.gravcomp = 1.0
         twin.spec.option.gravity = [0.0, 0.0, -G]
         rudder.inertia = rudder.inertia - inertia
-        rudder.add_body(name="imbalance", pos=[arm * p[1] / size, 0.0, -arm * p[0] / size], explicitinertial=True,
-                        mass=inertia / arm**2, ipos=[0.0, 0.0, 0.0], inertia=[1e-9 * inertia] * 3)
+        rudder.add_body(
+            name="imbalance",
+            pos=[arm * p[1] / size, 0.0, -arm * p[0] / size],
+            explicitinertial=True,
+            mass=inertia / arm**2,
+            ipos=[0.0, 0.0, 0.0],
+            inertia=[1e-9 * inertia] * 3,
+        )
         return True

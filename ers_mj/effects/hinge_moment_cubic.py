@@ -10,13 +10,17 @@ GROWN = 2.0  # half travels at which the flow is taken to part where a cubic alo
 
 
 class HingeMomentCubic(Load):
-    """theta'' -= k_3 x^3 exp(-(x / x_p)^2 / 2) / J, x = theta - theta_0: a hardening (or, k_3 < 0, softening) moment about the rest angle. It grows more
-    slowly beyond x_p, where the flow parts from the rudder; not where x_p is absent (infinite).
+    """theta'' -= k_3 x^3 exp(-(x / x_p)^2 / 2) / J, x = theta - theta_0: a hardening (or, k_3 < 0, softening) moment
+    about the rest angle. It grows more slowly beyond x_p, where the flow parts from the rudder; not where x_p is absent
+    (infinite).
     """
 
     name = "hinge_moment_cubic"
     sentence = "a hinge moment of {k_3} times angle cubed acts on the rudder"
-    mjcf = "a cubic term in the stiffness polynomial; with x_p none: the ctrl of the load actuator is set step by step from the angle"
+    mjcf = (
+        "a cubic term in the stiffness polynomial; with x_p none: the ctrl of the load actuator is set step by step"
+        " from the angle"
+    )
     parameters = (
         Parameter("k_3", "cubic", "torque per angle cubed", positive=False),
         Parameter("x_p", "position", "angle from the rest angle around which it grows more slowly", absent=np.inf),
@@ -46,4 +50,6 @@ class HingeMomentCubic(Load):
         return True
 
     def describe(self, values):
-        return super().describe(values) + ("" if values["x_p"] == "none" else f", growing more slowly beyond {values['x_p']}")
+        return super().describe(values) + (
+            "" if values["x_p"] == "none" else f", growing more slowly beyond {values['x_p']}"
+        )

@@ -4,15 +4,16 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter
 
-SHORTEST = 2e-5  # [s] of a winding: no sample tells a shorter one from none, and to simulate it takes as much longer as it is shorter
+# [s] of a winding: no sample tells a shorter one from none, and to simulate it takes as much longer as it is shorter
+SHORTEST = 2e-5
 HALVED = 1.5  # times the drive's largest torque at which the inductance is half where a fall is looked for first
 
 
 class Inductance(Drive):
     """Eq. (1)'s L i' = u - R i - K_e w_m, where the datasheet has none, or more of it than the datasheet says.
 
-    Iron saturates: the whole inductance is L / (1 + (i / i_2)^2), half of it at the current i_2, told as the torque that this one makes at the
-    rudder, and LEAST_IRON of it at the least.
+    Iron saturates: the whole inductance is L / (1 + (i / i_2)^2), half of it at the current i_2, told as the torque
+    that this one makes at the rudder, and LEAST_IRON of it at the least.
     """
 
     name = "inductance"
@@ -20,7 +21,12 @@ class Inductance(Drive):
     mjcf = "the inductance of the dcmotor; where it falls with the current it is set step by step"
     parameters = (
         Parameter("tau_L", "time", "electrical time constant beyond the baseline's", lower=SHORTEST),
-        Parameter("half", "torque", "torque at the rudder under whose current the inductance is half (infinite: it does not fall)", absent=np.inf),
+        Parameter(
+            "half",
+            "torque",
+            "torque at the rudder under whose current the inductance is half (infinite: it does not fall)",
+            absent=np.inf,
+        ),
     )
     needs = (("tau_L",),)
     absorbs = ("tau_e",)
@@ -32,10 +38,18 @@ class Inductance(Drive):
 
     def grown(self, name, p, scales):
         """One that falls with the current, from one that does not."""
-        return [np.array([p[0], HALVED * (scales.drive or scales.acceleration)])] if name == self.name and not np.isfinite(p[1]) else []
+        return (
+            [np.array([p[0], HALVED * (scales.drive or scales.acceleration)])]
+            if name == self.name and not np.isfinite(p[1])
+            else []
+        )
 
     def describe(self, values):
-        falls = "" if values["half"] == "none" else f"; it falls with the current, to half where that makes a torque of {values['half']}"
+        falls = (
+            ""
+            if values["half"] == "none"
+            else f"; it falls with the current, to half where that makes a torque of {values['half']}"
+        )
         return super().describe(values) + falls
 
     def coefficients(self, p, c):

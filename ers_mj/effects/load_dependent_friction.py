@@ -6,8 +6,8 @@ from ers_mj.effects.base import Friction, Parameter, law
 
 
 class LoadDependentFriction(Friction):
-    """F = F_c + mu |n K_t i|: a screw or gear that rubs harder the more it carries. Or mu |n K_t i| x / (1 + x), x = |n K_t i| / half: teeth that
-    rub little until they are pressed.
+    """F = F_c + mu |n K_t i|: a screw or gear that rubs harder the more it carries. Or mu |n K_t i| x / (1 + x), x = |n
+    K_t i| / half: teeth that rub little until they are pressed.
     """
 
     name = "load_dependent_friction"
@@ -25,7 +25,9 @@ class LoadDependentFriction(Friction):
 
     def grown(self, name, p, scales):
         """From one share: half of it under as much as friction holds at rest."""
-        return [np.array([1.3 * p[0], 0.3 * scales.acceleration])] if name == self.name and not np.isfinite(p[1]) else []
+        return (
+            [np.array([1.3 * p[0], 0.3 * scales.acceleration])] if name == self.name and not np.isfinite(p[1]) else []
+        )
 
     def constants(self, p, c):
         return np.array([p[0], p[1] if np.isfinite(p[1]) else 0.0])
@@ -36,4 +38,6 @@ class LoadDependentFriction(Friction):
         return level + p[0] * push * push / (push + p[1]) if push > 0.0 else level
 
     def describe(self, values):
-        return super().describe(values) + ("" if values["half"] == "none" else f", and by half of that under {values['half']}")
+        return super().describe(values) + (
+            "" if values["half"] == "none" else f", and by half of that under {values['half']}"
+        )

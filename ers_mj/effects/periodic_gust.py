@@ -7,13 +7,17 @@ import numpy as np
 from ers_mj.effects.base import Load, Parameter, law
 
 CYCLES = range(3, 41)  # within the longest recording, from which a fit is begun: a sine fits within one cycle only
-FLAT, SWELLS = 0.1, (1.0, 2.0, 3.0)  # third harmonic, and cycles of a swell within that recording, from which wider forms are begun
+FLAT, SWELLS = (
+    0.1,
+    (1.0, 2.0, 3.0),
+)  # third harmonic, and cycles of a swell within that recording, from which wider forms are begun
 SLOWEST = 0.02  # [Hz] of a swell: its wave within has the cycles that tell it from a drift
 
 
 class PeriodicGust(Load):
-    """theta'' += A sin(x) / J, x = 2 pi f t + phase, t from the zero of the recording's own clock: gusts, waves, another machine. Or A (sin(x) + third sin(3 x)),
-    flat at its top or pointed; or one that swells, A (1 + swell sin(2 pi f_s t + phase_s)) sin(x).
+    """theta'' += A sin(x) / J, x = 2 pi f t + phase, t from the zero of the recording's own clock: gusts, waves,
+    another machine. Or A (sin(x) + third sin(3 x)), flat at its top or pointed; or one that swells, A (1 + swell sin(2
+    pi f_s t + phase_s)) sin(x).
     """
 
     name = "periodic_gust"
@@ -22,9 +26,19 @@ class PeriodicGust(Load):
     parameters = (
         Parameter("A", "torque", "amplitude", positive=False),
         Parameter("f", "frequency", "frequency"),
-        Parameter("phase", "phase", "phase of the sine at time zero, another in every recording", positive=False, per_record=True),
-        Parameter("third", "ratio", "third harmonic over the first", positive=False, lower=-0.5, upper=0.5, absent=np.inf),
-        Parameter("swell", "ratio", "by how much its amplitude swells", positive=False, lower=-1.0, upper=1.0, absent=np.inf),
+        Parameter(
+            "phase",
+            "phase",
+            "phase of the sine at time zero, another in every recording",
+            positive=False,
+            per_record=True,
+        ),
+        Parameter(
+            "third", "ratio", "third harmonic over the first", positive=False, lower=-0.5, upper=0.5, absent=np.inf
+        ),
+        Parameter(
+            "swell", "ratio", "by how much its amplitude swells", positive=False, lower=-1.0, upper=1.0, absent=np.inf
+        ),
         Parameter("f_s", "frequency", "frequency of the swell", lower=SLOWEST, absent=np.inf),
         Parameter("phase_s", "phase", "phase of the swell at time zero", positive=False, absent=np.inf),
     )
@@ -33,18 +47,26 @@ class PeriodicGust(Load):
     wave = ((0,), 2)
 
     def starts(self, scales):
-        return [np.array([0.2 * scales.acceleration, cycles / scales.duration, 0.0, *[np.inf] * 4]) for cycles in CYCLES]
+        return [
+            np.array([0.2 * scales.acceleration, cycles / scales.duration, 0.0, *[np.inf] * 4]) for cycles in CYCLES
+        ]
 
     def grown(self, name, p, scales):
         """From a plain sine: with a third harmonic, or with a swell."""
         if name != self.name or np.isfinite(p[3:]).any():
             return []
-        swells = [np.array([*p[:3], np.inf, 0.2, cycles / scales.duration, phase]) for cycles in SWELLS for phase in (0.0, 0.5 * np.pi)]
+        swells = [
+            np.array([*p[:3], np.inf, 0.2, cycles / scales.duration, phase])
+            for cycles in SWELLS
+            for phase in (0.0, 0.5 * np.pi)
+        ]
         return [np.array([*p[:3], FLAT, np.inf, np.inf, np.inf]), *swells]
 
     def constants(self, p, c):
         swell, f_s, phase_s = p[4:] if np.isfinite(p[4]) else (0.0, 0.0, 0.0)
-        return np.array([p[0], 2 * np.pi * p[1], p[2], p[3] if np.isfinite(p[3]) else 0.0, swell, 2 * np.pi * f_s, phase_s])
+        return np.array(
+            [p[0], 2 * np.pi * p[1], p[2], p[3] if np.isfinite(p[3]) else 0.0, swell, 2 * np.pi * f_s, phase_s]
+        )
 
     @law
     def torque(p, theta, w, j, t):
@@ -58,4 +80,8 @@ class PeriodicGust(Load):
 
     def describe(self, values):
         third = "" if values["third"] == "none" else f" with a third harmonic of {values['third']}"
-        return super().describe(values) + third + ("" if values["swell"] == "none" else f", and swells by {values['swell']} at {values['f_s']}")
+        return (
+            super().describe(values)
+            + third
+            + ("" if values["swell"] == "none" else f", and swells by {values['swell']} at {values['f_s']}")
+        )

@@ -8,11 +8,16 @@ GROWN = 2.2  # exponent from which another one than the square is looked for
 
 
 class QuadraticDrag(Friction):
-    """theta'' -= c w |w|^(n - 1) / J, w in output units/s: turbulent air or churned grease. n is 2 where it is absent (infinite)."""
+    """theta'' -= c w |w|^(n - 1) / J, w in output units/s: turbulent air or churned grease. n is 2 where it is absent
+    (infinite).
+    """
 
     name = "quadratic_drag"
     sentence = "a drag of {c} times speed squared brakes fast motion"
-    mjcf = "a quadratic term in the damping polynomial; with n none: the ctrl of the load actuator is set step by step from the speed"
+    mjcf = (
+        "a quadratic term in the damping polynomial; with n none: the ctrl of the load actuator is set step by step"
+        " from the speed"
+    )
     parameters = (
         Parameter("c", "drag", "torque per speed squared, at 1 output unit/s"),
         Parameter("n", "ratio", "exponent of the speed, where it is not 2", lower=1.2, upper=4.0, absent=np.inf),
@@ -24,7 +29,11 @@ class QuadraticDrag(Friction):
 
     def grown(self, name, p, scales):
         """From a square: with an exponent of its own, as strong at high speed."""
-        return [np.array([p[0] * scales.speed ** (2.0 - GROWN), GROWN])] if name == self.name and not np.isfinite(p[1]) else []
+        return (
+            [np.array([p[0] * scales.speed ** (2.0 - GROWN), GROWN])]
+            if name == self.name and not np.isfinite(p[1])
+            else []
+        )
 
     def constants(self, p, c):
         return np.array([p[0], p[1] - 2.0 if np.isfinite(p[1]) else 0.0])
@@ -43,4 +52,8 @@ class QuadraticDrag(Friction):
         return True
 
     def describe(self, values):
-        return super().describe(values) if values["n"] == "none" else f"a drag of {values['c']} times speed to the power {values['n']} brakes fast motion"
+        return (
+            super().describe(values)
+            if values["n"] == "none"
+            else f"a drag of {values['c']} times speed to the power {values['n']} brakes fast motion"
+        )

@@ -8,14 +8,23 @@ from ers_mj.effects.base import Friction, Parameter, law
 
 
 class RunningIn(Friction):
-    """F = F_c (1 + change (1 - exp(-s / distance))), s the path since the recording began: grease that is worked in, or out."""
+    """F = F_c (1 + change (1 - exp(-s / distance))), s the path since the recording began: grease that is worked in, or
+    out.
+    """
 
     name = "running_in"
     named = False
     sentence = "friction that changes with the path travelled"
     mjcf = "none: frictionloss is set step by step from the path"
     parameters = (
-        Parameter("change", "ratio", "change of the Coulomb friction in the long run, over what it was", positive=False, lower=-0.95, upper=5.0),
+        Parameter(
+            "change",
+            "ratio",
+            "change of the Coulomb friction in the long run, over what it was",
+            positive=False,
+            lower=-0.95,
+            upper=5.0,
+        ),
         Parameter("distance", "position", "path within which it happens"),
     )
     needs = (("change",),)

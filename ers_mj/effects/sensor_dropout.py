@@ -6,7 +6,9 @@ from ers_mj.effects.base import Parameter, Sensor
 
 
 class SensorDropout(Sensor):
-    """The last reading is held for ``duration``, ``rate`` times a second at random. Found in the data itself, not by a fit."""
+    """The last reading is held for ``duration``, ``rate`` times a second at random. Found in the data itself, not by a
+    fit.
+    """
 
     name = "sensor_dropout"
     sentence = "the sensor drops out {rate} times a second, for {duration} on average"

@@ -6,7 +6,8 @@ from ers_mj.effects.base import Parameter, Sensor, recursive
 
 
 class SensorLag(Sensor):
-    """T y' = theta(t - T_d) - y, settled at the start: a filter in the sensor or its electronics, and a bus that brings its reading late.
+    """T y' = theta(t - T_d) - y, settled at the start: a filter in the sensor or its electronics, and a bus that brings
+    its reading late.
 
     Theta is taken as straight between samples.
     """
@@ -25,7 +26,11 @@ class SensorLag(Sensor):
 
     def grown(self, name, p, scales):
         """From a plain lag: with a dead time for a part of it."""
-        return [np.array([(1.0 - part) * p[0], part * p[0]]) for part in (0.5, 0.95)] if name == self.name and not np.isfinite(p[1]) else []
+        return (
+            [np.array([(1.0 - part) * p[0], part * p[0]]) for part in (0.5, 0.95)]
+            if name == self.name and not np.isfinite(p[1])
+            else []
+        )
 
     def measure(self, p, t, y):
         if np.isfinite(p[1]):

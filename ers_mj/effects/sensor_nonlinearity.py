@@ -10,9 +10,11 @@ ORDERS = (0.5, 1, 2, 3, 4, 6, 8)  # periods within the travel from which a fit i
 
 
 class SensorNonlinearity(Sensor):
-    """y = theta + bend theta^2 + twist theta^3, a loaded potentiometer; or + A sin(2 pi theta / period + phase), an eccentric scale.
+    """y = theta + bend theta^2 + twist theta^3, a loaded potentiometer; or + A sin(2 pi theta / period + phase), an
+    eccentric scale.
 
-    Terms that are absent are infinite. A gain and an offset of the sensor are no error that position can tell from the plant's.
+    Terms that are absent are infinite. A gain and an offset of the sensor are no error that position can tell from the
+    plant's.
     """
 
     name = "sensor_nonlinearity"
@@ -55,8 +57,19 @@ class SensorNonlinearity(Sensor):
         bend, twist, amplitude, period, phase = p
         rate = 2 * np.pi / period
         wave = amplitude * rate * np.cos(rate * theta + phase) if np.isfinite(period) else 0.0
-        return 1.0 + wave + (2.0 * bend * theta if np.isfinite(bend) else 0.0) + (3.0 * twist * theta**2 if np.isfinite(twist) else 0.0)
+        return (
+            1.0
+            + wave
+            + (2.0 * bend * theta if np.isfinite(bend) else 0.0)
+            + (3.0 * twist * theta**2 if np.isfinite(twist) else 0.0)
+        )
 
     def describe(self, values):
-        terms = {"bend": "{bend} times the angle squared", "twist": "{twist} times its cube", "period": "an amplitude of {A} every {period}"}
-        return "the sensor errs along the travel, by " + " and ".join(text.format(**values) for name, text in terms.items() if values[name] != "none")
+        terms = {
+            "bend": "{bend} times the angle squared",
+            "twist": "{twist} times its cube",
+            "period": "an amplitude of {A} every {period}",
+        }
+        return "the sensor errs along the travel, by " + " and ".join(
+            text.format(**values) for name, text in terms.items() if values[name] != "none"
+        )

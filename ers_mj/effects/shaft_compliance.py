@@ -5,26 +5,41 @@ import numpy as np
 from ers_mj.effects.base import Parameter, Transmission, coupled
 
 LIGHTEST = 0.2  # share of the inertia that the motor's side of a shaft bears at least
-LEAST_TWIST = 0.1  # of the noise, under the usual torque, of a shaft that is told: two that stood for forks had 0.025, seven concealed ones 3 and more
+# of the noise, under the usual torque, of a shaft that is told: two that stood for forks had 0.025, seven concealed
+# ones 3 and more
+LEAST_TWIST = 0.1
 HARDENS = 3.0  # times the twist under the friction at which a shaft that hardens is looked for first
 
 
 class ShaftCompliance(Transmission):
     """Two bodies on a spring-damper without play; f_shaft is its natural frequency against the total inertia.
 
-    The motor's side carries the shares rho of the inertia and phi of the friction. A rubber coupling, a belt or a strain wave gear gets stiffer the more
-    it is twisted: k x (1 + (x / twist_2)^2). Beside a play the shaft is in series with the play's contact, and does not harden.
+    The motor's side carries the shares rho of the inertia and phi of the friction. A rubber coupling, a belt or a
+    strain wave gear gets stiffer the more it is twisted: k x (1 + (x / twist_2)^2). Beside a play the shaft is in
+    series with the play's contact, and does not harden.
     """
 
     name = "shaft_compliance"
     sentence = "the shaft between motor and rudder twists like a spring, at {f_shaft} against the whole inertia"
-    mjcf = "stiffness (linear and cubic) and damping of the joint gap, without its limit; the shares of inertia, damping and friction on the rocker"
+    mjcf = (
+        "stiffness (linear and cubic) and damping of the joint gap, without its limit; the shares of inertia, damping"
+        " and friction on the rocker"
+    )
     parameters = (
-        Parameter("f_shaft", "frequency", "natural frequency of the shaft's spring", lower=2.0, upper=1000.0, absent=np.inf),
+        Parameter(
+            "f_shaft", "frequency", "natural frequency of the shaft's spring", lower=2.0, upper=1000.0, absent=np.inf
+        ),
         Parameter("zeta", "ratio", "damping ratio of the shaft", lower=0.005, upper=0.7, absent=0.05),
         Parameter("rho", "ratio", "motor side's share of the inertia", lower=LIGHTEST, upper=0.9, absent=0.5),
-        Parameter("phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1),
-        Parameter("twist_2", "position", "twist at which it takes twice the torque of a spring that does not harden (infinite: it does not)", absent=np.inf),
+        Parameter(
+            "phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1
+        ),
+        Parameter(
+            "twist_2",
+            "position",
+            "twist at which it takes twice the torque of a spring that does not harden (infinite: it does not)",
+            absent=np.inf,
+        ),
     )
     needs = (("f_shaft",),)
     tries, tangible = 3, False
@@ -34,13 +49,17 @@ class ShaftCompliance(Transmission):
         return [np.array([min(f, highest), 0.1, 0.6, 0.2, np.inf]) for f in (10.0, 20.0, 40.0, 80.0)]
 
     def grown(self, name, p, scales):
-        """A shaft that hardens, from one that does not: it takes twice the torque at a few times the twist that the friction makes."""
+        """A shaft that hardens, from one that does not: it takes twice the torque at a few times the twist that the
+        friction makes.
+        """
         if name != self.name or np.isfinite(p[4]) or self.really(p, 0.0) != self.name:
             return []
         return [np.array([*p[:4], HARDENS * scales.acceleration / (2.0 * np.pi * p[0]) ** 2])]
 
     def shows(self, p, scales):
-        """A shaft that the usual torque twists by far less than the noise shows nothing: a name for it stands for what stick and slip fork."""
+        """A shaft that the usual torque twists by far less than the noise shows nothing: a name for it stands for what
+        stick and slip fork.
+        """
         return scales.acceleration / (2.0 * np.pi * p[0]) ** 2 >= LEAST_TWIST * scales.noise
 
     def really(self, p, friction):

@@ -6,12 +6,13 @@ import numpy as np
 
 from ers_mj.effects.base import Friction, Parameter, law
 
-
 HEAVY = 1.5  # tail from which one heavier than an exponential's is begun
 
 
 class Stribeck(Friction):
-    """F(w) = F_c + dF_s exp(-x), x = (|w|/v_s)^delta: Stribeck's drop from static to Coulomb friction. Or one with a heavier tail, dF_s (1 + x / tail)^-tail."""
+    """F(w) = F_c + dF_s exp(-x), x = (|w|/v_s)^delta: Stribeck's drop from static to Coulomb friction. Or one with a
+    heavier tail, dF_s (1 + x / tail)^-tail.
+    """
 
     name = "stribeck"
     sentence = "friction at rest is {dF_s} higher than in motion and drops off around {v_s}"
@@ -20,7 +21,14 @@ class Stribeck(Friction):
         Parameter("dF_s", "torque", "static minus Coulomb friction"),
         Parameter("v_s", "speed", "Stribeck velocity"),
         Parameter("delta", "ratio", "exponent", lower=0.4, upper=4.0, absent=1.0),
-        Parameter("tail", "ratio", "power with which its tail falls, where that is no exponential", lower=0.3, upper=30.0, absent=np.inf),
+        Parameter(
+            "tail",
+            "ratio",
+            "power with which its tail falls, where that is no exponential",
+            lower=0.3,
+            upper=30.0,
+            absent=np.inf,
+        ),
     )
     sized, tries = 1, 3
 

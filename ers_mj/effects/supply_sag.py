@@ -8,20 +8,37 @@ from ers_mj.effects.base import Drive, Parameter, law, recursive
 
 
 class SupplySag(Drive):
-    """A source of resistance R_s behind a bridge of duty d = u / V_0, which draws d times the motor's current: the motor sees d (V_0 - R_s d i), so
-    that its current is that of a winding R (1 + (R_s / R) d^2), with bridge (u / u_most)^2 for that share. A source that carries the whole current
-    of the motor makes it R (1 + (R_s / R) |d|), with whole |u / u_most|. Where the supply was measured, the motor sees u (1 + measured (v / V_m - 1))
-    of a supply v: all of its changes (1), or none where u is already what the terminals saw. Behind a capacitor the voltage follows what is drawn with the time constant
-    T_c. The command is recovered as u = (j + a_emf w) / b.
+    """A source of resistance R_s behind a bridge of duty d = u / V_0, which draws d times the motor's current: the
+    motor sees d (V_0 - R_s d i), so that its current is that of a winding R (1 + (R_s / R) d^2), with bridge (u /
+    u_most)^2 for that share. A source that carries the whole current of the motor makes it R (1 + (R_s / R) |d|), with
+    whole |u / u_most|. Where the supply was measured, the motor sees u (1 + measured (v / V_m - 1)) of a supply v: all
+    of its changes (1), or none where u is already what the terminals saw. Behind a capacitor the voltage follows what
+    is drawn with the time constant T_c. The command is recovered as u = (j + a_emf w) / b.
     """
 
     name = "supply_sag"
-    sentence = "the supply sags under load: as if the motor's resistance were higher by {share} of itself at a command of {u_most}"
+    sentence = (
+        "the supply sags under load: as if the motor's resistance were higher by {share} of itself at a command of"
+        " {u_most}"
+    )
     mjcf = "none: the torque is set step by step from speed and current"
     parameters = (
-        Parameter("bridge", "ratio", "source resistance over the motor's at the largest input, of a bridge that draws its duty's share of the current", absent=np.inf),
+        Parameter(
+            "bridge",
+            "ratio",
+            "source resistance over the motor's at the largest input, of a bridge that draws its duty's share of the"
+            " current",
+            absent=np.inf,
+        ),
         Parameter("whole", "ratio", "the same of a source that carries the whole current of the motor", absent=np.inf),
-        Parameter("measured", "ratio", "share of the measured supply's changes that the motor sees", upper=2.0, absent=np.inf, recorded=True),
+        Parameter(
+            "measured",
+            "ratio",
+            "share of the measured supply's changes that the motor sees",
+            upper=2.0,
+            absent=np.inf,
+            recorded=True,
+        ),
         Parameter("T_c", "time", "time constant of the supply's capacitor", lower=0.005, upper=10.0, absent=np.inf),
         Parameter("u_most", "input", "largest input, 24 where it is not told", fitted=False, absent=24.0),
         Parameter("V_m", "supply", "median of the measured supply, 24 where it is not told", fitted=False, absent=24.0),
@@ -30,8 +47,14 @@ class SupplySag(Drive):
     sized, tries = 3, 4
 
     def starts(self, scales):
-        drawn = [np.array([*shares, np.inf, T_c, scales.input, 24.0]) for T_c in (np.inf, 0.1) for shares in ((0.2, np.inf), (np.inf, 0.2))]
-        return drawn + [np.array([np.inf, np.inf, 0.5, np.inf, scales.input, scales.supply])] if scales.supply else drawn
+        drawn = [
+            np.array([*shares, np.inf, T_c, scales.input, 24.0])
+            for T_c in (np.inf, 0.1)
+            for shares in ((0.2, np.inf), (np.inf, 0.2))
+        ]
+        return (
+            drawn + [np.array([np.inf, np.inf, 0.5, np.inf, scales.input, scales.supply])] if scales.supply else drawn
+        )
 
     def fed(self, p, u, supply):
         return u * (1.0 + p[2] * (supply / p[5] - 1.0)) if np.isfinite(p[2]) else u
@@ -67,10 +90,17 @@ class SupplySag(Drive):
         way, decay = np.sign(drawn * asked), np.exp(-np.diff(t) / T_c)  # a sag turns no current round
         most = bridge * np.maximum(drawn * asked, 0.0) + whole * np.abs(drawn)
         back = bridge * np.where(way > 0, asked**2, 0.0) + whole * way * np.abs(asked)
-        return j - asked * recursive(np.append(1.0, decay - (1.0 - decay) * back[:-1]), np.append(0.0, (1.0 - decay) * most[:-1]))
+        return j - asked * recursive(
+            np.append(1.0, decay - (1.0 - decay) * back[:-1]), np.append(0.0, (1.0 - decay) * most[:-1])
+        )
 
     def describe(self, values):
         if values["measured"] != "none":
-            return f"the supply varies and the drive does not make up for it: the motor sees {values['measured']} of each of its measured changes"
+            return (
+                f"the supply varies and the drive does not make up for it: the motor sees {values['measured']} of each"
+                " of its measured changes"
+            )
         share = values["whole"] if values["bridge"] == "none" else values["bridge"]
-        return self.sentence.format(share=share, u_most=values["u_most"]) + (f", {values['T_c']} after it is drawn" if values["T_c"] != "none" else "")
+        return self.sentence.format(share=share, u_most=values["u_most"]) + (
+            f", {values['T_c']} after it is drawn" if values["T_c"] != "none" else ""
+        )

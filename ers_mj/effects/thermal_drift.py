@@ -11,17 +11,30 @@ COLDEST = -0.9  # of the resistance, by which it may fall at most
 
 
 class ThermalDrift(Drive):
-    """R(t) = R (1 + rise q), T_w q' = (j / j_stall)^2 - q: the winding's heat, one node that is cold where a recording begins.
+    """R(t) = R (1 + rise q), T_w q' = (j / j_stall)^2 - q: the winding's heat, one node that is cold where a recording
+    begins.
 
-    j_stall is the drive acceleration under the largest input at a standstill, so that ``rise`` is what the resistance gains in the long run
-    there. A negative rise is a drive that gains as it warms.
+    j_stall is the drive acceleration under the largest input at a standstill, so that ``rise`` is what the resistance
+    gains in the long run there. A negative rise is a drive that gains as it warms.
     """
 
     name = "thermal_drift"
-    sentence = "the motor's resistance drifts by {rise} of itself as it warms up within {T_w} (at a standstill under {u})"
-    mjcf = "none: the torque is set step by step (the thermal of a dcmotor knows heat in watts, which no recording of an angle tells)"
+    sentence = (
+        "the motor's resistance drifts by {rise} of itself as it warms up within {T_w} (at a standstill under {u})"
+    )
+    mjcf = (
+        "none: the torque is set step by step (the thermal of a dcmotor knows heat in watts, which no recording of an"
+        " angle tells)"
+    )
     parameters = (
-        Parameter("rise", "ratio", "relative rise of the resistance, once warm at a standstill under the largest input", positive=False, lower=-3.0, upper=30.0),
+        Parameter(
+            "rise",
+            "ratio",
+            "relative rise of the resistance, once warm at a standstill under the largest input",
+            positive=False,
+            lower=-3.0,
+            upper=30.0,
+        ),
         Parameter("T_w", "time", "time constant of the warm-up", lower=SHORTEST, upper=1e4),
         Parameter("u", "input", "largest input, 24 where it is not told", fitted=False, absent=24.0),
     )

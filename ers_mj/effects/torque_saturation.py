@@ -8,7 +8,9 @@ LEAST = -0.5  # of fall, times the square of the drive
 
 
 class TorqueSaturation(Drive):
-    """j / (1 + fall (j / j_peak)^2) in place of the drive acceleration j: iron that saturates. j_peak is that of a standstill under the input u."""
+    """j / (1 + fall (j / j_peak)^2) in place of the drive acceleration j: iron that saturates. j_peak is that of a
+    standstill under the input u.
+    """
 
     name = "torque_saturation"
     named = False

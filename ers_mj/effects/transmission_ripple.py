@@ -7,16 +7,19 @@ import numpy as np
 from ers_mj.effects.base import RETURNS, Parameter, Transmission, law
 from ers_mj.errors import InputError
 
-ORDERS = range(1, 13)  # periods within the travel from which a fit is begun: slower than cogging, of which poles make many a turn
+ORDERS = range(
+    1, 13
+)  # periods within the travel from which a fit is begun: slower than cogging, of which poles make many a turn
 
 
 class TransmissionRipple(Transmission):
-    """r = 1 + ripple sin(x), x = 2 pi theta / period + phase: an eccentric gear or a bent screw. Or, whatever the load, theta'' +=
-    A (sin x + second sin(2 x + phase_2)) / J: teeth that grind.
+    """r = 1 + ripple sin(x), x = 2 pi theta / period + phase: an eccentric gear or a bent screw. Or, whatever the load,
+    theta'' += A (sin x + second sin(2 x + phase_2)) / J: teeth that grind.
 
-    The motor's torque at the rudder is r times, its back-EMF r times the mean ratio's; the change of the reflected inertia, and with
-    inductance the current's delay behind the changed back-EMF, are left out. A torque that waves with the angle is this one's where it is too slow for
-    a motor's cogging (``Scales.cog``), which without a known gear it never is.
+    The motor's torque at the rudder is r times, its back-EMF r times the mean ratio's; the change of the reflected
+    inertia, and with inductance the current's delay behind the changed back-EMF, are left out. A torque that waves with
+    the angle is this one's where it is too slow for a motor's cogging (``Scales.cog``), which without a known gear it
+    never is.
     """
 
     name = "transmission_ripple"
@@ -26,8 +29,22 @@ class TransmissionRipple(Transmission):
         Parameter("ripple", "ratio", "amplitude over the mean ratio", positive=False, lower=-0.9, upper=0.9),
         Parameter("period", "position", "period, seen at the output"),
         Parameter("phase", "phase", "phase of the sine at angle zero", positive=False),
-        Parameter("A", "torque", "amplitude, seen at the output, of a torque instead of a ratio", positive=False, absent=np.inf),
-        Parameter("second", "ratio", "second harmonic of that torque over the first", positive=False, lower=-2.0, upper=2.0, absent=np.inf),
+        Parameter(
+            "A",
+            "torque",
+            "amplitude, seen at the output, of a torque instead of a ratio",
+            positive=False,
+            absent=np.inf,
+        ),
+        Parameter(
+            "second",
+            "ratio",
+            "second harmonic of that torque over the first",
+            positive=False,
+            lower=-2.0,
+            upper=2.0,
+            absent=np.inf,
+        ),
         Parameter("phase_2", "phase", "phase of the second harmonic against the first", positive=False, absent=np.inf),
     )
     needs, together = (("ripple", "A"),), (("second", "phase_2"),)
@@ -36,11 +53,19 @@ class TransmissionRipple(Transmission):
 
     def starts(self, scales):
         periods = [(scales.high - scales.low) / order for order in ORDERS]
-        return [*(np.array([0.05, period, 0.0, np.inf, np.inf, np.inf]) for period in periods),
-                *(np.array([np.inf, period, 0.0, 0.2 * scales.acceleration, np.inf, np.inf]) for period in periods if period > scales.cog)]
+        return [
+            *(np.array([0.05, period, 0.0, np.inf, np.inf, np.inf]) for period in periods),
+            *(
+                np.array([np.inf, period, 0.0, 0.2 * scales.acceleration, np.inf, np.inf])
+                for period in periods
+                if period > scales.cog
+            ),
+        ]
 
     def grown(self, name, p, scales):
-        """From a plain torque: with a second harmonic, where a whole period is seen: less of five numbers stands for any smooth torque."""
+        """From a plain torque: with a second harmonic, where a whole period is seen: less of five numbers stands for
+        any smooth torque.
+        """
         plain = name == self.name and np.isfinite(p[3]) and not np.isfinite(p[4]) and p[1] <= scales.high - scales.low
         return [np.array([*p[:4], 0.1, phase]) for phase in (0.0, 0.5 * np.pi)] if plain else []
 
@@ -64,4 +89,7 @@ class TransmissionRipple(Transmission):
     def describe(self, values):
         if values["A"] == "none":
             return super().describe(values)
-        return f"the gear does not turn evenly: a torque of amplitude {values['A']} at the rudder that returns every {values['period']} of its angle"
+        return (
+            f"the gear does not turn evenly: a torque of amplitude {values['A']} at the rudder that returns every"
+            f" {values['period']} of its angle"
+        )

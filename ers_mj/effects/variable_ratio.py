@@ -10,12 +10,14 @@ LEAST = 0.05  # of the ratio at theta_0: a linkage near its dead centre
 class VariableRatio(Transmission):
     """r = 1 + slope x + bend x^2, x = theta - theta_0: a rod on a rocker arm.
 
-    The motor's torque at the rudder is r times, its back-EMF r times that at theta_0, and its share rho of the inertia r^2 times; with
-    inductance the current's delay behind the changed back-EMF is left out.
+    The motor's torque at the rudder is r times, its back-EMF r times that at theta_0, and its share rho of the inertia
+    r^2 times; with inductance the current's delay behind the changed back-EMF is left out.
     """
 
     name = "variable_ratio"
-    sentence = "the gear ratio changes along the travel: by {slope} times the angle from rest and {bend} times its square"
+    sentence = (
+        "the gear ratio changes along the travel: by {slope} times the angle from rest and {bend} times its square"
+    )
     mjcf = "none: torque and inertia are set step by step; a rod on a rocker arm is the rudder system's own linkage"
     parameters = (
         Parameter("slope", "per_position", "relative change of the ratio per angle", positive=False),
@@ -28,7 +30,10 @@ class VariableRatio(Transmission):
     def starts(self, scales):
         """Mostly slope, mostly bend, and both."""
         reach = scales.position
-        return [np.array([0.1 * slope / reach, 0.1 * bend / reach**2, 0.5]) for slope, bend in ((1.0, 0.05), (0.05, 1.0), (1.0, 1.0), (1.0, -1.0))]
+        return [
+            np.array([0.1 * slope / reach, 0.1 * bend / reach**2, 0.5])
+            for slope, bend in ((1.0, 0.05), (0.05, 1.0), (1.0, 1.0), (1.0, -1.0))
+        ]
 
     def constants(self, p, c):
         return np.array([p[0], p[1], c.theta_0, c.a_emf, p[2]])

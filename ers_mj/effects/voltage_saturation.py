@@ -9,14 +9,23 @@ LEAST_SHARP = 4.0  # at which half of u_max is given to 1.5 % still: what bends 
 
 
 class VoltageSaturation(Drive):
-    """The terminals see the command u clipped at +-u_max, or u / (1 + |u / u_max|^sharpness)^(1 / sharpness): a drive that gives in before."""
+    """The terminals see the command u clipped at +-u_max, or u / (1 + |u / u_max|^sharpness)^(1 / sharpness): a drive
+    that gives in before.
+    """
 
     name = "voltage_saturation"
     sentence = "the drive gives no more than {u_max}, whatever is commanded"
     mjcf = "the ctrlrange of the motor; a soft knee is put into the command before it reaches ctrl"
     parameters = (
         Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),
-        Parameter("sharpness", "ratio", "exponent of a soft knee; a plain clip where there is none", lower=LEAST_SHARP, upper=100.0, absent=np.inf),
+        Parameter(
+            "sharpness",
+            "ratio",
+            "exponent of a soft knee; a plain clip where there is none",
+            lower=LEAST_SHARP,
+            upper=100.0,
+            absent=np.inf,
+        ),
     )
     needs = (("u_max",),)
     tries = 3

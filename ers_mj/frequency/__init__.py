@@ -1,4 +1,4 @@
 """Loops over frequency.
-
-linear (a plant about one point), describing (what is not linear, at one amplitude) -> loop (margins) -> cycle (limit cycles)
+ linear (a plant about one point), describing (what is not linear, at one amplitude) -> loop (margins) -> cycle (limit
+cycles)
 """

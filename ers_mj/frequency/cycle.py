@@ -1,12 +1,12 @@
 """Limit cycles: those that the describing functions predict, and the one that the simulated loop shows.
 
-    motor's side   Z_m theta_m + tau = drive,   Z_m = rho s^2 + beta a_mech s + a_emf s / (1 + tau_e s)
-    rudder         Z_l theta = tau,             Z_l = (1 - rho) s^2 + (1 - beta) a_mech s + a_1 + N_friction(E) + N_preload(E)
-    play           tau = N_contact(A, w) (theta_m - theta)
-    drive          -H C(E) N_limit(|C| E) theta,  H = b (1 - e^(-s h)) / (s h) e^(-s delay) / (1 + tau_e s)
-
-with E the rudder's amplitude and A the twist's. A cycle of frequency w and amplitude E balances both lines; without play theta_m = theta. It lasts
-where a larger E damps it: Im(R_E / R_w) < 0 of the residual R(w, E), the quasi-static criterion of Gelb and Vander Velde.
+    motor's side   Z_m theta_m + tau = drive,   Z_m = rho s^2 + beta a_mech s + a_emf s / (1 + tau_e s) rudder
+    Z_l theta = tau,             Z_l = (1 - rho) s^2 + (1 - beta) a_mech s + a_1 + N_friction(E) + N_preload(E) play
+    tau = N_contact(A, w) (theta_m - theta) drive          -H C(E) N_limit(|C| E) theta,  H = b (1 - e^(-s h)) / (s h)
+    e^(-s delay) / (1 + tau_e s)
+ with E the rudder's amplitude and A the twist's. A cycle of frequency w and amplitude E balances both lines; without
+play theta_m = theta. It lasts where a larger E damps it: Im(R_E / R_w) < 0 of the residual R(w, E), the quasi-static
+criterion of Gelb and Vander Velde.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ KICK_SHARE = 0.25  # of the time, after which a loop has forgotten how it was le
 
 @dataclass(frozen=True)
 class Cycle:
-    """A limit cycle: frequency [Hz] and amplitude of the rudder [rad]; ``lasting`` whether disturbances of it die out."""
+    """A limit cycle: frequency [Hz] and amplitude of the rudder [rad]; ``lasting`` whether disturbances of it die
+    out.
+    """
 
     f_hz: float
     amplitude: float
@@ -70,13 +72,19 @@ def predicted(controller: Controller, c: Coefficients, centre: float) -> list[Cy
 
 def _surface(f_hz: np.ndarray, E: np.ndarray, values: np.ndarray) -> Callable[[float, float], complex]:
     """Complex values (F, E) as a function of frequency and amplitude, straight over both logarithms."""
-    parts = [RectBivariateSpline(np.log(f_hz), np.log(E), part, kx=1, ky=1)
-             for part in (np.log(np.abs(values)), np.unwrap(np.unwrap(np.angle(values), axis=0), axis=1))]
-    return lambda f, e: complex(np.exp(parts[0].ev(math.log(f), math.log(e)) + 1j * parts[1].ev(math.log(f), math.log(e))))
+    parts = [
+        RectBivariateSpline(np.log(f_hz), np.log(E), part, kx=1, ky=1)
+        for part in (np.log(np.abs(values)), np.unwrap(np.unwrap(np.angle(values), axis=0), axis=1))
+    ]
+    return lambda f, e: complex(
+        np.exp(parts[0].ev(math.log(f), math.log(e)) + 1j * parts[1].ev(math.log(f), math.log(e)))
+    )
 
 
 def residual(c: Coefficients, h: float, centre: float, C: complex, f_hz: float, E: float) -> complex:
-    """What the balance leaves [1/s^2], over E: 0 for a cycle; NaN where no twist passes the torque that the rudder takes."""
+    """What the balance leaves [1/s^2], over E: 0 for a cycle; NaN where no twist passes the torque that the rudder
+    takes.
+    """
     w = 2.0 * math.pi * f_hz
     s = 1j * w
     lag = 1.0 + s * c.tau_e
@@ -105,8 +113,8 @@ def _passed(c: Coefficients, w: float, torque: float) -> complex | None:
 
 @lru_cache(maxsize=4 * LOOKED_HZ)
 def _contacts(k: float, d: float, gap: float, harden: float, w: float) -> tuple[np.ndarray, np.ndarray]:
-    """What the contact passes (X,) [rad/s^2] of twists just beyond the play up to WIDEST times it, and its N (X,); of a shaft that hardens, of twists as small
-    against that at which it takes twice the torque."""
+    """What the contact passes (X,) [rad/s^2] of twists just beyond the play up to WIDEST times it, and its N (X,); of a
+    shaft that hardens, of twists as small against that at which it takes twice the torque."""
     spread = np.geomspace(1e-4, WIDEST, TWISTS)
     if harden > 0:
         twist = spread / np.sqrt(harden)
@@ -130,7 +138,11 @@ def balanced(residual: Callable[[float, float], complex], to_hz: float = TO_HZ) 
         solved = root(lambda z: [at(z).real / size, at(z).imag / size], start, tol=1e-10)
         f, e = np.exp(np.clip(solved.x, *ends)).tolist()
         inside = bool((ends[0] < solved.x).all() and (solved.x < ends[1]).all())
-        if not solved.success or not inside or any(abs(math.log(f / x.f_hz)) < 1e-3 and abs(math.log(e / x.amplitude)) < 1e-3 for x in found):
+        if (
+            not solved.success
+            or not inside
+            or any(abs(math.log(f / x.f_hz)) < 1e-3 and abs(math.log(e / x.amplitude)) < 1e-3 for x in found)
+        ):
             continue
         d = 1e-4
         R_w = (at(solved.x + [d, 0]) - at(solved.x - [d, 0])) / (2.0 * d * 2.0 * math.pi * f)
@@ -145,8 +157,11 @@ def _turns(x: np.ndarray) -> np.ndarray:
     return (corners.min(axis=0) < 0) & (corners.max(axis=0) > 0)
 
 
-def simulated(controller: Controller, plant: Sampled, effects, terminal, centre: float, kick: float, duration: float) -> tuple[Cycle | None, np.ndarray]:
-    """The cycle that a loop keeps after being let go at centre + kick [rad]; None where it comes to rest, and the angle (N,) about the centre.
+def simulated(
+    controller: Controller, plant: Sampled, effects, terminal, centre: float, kick: float, duration: float
+) -> tuple[Cycle | None, np.ndarray]:
+    """The cycle that a loop keeps after being let go at centre + kick [rad]; None where it comes to rest, and the angle
+    (N,) about the centre.
 
     The plant stands at centre + kick; its drive's effects are in ``terminal``, its sensor's in ``effects``.
     """
@@ -158,7 +173,9 @@ def simulated(controller: Controller, plant: Sampled, effects, terminal, centre:
 
 
 def lasting(theta: np.ndarray, h: float) -> Cycle | None:
-    """The oscillation (N,) [rad], sampled at h [s], that is still there at the end; None where it dies out, grows out of bounds or never is."""
+    """The oscillation (N,) [rad], sampled at h [s], that is still there at the end; None where it dies out, grows out
+    of bounds or never is.
+    """
     quarter = theta.size // 4
     before, last = theta[-2 * quarter : -quarter], theta[-quarter:]
     if not np.isfinite(theta).all():

@@ -1,9 +1,10 @@
-"""Plants as linear systems, while they slip: the reduced model from its coefficients, the MuJoCo plant from MuJoCo's own derivatives.
+"""Plants as linear systems, while they slip: the reduced model from its coefficients, the MuJoCo plant from MuJoCo's
+own derivatives.
 
-    plant, point -> x' = A x + B (voltage, load), theta = C x -> the same from sample to sample, held, with the command's delay
-
-Where a plant slips, its Coulomb friction and its preload are constant and drop out; a play is closed. Laws of effects enter with their slopes at
-the point.
+    plant, point -> x' = A x + B (voltage, load), theta = C x -> the same from sample to sample, held, with the
+    command's delay
+ Where a plant slips, its Coulomb friction and its preload are constant and drop out; a play is closed. Laws of effects
+enter with their slopes at the point.
 """
 
 from __future__ import annotations
@@ -25,7 +26,12 @@ from ers_mj.plants.reduced import ReducedModel
 
 SLIP = 1.0  # [rad/s] of the point
 NUDGE = 1e-5  # of the point, for slopes of laws
-EPSILONS = (1e-7, 1e-8, 3e-9, 1e-9)  # of MuJoCo's finite differences: the first that its rigid contacts bear, which give little under their loads
+EPSILONS = (
+    1e-7,
+    1e-8,
+    3e-9,
+    1e-9,
+)  # of MuJoCo's finite differences: the first that its rigid contacts bear, which give little under their loads
 BURST = 1.01  # growth in one step beyond which a difference has opened a contact
 SETTLE_S = 0.1  # before them, so that contacts and couplings carry their loads
 PADE = 4  # order of a dead time where no sample time is given
@@ -80,22 +86,32 @@ def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: flo
         move = _steps(A, B[:, :1], step)
     held = _held(move, C, 1.0 / rate_hz, c.delay)
     for name, values in plant.effects:
-        held, load = (held * _late(values, held.dt), load * _late(values, load.dt)) if name == "sensor_lag" else (held, load)
+        held, load = (
+            (held * _late(values, held.dt), load * _late(values, load.dt)) if name == "sensor_lag" else (held, load)
+        )
     return LinearPlant("reduced" if reduced else "mujoco", held, load, theta, omega, _left_out(plant))
 
 
 def _left_out(plant: ReducedModel | MechanicalPlant) -> tuple[str, ...]:
-    """Effects that change the command or the reading in ways that are not linear; in MuJoCo also laws that the stepping applies."""
-    shaped = [name for name, _ in plant.effects
-              if type(BY_NAME[name]).command is not Effect.command or (type(BY_NAME[name]).measure is not Effect.measure and name != "sensor_lag")]
+    """Effects that change the command or the reading in ways that are not linear; in MuJoCo also laws that the stepping
+    applies.
+    """
+    shaped = [
+        name
+        for name, _ in plant.effects
+        if type(BY_NAME[name]).command is not Effect.command
+        or (type(BY_NAME[name]).measure is not Effect.measure and name != "sensor_lag")
+    ]
     return tuple(dict.fromkeys([*shaped, *(plant.stepped if isinstance(plant, MechanicalPlant) else ())]))
 
 
-# -- the reduced model ---------------------------------------------------------------------------------------------------
+# -- the reduced model
+# ---------------------------------------------------------------------------------------------------
 
 
 def matrices(model: ReducedModel, theta: float, omega: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A (n, n), B (n, 2) of voltage [V] and load [rad/s^2], C (1, n) of the states theta, w[, theta_m, w_m][, j], without the delay.
+    """A (n, n), B (n, 2) of voltage [V] and load [rad/s^2], C (1, n) of the states theta, w[, theta_m, w_m][, j],
+    without the delay.
 
         (1 - rho) w' = -a_1 theta - (1 - beta) a_mech w + k (theta_m - theta) + d (w_m - w) + f(theta, w, j) + load
         rho w_m' = -beta a_mech w_m + j - k (theta_m - theta) - d (w_m - w),   tau_e j' = b u - a_emf w_m - j
@@ -126,8 +142,14 @@ def matrices(model: ReducedModel, theta: float, omega: float) -> tuple[np.ndarra
 
 
 def _slopes(model: ReducedModel, c: Coefficients, theta: float, omega: float) -> tuple[float, float, float]:
-    """Slopes over theta, w and j of what the effects' laws add to the rudder's acceleration, in motion upwards at a drive that holds the speed."""
-    laws = [(effect, effect.constants(values, c)) for effect, values in ((BY_NAME[name], values) for name, values in model.effects) if effect.is_lawful(values)]
+    """Slopes over theta, w and j of what the effects' laws add to the rudder's acceleration, in motion upwards at a
+    drive that holds the speed.
+    """
+    laws = [
+        (effect, effect.constants(values, c))
+        for effect, values in ((BY_NAME[name], values) for name, values in model.effects)
+        if effect.is_lawful(values)
+    ]
     j = c.a_1 * (theta - c.theta_0) + c.a_mech_plus * omega + c.c_1 * np.sign(theta - c.theta_0) + c.c_2_plus
 
     def force(theta: float, w: float, j: float) -> float:
@@ -142,12 +164,16 @@ def _slopes(model: ReducedModel, c: Coefficients, theta: float, omega: float) ->
     return tuple((force(*(point + e)) - force(*(point - e))) / (2.0 * e.sum()) for e in np.diag(steps))
 
 
-# -- the MuJoCo plant ------------------------------------------------------------------------------------------------------
+# -- the MuJoCo plant
+# ------------------------------------------------------------------------------------------------------
 
 
 @unlogged()
-def transitions(plant: MechanicalPlant, rate_hz: float, theta: float, omega: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """A (n, n), B (n, 2) of voltage [V] and load [rad/s^2], C (1, n), from one step of MuJoCo to the next, and that step [s].
+def transitions(
+    plant: MechanicalPlant, rate_hz: float, theta: float, omega: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """A (n, n), B (n, 2) of voltage [V] and load [rad/s^2], C (1, n), from one step of MuJoCo to the next, and that
+    step [s].
 
     By `mjd_transitionFD`, after SETTLE_S of motion under the voltage that holds the speed.
 
@@ -156,7 +182,12 @@ def transitions(plant: MechanicalPlant, rate_hz: float, theta: float, omega: flo
     """
     stepper, c, J = plant._stepper(), plant._lowered, plant._skeleton.inertia
     model, data = stepper.model, stepper.data
-    v = (c.a_1 * (theta - c.theta_0) + (c.a_mech_plus + c.a_emf) * omega + c.c_1 * np.sign(theta - c.theta_0) + c.c_2_plus) / c.b
+    v = (
+        c.a_1 * (theta - c.theta_0)
+        + (c.a_mech_plus + c.a_emf) * omega
+        + c.c_1 * np.sign(theta - c.theta_0)
+        + c.c_2_plus
+    ) / c.b
     stepper.reset(_pushing(plant, theta - SETTLE_S * omega, omega))
     stepper.hold([(v, stepper._divide(SETTLE_S)[1])], SETTLE_S)
     model.opt.timestep, _ = stepper._divide(1.0 / rate_hz)
@@ -167,20 +198,30 @@ def transitions(plant: MechanicalPlant, rate_hz: float, theta: float, omega: flo
         if np.isfinite(A).all() and np.abs(np.linalg.eigvals(A)).max() < BURST:
             break
     else:
-        raise InputError(f"MuJoCo's derivatives at {theta:.4g} rad and {omega:.3g} rad/s are those of no motion: its contacts carry too little load there")
+        raise InputError(
+            f"MuJoCo's derivatives at {theta:.4g} rad and {omega:.3g} rad/s are those of no motion: its contacts carry"
+            " too little load there"
+        )
     C = np.zeros((1, n))
     C[0, [stepper.rocker, *([stepper.gap] if stepper.gap is not None else [])]] = 1.0
     return A, B[:, [stepper.motor, stepper.load]] * [1.0, J], C, model.opt.timestep
 
 
 def _pushing(plant: MechanicalPlant, theta: float, omega: float) -> dict[str, tuple[float, float]]:
-    """Where the joints start, {name: (position, velocity)}: the drive at the upper end of the play, so that it pushes upwards."""
+    """Where the joints start, {name: (position, velocity)}: the drive at the upper end of the play, so that it pushes
+    upwards.
+    """
     ahead = plant._lowered.gap if plant._lowered.has_motor_side else 0.0
     pose = plant._skeleton.pose(theta + ahead)
-    return plant._start((theta, omega)) | {name: (q, dq * omega) for name, (q, dq) in pose.items()} | {"gap": (-ahead, 0.0)}
+    return (
+        plant._start((theta, omega))
+        | {name: (q, dq * omega) for name, (q, dq) in pose.items()}
+        | {"gap": (-ahead, 0.0)}
+    )
 
 
-# -- from sample to sample ----------------------------------------------------------------------------------------------------
+# -- from sample to sample
+# ----------------------------------------------------------------------------------------------------
 
 
 def _flow(A: np.ndarray, B: np.ndarray) -> Move:

@@ -1,6 +1,6 @@
 """One controller around one plant over frequency: open loop, sensitivity, margins, disk margins, bandwidth.
-
-    plant about its point, friction and preload at the amplitude; controller at the same amplitude -> L = C P -> S = 1/(1 + L), T = L S -> margins
+ plant about its point, friction and preload at the amplitude; controller at the same amplitude -> L = C P -> S = 1/(1 +
+L), T = L S -> margins
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ LOWEST_HZ, ASKED, DRAWN = 0.5, 40, 600  # frequencies at which a controller is a
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A loop, each (F,): frequency [Hz], plant [rad/V], controller [V/rad], and what follows; None where there is none (an infinite margin too).
+    """A loop, each (F,): frequency [Hz], plant [rad/V], controller [V/rad], and what follows; None where there is none
+    (an infinite margin too).
 
     Attributes:
         gain_margin_db: least change of the gain, up or down, that ends stability; ``gain_range`` both as factors.
@@ -66,8 +67,21 @@ class Loop:
 
     def as_document(self) -> dict:
         """As an entry of `loops`."""
-        names = ("controller", "plant", "gain_margin_db", "gain_range", "phase_margin_deg", "gain_crossover_hz", "disk_margin", "disk_gain_margin_db",
-                 "disk_phase_margin_deg", "sensitivity_peak", "sensitivity_peak_hz", "bandwidth_hz", "stable")
+        names = (
+            "controller",
+            "plant",
+            "gain_margin_db",
+            "gain_range",
+            "phase_margin_deg",
+            "gain_crossover_hz",
+            "disk_margin",
+            "disk_gain_margin_db",
+            "disk_phase_margin_deg",
+            "sensitivity_peak",
+            "sensitivity_peak_hz",
+            "bandwidth_hz",
+            "stable",
+        )
         return {name: getattr(self, name) for name in names}
 
 
@@ -86,7 +100,13 @@ def ask(controller: Controller, centre: float, amplitude: float) -> Answers:
     """What a controller answers to sines of the rudder, from LOWEST_HZ almost up to half its sample rate."""
     asked = np.geomspace(LOWEST_HZ, ROOM / controller.h, ASKED)
     f_hz = np.geomspace(asked[0], asked[-1], DRAWN)
-    return Answers(controller.name, centre, amplitude, f_hz, _between(asked, controller_response(controller, centre, amplitude, asked), f_hz))
+    return Answers(
+        controller.name,
+        centre,
+        amplitude,
+        f_hz,
+        _between(asked, controller_response(controller, centre, amplitude, asked), f_hz),
+    )
 
 
 def close_loop(answers: Answers, plant: LinearPlant, c: Coefficients) -> Loop:
@@ -114,9 +134,23 @@ def judged(controller: str, plant: str, f_hz: np.ndarray, P: np.ndarray, C: np.n
     T = np.abs(L * S)
     fallen = np.flatnonzero(T < T[0] / math.sqrt(2.0))
     alpha = float(np.min(1.0 / np.abs(S - 0.5)))
-    return Loop(controller, plant, f_hz, P, C, min(margins) if margins else None, (down, up), None if worst is None else float(phases[worst]),
-                None if worst is None else float(crossings[worst]) / (2.0 * math.pi), alpha, *_of_disk(alpha), float(np.abs(S).max()),
-                float(f_hz[np.argmax(np.abs(S))]), _crossing(f_hz, T, int(fallen[0])) if fallen.size else None, is_stable(L))
+    return Loop(
+        controller,
+        plant,
+        f_hz,
+        P,
+        C,
+        min(margins) if margins else None,
+        (down, up),
+        None if worst is None else float(phases[worst]),
+        None if worst is None else float(crossings[worst]) / (2.0 * math.pi),
+        alpha,
+        *_of_disk(alpha),
+        float(np.abs(S).max()),
+        float(f_hz[np.argmax(np.abs(S))]),
+        _crossing(f_hz, T, int(fallen[0])) if fallen.size else None,
+        is_stable(L),
+    )
 
 
 def _least(x: np.ndarray) -> float | None:
@@ -128,7 +162,9 @@ def _most(x: np.ndarray) -> float | None:
 
 
 def _of_disk(alpha: float) -> tuple[float | None, float | None]:
-    """Gain [dB], up or down, and phase [deg] within the balanced disk of size alpha (as `control.disk_margins`); None where it allows any."""
+    """Gain [dB], up or down, and phase [deg] within the balanced disk of size alpha (as `control.disk_margins`); None
+    where it allows any.
+    """
     gain = None if alpha >= 2.0 else 20.0 * math.log10((1.0 + 0.5 * alpha) / (1.0 - 0.5 * alpha))
     return gain, None if alpha >= 2.0 else math.degrees(2.0 * math.atan(0.5 * alpha))
 

@@ -1,6 +1,6 @@
 """One call of `ers frequency`: plants, loops, limit cycles and recordings under the same conditions.
-
-    datasheet -> plants -> linear plants -> loops (a controller each) -> margins;  describing functions -> cycles;  recordings -> responses -> gaps
+ datasheet -> plants -> linear plants -> loops (a controller each) -> margins;  describing functions -> cycles;
+recordings -> responses -> gaps
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ DRAWN = 300  # frequencies of a plant's own picture
 
 @dataclass(frozen=True, eq=False)
 class PlantView:
-    """A plant beside the others, each (F,) [rad/V]: linear while it slips, and with friction and preload at the amplitude; ``off`` is the largest
-    difference of its linear response from the first plant's up to COMPARED_HZ, ([dB], [deg])."""
+    """A plant beside the others, each (F,) [rad/V]: linear while it slips, and with friction and preload at the
+    amplitude; ``off`` is the largest difference of its linear response from the first plant's up to COMPARED_HZ, ([dB],
+    [deg])."""
 
     linear: LinearPlant
     f_hz: np.ndarray
@@ -48,7 +49,9 @@ class PlantView:
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """The limit cycles of one controller: those predicted, and by plant the one that the simulation shows (None: it rests), its end (N,) [rad]."""
+    """The limit cycles of one controller: those predicted, and by plant the one that the simulation shows (None: it
+    rests), its end (N,) [rad].
+    """
 
     controller: str
     predicted: tuple[Cycle, ...]
@@ -75,8 +78,16 @@ class Study:
     recordings: tuple[Compared, ...]
 
 
-def study(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[str], conditions: Conditions, recordings: Sequence[Recording] = (), *,
-          design: Datasheet | None = None, progress: Progress = lambda text, fraction: None) -> Study:
+def study(
+    datasheet: Datasheet,
+    controllers: Sequence[str],
+    plants: Sequence[str],
+    conditions: Conditions,
+    recordings: Sequence[Recording] = (),
+    *,
+    design: Datasheet | None = None,
+    progress: Progress = lambda text, fraction: None,
+) -> Study:
     """Analyse every combination.
 
     Args:
@@ -91,7 +102,9 @@ def study(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[str
         InputError: the datasheet, an effect, a recording or the sample rate cannot be used.
     """
     if not SLOWEST_HZ <= conditions.rate_hz <= FASTEST_HZ:
-        raise InputError(f"the loop's sample rate is {conditions.rate_hz:g} Hz, {SLOWEST_HZ:g} Hz to {FASTEST_HZ:g} Hz was expected")
+        raise InputError(
+            f"the loop's sample rate is {conditions.rate_hz:g} Hz, {SLOWEST_HZ:g} Hz to {FASTEST_HZ:g} Hz was expected"
+        )
     known = Servo.of(design or datasheet)
     responses = [_response(r, datasheet) for r in recordings]  # what cannot be used is refused before anything runs
     built = {name: _build(datasheet, name, conditions) for name in plants}
@@ -108,18 +121,30 @@ def study(datasheet: Datasheet, controllers: Sequence[str], plants: Sequence[str
         loops += [close_loop(answers, plant, c) for plant in linear.values()]
         progress(f"looking for limit cycles of {name}", (k + 0.4) / len(controllers))
         cycles.append(_cycles(law, built, c, conditions))
-    return Study(_views(linear, c, conditions), tuple(loops), tuple(cycles),
-                 tuple(_compare(*pair, built, c) for pair in zip(recordings, responses, strict=True)))
+    return Study(
+        _views(linear, c, conditions),
+        tuple(loops),
+        tuple(cycles),
+        tuple(_compare(*pair, built, c) for pair in zip(recordings, responses, strict=True)),
+    )
 
 
 def _build(datasheet: Datasheet, plant: str, conditions: Conditions) -> Plant:
-    return build_plant(datasheet, plant=plant, effects=conditions.effects, gap=conditions.gap, inductance=conditions.inductance,
-                       linkage=conditions.linkage if plant == "mujoco" else "constant")
+    return build_plant(
+        datasheet,
+        plant=plant,
+        effects=conditions.effects,
+        gap=conditions.gap,
+        inductance=conditions.inductance,
+        linkage=conditions.linkage if plant == "mujoco" else "constant",
+    )
 
 
 def _views(linear: dict[str, LinearPlant], c: Coefficients, conditions: Conditions) -> tuple[PlantView, ...]:
     f_hz = np.geomspace(LOWEST_HZ, 0.47 * conditions.rate_hz, DRAWN)
-    N = coulomb(0.5 * (c.c_2_plus + c.c_2_minus), conditions.amplitude) + preload(c.c_1, conditions.amplitude, conditions.start - c.theta_0)
+    N = coulomb(0.5 * (c.c_2_plus + c.c_2_minus), conditions.amplitude) + preload(
+        c.c_1, conditions.amplitude, conditions.start - c.theta_0
+    )
     slipping = {name: plant.response(f_hz) for name, plant in linear.items()}
     first, low = next(iter(slipping.values())), f_hz <= COMPARED_HZ
     views = []
@@ -136,22 +161,28 @@ def _cycles(law, built: dict[str, Plant], c: Coefficients, conditions: Condition
     for name, plant in built.items():
         stood = sampled(plant, conditions.rate_hz, (c.theta_0 + KICK, 0.0))
         seen[name], theta = simulated(law, stood, plant.effects, plant.terminal, c.theta_0, KICK, CYCLE_S)
-        tails[name] = theta[-round(0.1 * conditions.rate_hz):]
+        tails[name] = theta[-round(0.1 * conditions.rate_hz) :]
     return Cycles(law.name, tuple(predicted(law, c, c.theta_0)), seen, tails)
 
 
-# -- recordings ----------------------------------------------------------------------------------------------------------
+# -- recordings
+# ----------------------------------------------------------------------------------------------------------
 
 
 def _response(recording: Recording, datasheet: Datasheet) -> Response:
     if datasheet.parameters and (recording.input_unit, recording.output_unit) != ("V", "rad"):
-        raise InputError(f"{recording.name}: is in {recording.output_unit} per {recording.input_unit}, {datasheet.name or 'the datasheet'} in rad per V: "
-                         "give a datasheet with [lumped] in the recording's units")
+        raise InputError(
+            f"{recording.name}: is in {recording.output_unit} per {recording.input_unit},"
+            f" {datasheet.name or 'the datasheet'} in rad per V: give a datasheet with [lumped] in the recording's"
+            " units"
+        )
     return frequency_response(recording)
 
 
 def _compare(recording: Recording, response: Response, built: dict[str, Plant], c: Coefficients) -> Compared:
-    """A recording beside each plant, slipping and with the friction and preload that its motion meets (taken as normal)."""
+    """A recording beside each plant, slipping and with the friction and preload that its motion meets (taken as
+    normal).
+    """
     y, f_hz = recording.y[recording.valid], response.f_hz
     speed, spread, centre = float(smooth_speed(recording).std()), float(y.std()), float(y.mean())
     N = rubbing(0.5 * (c.c_2_plus + c.c_2_minus), speed, f_hz) + leaning(c.c_1, spread, centre - c.theta_0)

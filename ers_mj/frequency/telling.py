@@ -31,8 +31,10 @@ def notes(found: Study) -> list[str]:
     first = found.plants[0].linear.name
     for view in found.plants:
         if view.linear.name != first:
-            out.append(f"The {view.linear.name} plant's linear response is within {view.off[0]:.2g} dB and {view.off[1]:.2g}° of the {first} plant's "
-                       f"up to {COMPARED_HZ:g} Hz.")
+            out.append(
+                f"The {view.linear.name} plant's linear response is within {view.off[0]:.2g} dB and {view.off[1]:.2g}°"
+                f" of the {first} plant's up to {COMPARED_HZ:g} Hz."
+            )
         if view.linear.left_out:
             out.append(f"The linear {view.linear.name} plant leaves out: {', '.join(view.linear.left_out)}.")
     return out
@@ -54,28 +56,76 @@ def _against(seen: Cycle, predicted: list[Cycle]) -> str:
     if not predicted:
         return f"seen {_size(seen)}"
     nearest = min(predicted, key=lambda c: abs(math.log(c.f_hz / seen.f_hz)))
-    return (f"seen {_size(seen)}, predicted {100 * (nearest.f_hz / seen.f_hz - 1):+.0f} % in frequency, "
-            f"{100 * (nearest.amplitude / seen.amplitude - 1):+.0f} % in amplitude")
+    return (
+        f"seen {_size(seen)}, predicted {100 * (nearest.f_hz / seen.f_hz - 1):+.0f} % in frequency, "
+        f"{100 * (nearest.amplitude / seen.amplitude - 1):+.0f} % in amplitude"
+    )
 
 
 def as_document(found: Study) -> dict:
     """The keys of `ers frequency --json` beside the contract's four."""
-    return {"loops": [loop.as_document() for loop in found.loops],
-            "plants": [{"plant": v.linear.name, "theta_rad": v.linear.theta, "omega_rad_s": v.linear.omega, "left_out": v.linear.left_out,
-                        "max_off_db": v.off[0], "max_off_deg": v.off[1]} for v in found.plants],
-            "cycles": [{"controller": c.controller, "predicted": [x.as_document() for x in c.predicted],
-                        "simulated": {plant: x and x.as_document() for plant, x in c.seen.items()}} for c in found.cycles],
-            "cycle_sentences": [cycle_sentence(c) for c in found.cycles],
-            "recordings": [_recording(c) for c in found.recordings], "notes": notes(found)}
+    return {
+        "loops": [loop.as_document() for loop in found.loops],
+        "plants": [
+            {
+                "plant": v.linear.name,
+                "theta_rad": v.linear.theta,
+                "omega_rad_s": v.linear.omega,
+                "left_out": v.linear.left_out,
+                "max_off_db": v.off[0],
+                "max_off_deg": v.off[1],
+            }
+            for v in found.plants
+        ],
+        "cycles": [
+            {
+                "controller": c.controller,
+                "predicted": [x.as_document() for x in c.predicted],
+                "simulated": {plant: x and x.as_document() for plant, x in c.seen.items()},
+            }
+            for c in found.cycles
+        ],
+        "cycle_sentences": [cycle_sentence(c) for c in found.cycles],
+        "recordings": [_recording(c) for c in found.recordings],
+        "notes": notes(found),
+    }
 
 
 def _recording(compared: Compared) -> dict:
     r = compared.response
-    return {"name": r.name, "kind": r.kind, "periods": r.periods, "f_hz": r.f_hz, "gain_db": 20.0 * np.log10(np.abs(r.g)),
-            "phase_deg": np.degrees(np.angle(r.g)), "coherence": r.coherence, "relative_error": r.error, "output_rad": r.output,
-            "noise_rad": r.noise, "distortion_rad": r.distortion,
-            "models": {name: {"gain_db": 20.0 * np.log10(np.abs(m)), "phase_deg": np.degrees(np.angle(m))} for name, m in compared.models.items()},
-            "gaps": {name: gap and {"lines": gap.lines, "rms_db": gap.rms_db, "max_db": gap.max_db, "rms_deg": gap.rms_deg, "max_deg": gap.max_deg,
-                                    "band_hz": gap.band_hz, "linear": gap.linear} for name, gap in compared.gaps.items()},
-            "sentences": [f"{name}: {gap.sentence}" if gap else f"{name}: {r.name} is nowhere coherent enough to be compared"
-                          for name, gap in compared.gaps.items()]}
+    return {
+        "name": r.name,
+        "kind": r.kind,
+        "periods": r.periods,
+        "f_hz": r.f_hz,
+        "gain_db": 20.0 * np.log10(np.abs(r.g)),
+        "phase_deg": np.degrees(np.angle(r.g)),
+        "coherence": r.coherence,
+        "relative_error": r.error,
+        "output_rad": r.output,
+        "noise_rad": r.noise,
+        "distortion_rad": r.distortion,
+        "models": {
+            name: {"gain_db": 20.0 * np.log10(np.abs(m)), "phase_deg": np.degrees(np.angle(m))}
+            for name, m in compared.models.items()
+        },
+        "gaps": {
+            name: (
+                gap
+                and {
+                    "lines": gap.lines,
+                    "rms_db": gap.rms_db,
+                    "max_db": gap.max_db,
+                    "rms_deg": gap.rms_deg,
+                    "max_deg": gap.max_deg,
+                    "band_hz": gap.band_hz,
+                    "linear": gap.linear,
+                }
+            )
+            for name, gap in compared.gaps.items()
+        },
+        "sentences": [
+            f"{name}: {gap.sentence}" if gap else f"{name}: {r.name} is nowhere coherent enough to be compared"
+            for name, gap in compared.gaps.items()
+        ],
+    }

@@ -1,6 +1,6 @@
 """From recordings to parameters: what to search, the search, what the data tell, and how surely.
 
-    traces -> unknowns -> structure (rank) -> search of the combinations -> starts -> precision -> rows and model
+traces -> unknowns -> structure (rank) -> search of the combinations -> starts -> precision -> rows and model
 """
 
 from __future__ import annotations
@@ -26,8 +26,12 @@ from ers_mj.traces import trace_of
 Progress = Callable[[str, float], None]
 
 
-def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, settings: Settings = Settings(),
-             progress: Progress = lambda text, share: None) -> Identified:
+def identify(
+    recordings: Sequence[Recording],
+    datasheet: Datasheet | None,
+    settings: Settings = Settings(),
+    progress: Progress = lambda text, share: None,
+) -> Identified:
     """Identify a servo from recordings.
 
     Args:
@@ -45,16 +49,32 @@ def identify(recordings: Sequence[Recording], datasheet: Datasheet | None, setti
     progress("looking at what the recordings can tell", 0.02)
     inertia = (settings.fixed or {}).get("J") or (datasheet.parameters.get("J") if datasheet is not None else None)
     traces = tuple(trace_of(r, inertia) for r in recordings)
-    unknowns = unknowns_of(traces, datasheet, settings.fixed or {}, settings.bounds or {}, settings.factors, recordings[0].output_unit == "rad")
+    unknowns = unknowns_of(
+        traces,
+        datasheet,
+        settings.fixed or {},
+        settings.bounds or {},
+        settings.factors,
+        recordings[0].output_unit == "rad",
+    )
     y = np.concatenate([t.y[t.valid] for t in traces])
     scale = 0.5 * float(np.ptp(y))
-    search = Search(unknowns, best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(unknowns.reference, surely=False)
+    search = Search(unknowns, best_structure(unknowns, traces, scale, settings.seed), scale, traces).at_home(
+        unknowns.reference, surely=False
+    )
     progress(f"searching by {settings.method}", 0.1)
-    simulate = rollouts(settings.jobs, recordings[0].output_unit == "rad", settings.timestep) if settings.plant == "mujoco" else None
+    simulate = (
+        rollouts(settings.jobs, recordings[0].output_unit == "rad", settings.timestep)
+        if settings.plant == "mujoco"
+        else None
+    )
     x, search, minimum, used = found_by(search, settings, simulate)
     again = structure_at(search.unknowns, traces, search.letters(x), scale)
     if not again.rank:
-        raise InputError("where the model comes nearest to these recordings no parameter shows: check that the input is the one that moved the output")
+        raise InputError(
+            "where the model comes nearest to these recordings no parameter shows: check that the input is the one that"
+            " moved the output"
+        )
     if again.rank > search.structure.rank:  # the reference was a place where less can be told
         before = used
         x, search, minimum, used = found_by(replace(search, structure=again, traces=traces), settings, simulate)

@@ -1,4 +1,6 @@
-"""The search: what of the unknowns can be told, the way to the least misfit, and the polish in which the recordings' starts are free too."""
+"""The search: what of the unknowns can be told, the way to the least misfit, and the polish in which the recordings'
+starts are free too.
+"""
 
 from __future__ import annotations
 
@@ -19,17 +21,28 @@ from ers_mj.traces import Trace
 
 BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is asked for
 MOST_PLACES = 8  # beside the reference, at which the rank is looked for
-SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = 1e-4, 1e-9, 1e-4  # shares of the value below which a step ends a search by squares
-NOISY_GAIN, NOISY = 1e-7, 0.5  # that of a polish where more than this share of the noise's own misfit is left: of chi^2 it is next to nothing
+SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = (
+    1e-4,
+    1e-9,
+    1e-4,
+)  # shares of the value below which a step ends a search by squares
+NOISY_GAIN, NOISY = (
+    1e-7,
+    0.5,
+)  # that of a polish where more than this share of the noise's own misfit is left: of chi^2 it is next to nothing
 FOLLOWED = (60.0, 30.0)  # [1/s] observer rates of the polish in MuJoCo; the answer is judged by the last
 AFTER_OPENING = 2  # attempts where the reference is the end of a search from many guesses already
-POLISH_BUDGET, POLISHES, POLISH_WORTH = 200, 4, 1e-4  # the last: share of the value that another polish must have been worth
+POLISH_BUDGET, POLISHES, POLISH_WORTH = (
+    200,
+    4,
+    1e-4,
+)  # the last: share of the value that another polish must have been worth
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to identify: minimiser, plant, what is held and bounded (see unknowns.py), evaluations at most, whether ls goes on where
-    another method ends, and MuJoCo's step [s]."""
+    """How to identify: minimiser, plant, what is held and bounded (see unknowns.py), evaluations at most, whether ls
+    goes on where another method ends, and MuJoCo's step [s]."""
 
     method: str = "ls"
     plant: str = "reduced"
@@ -44,7 +57,9 @@ class Settings:
 
 
 def best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, seed: int) -> Structure:
-    """The highest rank met at the reference and at places drawn from the bounds, once it has been met twice: where a rudder sticks less can be told."""
+    """The highest rank met at the reference and at places drawn from the bounds, once it has been met twice: where a
+    rudder sticks less can be told.
+    """
     random, found = np.random.default_rng(seed), [structure_at(unknowns, traces, unknowns.reference, scale)]
     for _ in range(MOST_PLACES):
         found.append(structure_at(unknowns, traces, unknowns.drawn(random), scale))
@@ -52,14 +67,18 @@ def best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, se
         if best.rank == len(unknowns.names) or sum(s.rank == best.rank for s in found) > 1 and best.rank:
             break
     if not best.rank:
-        raise InputError("no motion that the model can make within these bounds shows any parameter: check units of input and output, or widen --within")
+        raise InputError(
+            "no motion that the model can make within these bounds shows any parameter: check units of input and"
+            " output, or widen --within"
+        )
     return best
 
 
 def found_by(search: Search, settings: Settings, simulate: Simulator | None) -> tuple[np.ndarray, Search, Minimum, int]:
     """(coordinates, search with the fitted starts, the minimiser's own result, evaluations in all).
 
-    A winding of which the recordings ask for less than the bounds allow is left out: a vanishing time constant can neither be told nor be run well.
+    A winding of which the recordings ask for less than the bounds allow is left out: a vanishing time constant can
+    neither be told nor be run well.
     """
     winding = search.unknowns.winding
     doubted = winding in search.names and winding not in (settings.bounds or {})
@@ -68,7 +87,9 @@ def found_by(search: Search, settings: Settings, simulate: Simulator | None) -> 
     absent = doubted and search.at_lower_end(found.x, winding)
     if absent:
         unknowns = search.unknowns.without(winding, letters)
-        search = replace(search, unknowns=unknowns, structure=structure_at(unknowns, search.traces, unknowns.reference, search.scale))
+        search = replace(
+            search, unknowns=unknowns, structure=structure_at(unknowns, search.traces, unknowns.reference, search.scale)
+        )
     if absent or doubted and settings.method == "ls" and found.value > Misfit(search).target:
         found = _minimum(search, settings, simulate)
         used += found.evaluations
@@ -85,16 +106,31 @@ def _minimum(search: Search, settings: Settings, simulate: Simulator | None, att
     by_squares = settings.method == "ls"
     objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
     lower, upper = search.bounds
-    method = LS(gain=SEARCH_GAIN, attempts=attempts or (AFTER_OPENING if search.unknowns.guessed else ATTEMPTS)) if by_squares else MINIMISERS[settings.method]
-    found = method.minimise(objective, lower, upper, seed=settings.seed, budget=settings.budget or BUDGET["reduced" if by_squares else settings.plant],
-                            start=np.clip(search.coordinates(search.unknowns.reference), lower, upper))
+    method = (
+        LS(gain=SEARCH_GAIN, attempts=attempts or (AFTER_OPENING if search.unknowns.guessed else ATTEMPTS))
+        if by_squares
+        else MINIMISERS[settings.method]
+    )
+    found = method.minimise(
+        objective,
+        lower,
+        upper,
+        seed=settings.seed,
+        budget=settings.budget or BUDGET["reduced" if by_squares else settings.plant],
+        start=np.clip(search.coordinates(search.unknowns.reference), lower, upper),
+    )
     if not np.isfinite(found.value):
-        raise InputError("no motion that the model can make within these bounds resembles the recordings: check units and signs of input and output")
+        raise InputError(
+            "no motion that the model can make within these bounds resembles the recordings: check units and signs of"
+            " input and output"
+        )
     return found
 
 
 def polished(search: Search, x: np.ndarray, value: float, simulate: Simulator | None) -> tuple[np.ndarray, Search, int]:
-    """ls carried on from x (r,) of a ``value`` with the recordings' starts among the unknowns: where it ends, and evaluations."""
+    """ls carried on from x (r,) of a ``value`` with the recordings' starts among the unknowns: where it ends, and
+    evaluations.
+    """
     used = 0
     for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
         x, search, ended = _polished(search, x, value, None, FOLLOWED[0] if simulate else 0.0)
@@ -108,8 +144,12 @@ def polished(search: Search, x: np.ndarray, value: float, simulate: Simulator | 
     return x, search, used
 
 
-def _polished(search: Search, x: np.ndarray, value: float, simulate: Simulator | None, rate: float) -> tuple[np.ndarray, Search, Minimum]:
-    """ls from x (r,) of a ``value`` with the recordings' starts among the unknowns; by the reduced model, or with its slopes by ``simulate``, forgiving single blocks."""
+def _polished(
+    search: Search, x: np.ndarray, value: float, simulate: Simulator | None, rate: float
+) -> tuple[np.ndarray, Search, Minimum]:
+    """ls from x (r,) of a ``value`` with the recordings' starts among the unknowns; by the reduced model, or with its
+    slopes by ``simulate``, forgiving single blocks.
+    """
     letters = search.letters(x)
     begun = replace(search, unknowns=search.unknowns.around(letters), with_starts=True).at_home(letters)
     lower, upper = begun.bounds

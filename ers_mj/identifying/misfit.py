@@ -1,9 +1,10 @@
 """The objective of an identification: Eq. (13) as a function of the combinations that the data can tell.
 
-    coordinates (r,) -> letters (k,) -> Model -> simulated recordings -> residuals -> integral of their squares [rad^2 s]
-
-A coordinate is the logarithm of a combination over its reference; B, whose effect is a small addition to the back-EMF's, counts in proportion, so
-that the valley in which it trades against the rest is straight; theta_0 counts in half travels.
+    coordinates (r,) -> letters (k,) -> Model -> simulated recordings -> residuals -> integral of their squares [rad^2
+    s]
+ A coordinate is the logarithm of a combination over its reference; B, whose effect is a small addition to the
+back-EMF's, counts in proportion, so that the valley in which it trades against the rest is straight; theta_0 counts in
+half travels.
 """
 
 from __future__ import annotations
@@ -23,8 +24,15 @@ from ers_mj.identifying.unknowns import Unknowns
 STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone through before the free run
 IN_PROPORTION = ("B",)
 STEP = 1e-5  # of the letters' logarithms, for sensitivities
-COARSER, FORKS, FEWEST = 3.0, 0.01, 0.5  # a second step, the share of a slope's size by which both may differ, and the samples' share that must be left
-START, HOME = 0.01, 0.02  # half travels by which the angle at the start may be off, and within which of theta_0 a start is at home
+COARSER, FORKS, FEWEST = (
+    3.0,
+    0.01,
+    0.5,
+)  # a second step, the share of a slope's size by which both may differ, and the samples' share that must be left
+START, HOME = (
+    0.01,
+    0.02,
+)  # half travels by which the angle at the start may be off, and within which of theta_0 a start is at home
 SHY = 0.02  # share of a coordinate's range, within which it rests at its end
 EXPLAINED = 1.3  # mean squared residual in sigmas up to which a fit is good enough for no further start
 
@@ -33,9 +41,11 @@ Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace], float], l
 
 @dataclass(frozen=True)
 class Search:
-    """Coordinates (r,) of the combinations, and behind them, ``with_starts``, of where each recording starts (angle; speed where it moves).
+    """Coordinates (r,) of the combinations, and behind them, ``with_starts``, of where each recording starts (angle;
+    speed where it moves).
 
-    A recording that starts at ``home`` starts at theta_0, wherever that is: a start that may lie on either side of it would make a kink.
+    A recording that starts at ``home`` starts at theta_0, wherever that is: a start that may lie on either side of it
+    would make a kink.
     """
 
     unknowns: Unknowns
@@ -46,14 +56,21 @@ class Search:
     with_starts: bool = False
 
     def at_home(self, letters: np.ndarray, surely: bool = True) -> Search:
-        """The search in which those recordings start at home that must: at rest near theta_0, where the preload is stronger than friction.
+        """The search in which those recordings start at home that must: at rest near theta_0, where the preload is
+        stronger than friction.
 
         Where that is not known ``surely``, a preload is enough.
         """
         values = self.unknowns.values(letters)
         holds = values["c_1"] > (values["c_2"] if surely else 0.0)
         near = HOME * self.scale
-        return replace(self, home=tuple(holds and t.start[1] == 0.0 and abs(t.start[0] - values["theta_0"]) < near + 5.0 * t.sigma for t in self.traces))
+        return replace(
+            self,
+            home=tuple(
+                holds and t.start[1] == 0.0 and abs(t.start[0] - values["theta_0"]) < near + 5.0 * t.sigma
+                for t in self.traces
+            ),
+        )
 
     @property
     def names(self) -> list[str]:
@@ -63,8 +80,16 @@ class Search:
     @property
     def _moved(self) -> list[tuple[int, int]]:
         """(recording, 0 for the angle or 1 for the speed) of the coordinates of the starts."""
-        return [(r, i) for r, t in enumerate(self.traces) for i in (0, 1)
-                if not (self.home and self.home[r]) and (i == 0 or t.start[1] != 0.0)] if self.with_starts else []
+        return (
+            [
+                (r, i)
+                for r, t in enumerate(self.traces)
+                for i in (0, 1)
+                if not (self.home and self.home[r]) and (i == 0 or t.start[1] != 0.0)
+            ]
+            if self.with_starts
+            else []
+        )
 
     def letters(self, x: np.ndarray) -> np.ndarray:
         """The letters (k,) at coordinates x, the pivots at their reference."""
@@ -75,7 +100,10 @@ class Search:
 
     def coordinates(self, letters: np.ndarray) -> np.ndarray:
         """Of letters (k,): the combinations' coordinates, wherever the pivots are; the starts at 0."""
-        ratio = [0.0 if name == "theta_0" else math.log(letters[k] / self.unknowns.reference[k]) for k, name in enumerate(self.unknowns.names)]
+        ratio = [
+            0.0 if name == "theta_0" else math.log(letters[k] / self.unknowns.reference[k])
+            for k, name in enumerate(self.unknowns.names)
+        ]
         out = []
         for k, name in zip(self.structure.kept, self.names):
             if name == "theta_0":
@@ -100,7 +128,10 @@ class Search:
             if name == "theta_0":
                 ends.append((u.lower[k] / self.scale, u.upper[k] / self.scale))
                 continue
-            low, high = (math.log(max(x[k] / u.reference[k], 1e-6)) for x in ((u.lower, u.upper) if u.reference[k] > 0 else (u.upper, u.lower)))
+            low, high = (
+                math.log(max(x[k] / u.reference[k], 1e-6))
+                for x in ((u.lower, u.upper) if u.reference[k] > 0 else (u.upper, u.lower))
+            )
             for row, p in zip(self._powers, self.structure.pivots):
                 if u.names[p] == "theta_0":
                     continue
@@ -125,7 +156,7 @@ class Search:
             return self.traces
         theta_0 = self.unknowns.values(self.letters(x))["theta_0"]
         starts = [[theta_0, 0.0] if self.home and self.home[r] else list(t.start) for r, t in enumerate(self.traces)]
-        for (r, i), z in zip(self._moved, x[len(self.names):]):
+        for (r, i), z in zip(self._moved, x[len(self.names) :]):
             starts[r][i] += z * self.scale
         return tuple(replace(t, start=tuple(s)) for t, s in zip(self.traces, starts))
 
@@ -134,9 +165,10 @@ class Search:
 class Misfit:
     """Eq. (13) over a search's coordinates: x (M, r) -> (M,) [rad^2 s, or output unit^2 s].
 
-    The model runs in the observer form of ``rate`` (see identification.py), free where that is 0. Further channels enter with the weight of their noise.
-    ``simulate`` gives the residuals in sigmas of many candidates at once where it is not the reduced model that runs; the slopes are the reduced model's then.
-    A ``robust`` one has the logarithm of identification.py, block by block.
+    The model runs in the observer form of ``rate`` (see identification.py), free where that is 0. Further channels
+    enter with the weight of their noise. ``simulate`` gives the residuals in sigmas of many candidates at once where it
+    is not the reduced model that runs; the slopes are the reduced model's then. A ``robust`` one has the logarithm of
+    identification.py, block by block.
     """
 
     search: Search
@@ -147,8 +179,12 @@ class Misfit:
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         if self.simulate is not None:
-            found = self.simulate(self.search.unknowns, [self.search.letters(row) for row in x], self.search.traces, self.rate)
-            return np.array([_squares(self.weight * (forgiving(e, self.search.traces) if self.robust else e)) for e in found])
+            found = self.simulate(
+                self.search.unknowns, [self.search.letters(row) for row in x], self.search.traces, self.rate
+            )
+            return np.array(
+                [_squares(self.weight * (forgiving(e, self.search.traces) if self.robust else e)) for e in found]
+            )
         with ThreadPoolExecutor(self.jobs) as pool:
             return np.array(list(pool.map(lambda row: _squares(self.residuals(row)), x)))
 
@@ -198,14 +234,18 @@ class Misfit:
 
 
 def forgiving(e: np.ndarray, traces: Sequence[Trace]) -> np.ndarray:
-    """Residuals e (N,) in sigmas, scaled so that each block's squares sum to n ln(1 + m), m their mean: a few blocks cannot decide everything."""
+    """Residuals e (N,) in sigmas, scaled so that each block's squares sum to n ln(1 + m), m their mean: a few blocks
+    cannot decide everything.
+    """
     blocks = Blocks.of(traces)
     m = blocks.misfit(e)
     return e * np.sqrt(np.log1p(m) / np.maximum(m, 1e-300))[blocks.index]
 
 
 def forgiven(e: np.ndarray, traces: Sequence[Trace]) -> np.ndarray:
-    """What the slopes of plain residuals are to be multiplied by, (N,), so that with the scaled ones e (N,) they give the slope of the sum."""
+    """What the slopes of plain residuals are to be multiplied by, (N,), so that with the scaled ones e (N,) they give
+    the slope of the sum.
+    """
     blocks = Blocks.of(traces)
     m = np.expm1(blocks.misfit(e))
     return (np.sqrt(m / np.maximum(np.log1p(m), 1e-300)) / (1.0 + m))[blocks.index]

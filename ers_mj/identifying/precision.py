@@ -1,6 +1,6 @@
 """How sure fitted numbers are: Fisher's information, resampled blocks, and the profile of what is weak.
-
-    sensitivities J (N, r), residuals e (N,), both in sigmas -> covariance (r, r) -> 95 % half-width of anything that follows from the numbers
+ sensitivities J (N, r), residuals e (N,), both in sigmas -> covariance (r, r) -> 95 % half-width of anything that
+follows from the numbers
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ PROFILE_BUDGET, PROFILE_GAIN = 30, 1e-6  # simulations for each, and the share o
 
 @dataclass(frozen=True)
 class Precision:
-    """Covariances (r, r) of the coordinates: ``fisher`` by the residuals' size, ``resampled`` by blocks; ``freedom`` of the latter."""
+    """Covariances (r, r) of the coordinates: ``fisher`` by the residuals' size, ``resampled`` by blocks; ``freedom`` of
+    the latter.
+    """
 
     fisher: np.ndarray
     resampled: np.ndarray
@@ -34,14 +36,17 @@ class Precision:
 
     def half_width(self, gradient: np.ndarray) -> float:
         """95 % half-width of what has this gradient (r,): the wider of both."""
-        return max(1.96 * float(np.sqrt(gradient @ self.fisher @ gradient)),
-                   float(student.ppf(0.975, self.freedom) * np.sqrt(gradient @ self.resampled @ gradient)))
+        return max(
+            1.96 * float(np.sqrt(gradient @ self.fisher @ gradient)),
+            float(student.ppf(0.975, self.freedom) * np.sqrt(gradient @ self.resampled @ gradient)),
+        )
 
 
 def precision_of(slopes: np.ndarray, e: np.ndarray, traces: Sequence[Trace], seed: int) -> Precision:
     """From sensitivities (N, r) and residuals (N,) in sigmas at the optimum.
 
-    Each draw weighs the pieces by how often chance picks them and takes the one Gauss-Newton step that the weights ask for.
+    Each draw weighs the pieces by how often chance picks them and takes the one Gauss-Newton step that the weights ask
+    for.
     """
     pieces = _pieces(traces)
     seen = np.concatenate([t.seen for t in traces])
@@ -49,7 +54,9 @@ def precision_of(slopes: np.ndarray, e: np.ndarray, traces: Sequence[Trace], see
     outer = np.array([slopes[pieces == b].T @ slopes[pieces == b] for b in range(count)])
     pull = np.array([slopes[pieces == b].T @ e[pieces == b] for b in range(count)])
     information = outer.sum(axis=0)
-    fisher = max(float(e @ e) / max(int(seen.sum()) - r, 1), 1e-300) * np.linalg.pinv(information, rcond=1e-14, hermitian=True)
+    fisher = max(float(e @ e) / max(int(seen.sum()) - r, 1), 1e-300) * np.linalg.pinv(
+        information, rcond=1e-14, hermitian=True
+    )
     random, steps = np.random.default_rng(seed), []
     for _ in range(DRAWS):
         weight = np.bincount(random.integers(0, count, count), minlength=count)
@@ -65,7 +72,9 @@ def precision_of(slopes: np.ndarray, e: np.ndarray, traces: Sequence[Trace], see
 
 
 def _pieces(traces: Sequence[Trace]) -> np.ndarray:
-    """(N,) which piece each row belongs to: pieces of time, all channels together, or whole recordings where there are enough."""
+    """(N,) which piece each row belongs to: pieces of time, all channels together, or whole recordings where there are
+    enough.
+    """
     if len(traces) >= RECORDINGS:
         return np.concatenate([np.full(t.rows, k) for k, t in enumerate(traces)])
     length = max(SHORTEST, sum(t.t.size for t in traces) // BLOCKS)
@@ -79,7 +88,9 @@ def _pieces(traces: Sequence[Trace]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Profile:
-    """What the misfit rises to where one coordinate is held at x (P,): ``rise`` (P,) over that of 1 sigma^2, and where it passes the 95 % level."""
+    """What the misfit rises to where one coordinate is held at x (P,): ``rise`` (P,) over that of 1 sigma^2, and where
+    it passes the 95 % level.
+    """
 
     name: str
     x: np.ndarray
@@ -89,7 +100,9 @@ class Profile:
 
 
 class Pinned:
-    """An objective (see minimisers/base.py) over all coordinates but one, which is held; its slopes (N, r) are those of the optimum throughout."""
+    """An objective (see minimisers/base.py) over all coordinates but one, which is held; its slopes (N, r) are those of
+    the optimum throughout.
+    """
 
     def __init__(self, objective, slopes: np.ndarray, k: int, value: float):
         self._objective, self._slopes, self._k, self._value = objective, np.delete(slopes, k, axis=1), k, value
@@ -106,7 +119,16 @@ class Pinned:
         return np.array([float(e @ e) for e in map(self.residuals, x)])
 
 
-def profile(objective, slopes: np.ndarray, x: np.ndarray, k: int, name: str, half: float, inflation: float, bounds: tuple[np.ndarray, np.ndarray]) -> Profile:
+def profile(
+    objective,
+    slopes: np.ndarray,
+    x: np.ndarray,
+    k: int,
+    name: str,
+    half: float,
+    inflation: float,
+    bounds: tuple[np.ndarray, np.ndarray],
+) -> Profile:
     """The profile likelihood of coordinate k about the optimum x (r,).
 
     Args:
@@ -126,7 +148,9 @@ def profile(objective, slopes: np.ndarray, x: np.ndarray, k: int, name: str, hal
             if at in places:
                 break
             held = Pinned(objective, slopes, k, at)
-            found = LS(attempts=1, staged=False, gain=PROFILE_GAIN).minimise(held, lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest)
+            found = LS(attempts=1, staged=False, gain=PROFILE_GAIN).minimise(
+                held, lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest
+            )
             places.append(at)
             rises.append(max(found.value - least, 0.0))
             rest = found.x
@@ -134,13 +158,17 @@ def profile(objective, slopes: np.ndarray, x: np.ndarray, k: int, name: str, hal
                 break
     order = np.argsort(places)
     at, rise = np.array(places)[order], np.array(rises)[order]
-    return Profile(name, at, rise, level, (_crossing(at, rise, level, float(x[k]), -1), _crossing(at, rise, level, float(x[k]), 1)))
+    return Profile(
+        name, at, rise, level, (_crossing(at, rise, level, float(x[k]), -1), _crossing(at, rise, level, float(x[k]), 1))
+    )
 
 
 def _crossing(at: np.ndarray, rise: np.ndarray, level: float, best: float, way: int) -> float | None:
-    """Where the square root of a profile passes that of the level on one side; None where it does not as far as it was followed."""
+    """Where the square root of a profile passes that of the level on one side; None where it does not as far as it was
+    followed.
+    """
     side = way * (at - best) >= 0
-    distance, height = way * (at[side] - best), np.sqrt(np.maximum.accumulate(rise[side][:: way])[:: way])
+    distance, height = way * (at[side] - best), np.sqrt(np.maximum.accumulate(rise[side][::way])[::way])
     order = np.argsort(distance)
     distance, height = distance[order], height[order]
     above = np.flatnonzero(height >= np.sqrt(level))

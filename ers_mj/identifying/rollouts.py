@@ -15,17 +15,29 @@ from ers_mj.traces import Trace
 from ers_mj.identifying.unknowns import Unknowns
 
 
-def plant_of(unknowns: Unknowns, letters: np.ndarray, is_angle: bool = True, timestep: float = TIMESTEP) -> MechanicalPlant:
+def plant_of(
+    unknowns: Unknowns, letters: np.ndarray, is_angle: bool = True, timestep: float = TIMESTEP
+) -> MechanicalPlant:
     """The MuJoCo plant that letters (k,) make: the rudder system where they are Eq. (1)'s, else one joint."""
     c = lumped(unknowns.values(letters))
-    return MechanicalPlant(c, parameters=None if unknowns.is_lumped else bodily(unknowns.everything(letters), is_angle, c.b), is_angle=is_angle,
-                           timestep=timestep)
+    return MechanicalPlant(
+        c,
+        parameters=None if unknowns.is_lumped else bodily(unknowns.everything(letters), is_angle, c.b),
+        is_angle=is_angle,
+        timestep=timestep,
+    )
 
 
 def rollouts(jobs: int, is_angle: bool = True, timestep: float = TIMESTEP) -> Simulator:
-    """(unknowns, candidates (M) of letters (k,), traces, rate) -> M residuals (N,) in sigmas, as identification.residuals has them."""
+    """(unknowns, candidates (M) of letters (k,), traces, rate) -> M residuals (N,) in sigmas, as
+    identification.residuals has them.
+    """
+
     def simulate(unknowns, candidates, traces, rate):
-        plants, parts = [plant_of(unknowns, letters, is_angle, timestep) for letters in candidates], [[] for _ in candidates]
+        plants, parts = (
+            [plant_of(unknowns, letters, is_angle, timestep) for letters in candidates],
+            [[] for _ in candidates],
+        )
         for trace in traces:
             for letters, part, motion in zip(candidates, parts, _motions(plants, trace, rate, jobs)):
                 part.append(_compared(unknowns, letters, trace, motion))
@@ -38,7 +50,12 @@ def _motions(plants: Sequence[MechanicalPlant], trace: Trace, rate: float, jobs:
     if len(plants) > 1 and trace.is_uniform and trace.enable is None and trace.load is None and rate == 0.0:
         return simulate_many(plants, trace.t, trace.u, jobs, start=trace.start)
     gain, every = observer_gain(rate, trace.sample_time)
-    return [plant.simulate(trace.t, trace.u, trace.start, enable=trace.enable, load=trace.load, y=trace.y, gain=gain, every=every) for plant in plants]
+    return [
+        plant.simulate(
+            trace.t, trace.u, trace.start, enable=trace.enable, load=trace.load, y=trace.y, gain=gain, every=every
+        )
+        for plant in plants
+    ]
 
 
 def _compared(unknowns: Unknowns, letters: np.ndarray, trace: Trace, motion: Motion) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""What the data can tell at all: the rank of the sensitivities, and the combinations that are left where it falls short.
-
-Sensitivities are simulated slopes by the logarithm of each letter, so that an exponent is a number: where a null vector v of them has
-whole entries, prod p_i^{v_i s} changes nothing, and with one letter (the pivot) of each null vector held, every other one
-stands for the combination p_i / prod pivot_j^{v_ji}.
+"""What the data can tell at all: the rank of the sensitivities, and the combinations that are left where it falls
+short.
+ Sensitivities are simulated slopes by the logarithm of each letter, so that an exponent is a number: where a null
+vector v of them has whole entries, prod p_i^{v_i s} changes nothing, and with one letter (the pivot) of each null
+vector held, every other one stands for the combination p_i / prod pivot_j^{v_ji}.
 """
 
 from __future__ import annotations
@@ -15,12 +15,27 @@ import numpy as np
 RANK = 1e-6  # singular value, of columns of length one, over the largest, below which a direction does nothing
 SURE = 3.0  # times what it is off by, which a singular value must be
 WHOLE = 0.02  # from a whole number, within which an exponent is one
-HELD_FIRST = ("J", "R", "B", "K_t", "K_e", "L", "k_s", "T_LH", "F_c", "ampere", "emf_share", "tau_e")  # pivots, as a reader expects them
+HELD_FIRST = (
+    "J",
+    "R",
+    "B",
+    "K_t",
+    "K_e",
+    "L",
+    "k_s",
+    "T_LH",
+    "F_c",
+    "ampere",
+    "emf_share",
+    "tau_e",
+)  # pivots, as a reader expects them
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Letters (k,), the null space in reduced rows (d, k), 1 at each row's pivot and 0 at the others', and the singular values (k,)."""
+    """Letters (k,), the null space in reduced rows (d, k), 1 at each row's pivot and 0 at the others', and the singular
+    values (k,).
+    """
 
     names: tuple[str, ...]
     null: np.ndarray
@@ -39,7 +54,9 @@ class Structure:
 
     def told(self, gradient: np.ndarray) -> bool:
         """Whether something with this gradient (k,) by the letters' logarithms stays the same along the null space."""
-        return not len(self.null) or float(np.abs(self.null @ gradient).max()) < WHOLE * max(float(np.abs(gradient).max()), 1e-300)
+        return not len(self.null) or float(np.abs(self.null @ gradient).max()) < WHOLE * max(
+            float(np.abs(gradient).max()), 1e-300
+        )
 
     def exponents(self, k: int) -> np.ndarray | None:
         """(k,) of the combination that letter k stands for; None where it is no product of powers."""
@@ -57,7 +74,9 @@ class Structure:
         powers = self.exponents(k)
         if powers is None:
             return None
-        above, below = ([_power(self.names[i], abs(powers[i])) for i in [k, *self.pivots] if way * powers[i] > 0] for way in (1, -1))
+        above, below = (
+            [_power(self.names[i], abs(powers[i])) for i in [k, *self.pivots] if way * powers[i] > 0] for way in (1, -1)
+        )
         return " ".join(above) + (f"/{below[0]}" if len(below) == 1 else f"/({' '.join(below)})" if below else "")
 
     def trades(self) -> list[str]:
@@ -66,8 +85,11 @@ class Structure:
         for row, pivot in zip(self.null, self.pivots):
             others = [k for k in self.kept if row[k] != 0.0]
             if others and all(abs(row[k] - round(row[k])) > WHOLE for k in others):
-                out.append(f"one per cent of {self.names[pivot]} is made up for by {' and '.join(f'{row[k]:+.2g} % of {self.names[k]}' for k in others)}: "
-                           "these recordings tell them together only")
+                out.append(
+                    f"one per cent of {self.names[pivot]} is made up for by"
+                    f" {' and '.join(f'{row[k]:+.2g} % of {self.names[k]}' for k in others)}: these recordings tell"
+                    " them together only"
+                )
         return out
 
 
@@ -76,7 +98,9 @@ def _power(name: str, exponent: float) -> str:
 
 
 def structure_of(slopes: np.ndarray, names: Sequence[str], doubt: np.ndarray | None = None) -> Structure:
-    """From sensitivities (N, k), by the logarithms of the letters, and what they are off by: a direction in which they say no more than that does nothing."""
+    """From sensitivities (N, k), by the logarithms of the letters, and what they are off by: a direction in which they
+    say no more than that does nothing.
+    """
     size = np.linalg.norm(slopes, axis=0)
     scale = np.maximum(size, 1e-8 * size.max() + 1e-300)
     _, singular, turn = np.linalg.svd(slopes / scale, full_matrices=len(slopes) < len(names))
@@ -92,7 +116,9 @@ def structure_of(slopes: np.ndarray, names: Sequence[str], doubt: np.ndarray | N
 def _reduced(null: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, tuple[int, ...]]:
     """Gauss-Jordan on the rows (d, k), pivots in the order of HELD_FIRST; what is all but zero becomes zero."""
     rows, pivots = null.copy(), []
-    for k in sorted(range(len(names)), key=lambda k: HELD_FIRST.index(names[k]) if names[k] in HELD_FIRST else len(HELD_FIRST)):
+    for k in sorted(
+        range(len(names)), key=lambda k: HELD_FIRST.index(names[k]) if names[k] in HELD_FIRST else len(HELD_FIRST)
+    ):
         d = len(pivots)
         if d == len(rows):
             break

@@ -1,4 +1,6 @@
-"""What an identification searches: Eq. (1)'s letters where a datasheet gives them all, else Eq. (6)'s, each within bounds."""
+"""What an identification searches: Eq. (1)'s letters where a datasheet gives them all, else Eq. (6)'s, each within
+bounds.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +19,36 @@ from ers_mj.traces import Trace
 LETTERS = ("L", "R", "k_s", "T_LH", "F_c", "J", "B", "K_t", "K_e", "theta_0")  # Eq. (1), in the paper's order
 NEEDED = ("J", "B", "K_t", "K_e", "R")  # without them Eq. (1) cannot run
 FACTORS = (0.2, 3.0)  # of what is known beforehand, between which a positive one is searched
-QUICKEST = 0.03  # of the sample time: a winding that is quicker moves no sample, and takes a simulation that many times as long
+# of the sample time: a winding that is quicker moves no sample, and takes a simulation that many times as long
+QUICKEST = 0.03
 REST = {"a_1": 0.0, "a_2": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0}
-UNITS = {"J": "kg m^2", "B": "N m s/rad", "K_t": "N m/A", "K_e": "V s/rad", "k_s": "N m/rad", "T_LH": "N m", "F_c": "N m", "R": "ohm", "L": "H", "n": "-"}
+UNITS = {
+    "J": "kg m^2",
+    "B": "N m s/rad",
+    "K_t": "N m/A",
+    "K_e": "V s/rad",
+    "k_s": "N m/rad",
+    "T_LH": "N m",
+    "F_c": "N m",
+    "R": "ohm",
+    "L": "H",
+    "n": "-",
+}
 
 
 def unit_of_letter(name: str, y: str, u: str) -> str:
     """The unit of a letter of Eq. (1) or (6) for outputs in y and inputs in u."""
-    lumped = {"a_1": "1/s^2", "a_2": "1/s", "b": f"{y}/s^2/{u}", "c_1": f"{y}/s^2", "c_2": f"{y}/s^2", "theta_0": y, "tau_e": "s", "emf_share": "-",
-              "ampere": f"{y}/s^2/A"}
+    lumped = {
+        "a_1": "1/s^2",
+        "a_2": "1/s",
+        "b": f"{y}/s^2/{u}",
+        "c_1": f"{y}/s^2",
+        "c_2": f"{y}/s^2",
+        "theta_0": y,
+        "tau_e": "s",
+        "emf_share": "-",
+        "ampere": f"{y}/s^2/A",
+    }
     return UNITS.get(name) or lumped[name]
 
 
@@ -64,15 +87,24 @@ class Unknowns:
     def without(self, name: str, letters: np.ndarray) -> Unknowns:
         """The same without a letter, the reference at the others of these letters (k,)."""
         kept = np.array([other != name for other in self.names])
-        return replace(self, names=tuple(other for other in self.names if other != name), reference=letters[kept], lower=self.lower[kept],
-                       upper=self.upper[kept], absent=(*self.absent, name))
+        return replace(
+            self,
+            names=tuple(other for other in self.names if other != name),
+            reference=letters[kept],
+            lower=self.lower[kept],
+            upper=self.upper[kept],
+            absent=(*self.absent, name),
+        )
 
     def around(self, letters: np.ndarray) -> Unknowns:
         """The same with the bounds of guessed letters moved as far as these letters (k,) allow."""
         guessed = np.array([name in self.guessed for name in self.names])
         ends = np.sort(np.outer(self.factors, letters), axis=0)
-        return replace(self, lower=np.where(guessed, np.minimum(self.lower, ends[0]), self.lower),
-                       upper=np.where(guessed, np.maximum(self.upper, ends[1]), self.upper))
+        return replace(
+            self,
+            lower=np.where(guessed, np.minimum(self.lower, ends[0]), self.lower),
+            upper=np.where(guessed, np.maximum(self.upper, ends[1]), self.upper),
+        )
 
     def drawn(self, random: np.random.Generator) -> np.ndarray:
         """Letters (k,) drawn from the bounds, evenly by their logarithm where they are positive."""
@@ -96,8 +128,14 @@ class Unknowns:
         return Model(self.values(letters), ())
 
 
-def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Mapping[str, float], bounds: Mapping[str, tuple[float, float]],
-                factors: tuple[float, float] = FACTORS, is_angle: bool = True) -> Unknowns:
+def unknowns_of(
+    traces: Sequence[Trace],
+    datasheet: Datasheet | None,
+    fixed: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    factors: tuple[float, float] = FACTORS,
+    is_angle: bool = True,
+) -> Unknowns:
     """What to search in these recordings.
 
     Args:
@@ -126,7 +164,11 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
     allowed = LUMPED if is_lumped else LETTERS
     for name in (*fixed, *bounds):
         if name not in allowed:
-            why = f"without {', '.join(x for x in NEEDED if x not in sheet)} of a datasheet" if is_lumped else "where a datasheet gives those of Eq. (1)"
+            why = (
+                f"without {', '.join(x for x in NEEDED if x not in sheet)} of a datasheet"
+                if is_lumped
+                else "where a datasheet gives those of Eq. (1)"
+            )
             raise InputError(f"{name} cannot be fixed or bounded {why}: these are identified, {', '.join(allowed)}")
     y = np.concatenate([t.y[t.valid] for t in traces])
     names, ends, guessed = [], [], []
@@ -135,7 +177,11 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
     for name in order:
         if name in bounds:
             names.append(name)
-            least = QUICKEST * min(t.sample_time for t in traces) * (known["R"] if name == "L" else 1.0) if name in ("L", "tau_e") else -math.inf
+            least = (
+                QUICKEST * min(t.sample_time for t in traces) * (known["R"] if name == "L" else 1.0)
+                if name in ("L", "tau_e")
+                else -math.inf
+            )
             ends.append((max(bounds[name][0], least), max(bounds[name][1], 2.0 * least)))
         elif name == "theta_0":
             if springs:
@@ -152,7 +198,9 @@ def unknowns_of(traces: Sequence[Trace], datasheet: Datasheet | None, fixed: Map
     if not names:
         raise InputError("every letter is fixed, there is nothing to identify")
     held = {name: x for name, x in known.items() if name not in names}
-    return Unknowns(tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped, tuple(guessed), tuple(factors))
+    return Unknowns(
+        tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped, tuple(guessed), tuple(factors)
+    )
 
 
 def _matters(name: str, traces: Sequence[Trace], known: Mapping[str, float], is_lumped: bool) -> bool:
@@ -166,13 +214,18 @@ def _matters(name: str, traces: Sequence[Trace], known: Mapping[str, float], is_
 def _refuse_unknown(given: Mapping) -> None:
     for name in given:
         if name not in (*LETTERS, *LUMPED, "n"):
-            raise InputError(f"there is no parameter {name[:40]!r}; there are {', '.join(dict.fromkeys((*LETTERS, 'n', *LUMPED)))}")
+            raise InputError(
+                f"there is no parameter {name[:40]!r}; there are {', '.join(dict.fromkeys((*LETTERS, 'n', *LUMPED)))}"
+            )
 
 
 def _middle(name: str, ends: tuple[float, float]) -> float:
     lower, upper = ends
     if not lower < upper or lower < 0 and name not in ("theta_0", "b"):
-        raise InputError(f"the bounds of {name} are {lower:g} and {upper:g}, a lower one of at least zero and an upper one above it were expected")
+        raise InputError(
+            f"the bounds of {name} are {lower:g} and {upper:g}, a lower one of at least zero and an upper one above it"
+            " were expected"
+        )
     return math.sqrt(lower * upper) if lower > 0 else 0.5 * (lower + upper)
 
 

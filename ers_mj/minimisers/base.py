@@ -1,8 +1,8 @@
 """What every minimiser is: a search for the least value of any callable within bounds, by seed, within a budget.
-
-An objective is called with many points at once, x (M, k) -> values (M,). One that is a sum of squares may also have ``residuals(x (k,)) -> (N,)``,
-which `ls` needs, ``slopes(x, residuals there) -> (N, k)`` where they are cheaper than differences, ``stages``, easier objectives to go through
-first, ``draw(random)``, a point to begin again from, and ``target``, a value that is good enough. Nothing here knows of servos.
+ An objective is called with many points at once, x (M, k) -> values (M,). One that is a sum of squares may also have
+``residuals(x (k,)) -> (N,)``, which `ls` needs, ``slopes(x, residuals there) -> (N, k)`` where they are cheaper than
+differences, ``stages``, easier objectives to go through first, ``draw(random)``, a point to begin again from, and
+``target``, a value that is good enough. Nothing here knows of servos.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ class Spent(Exception):
 
 @dataclass(frozen=True)
 class Minimum:
-    """The best point found (k,), its value, how many evaluations were made, and the trace (T, 2): evaluations, best value until then."""
+    """The best point found (k,), its value, how many evaluations were made, and the trace (T, 2): evaluations, best
+    value until then.
+    """
 
     x: np.ndarray
     value: float
@@ -88,14 +90,24 @@ class Meter:
 
 
 class Minimiser(ABC):
-    """Abstract base: a member declares its name and a sentence, and searches on the unit cube until the meter is spent or it is done."""
+    """Abstract base: a member declares its name and a sentence, and searches on the unit cube until the meter is spent
+    or it is done.
+    """
 
     name: ClassVar[str] = ""
     sentence: ClassVar[str] = ""
     needs_residuals: ClassVar[bool] = False
 
-    def minimise(self, objective: Objective, lower: np.ndarray, upper: np.ndarray, *, seed: int = 0, budget: int = 10_000,
-                 start: np.ndarray | None = None) -> Minimum:
+    def minimise(
+        self,
+        objective: Objective,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        *,
+        seed: int = 0,
+        budget: int = 10_000,
+        start: np.ndarray | None = None,
+    ) -> Minimum:
         """Search the box.
 
         Args:
@@ -110,9 +122,15 @@ class Minimiser(ABC):
         """
         lower, upper = np.array(lower, float), np.array(upper, float)
         if lower.shape != upper.shape or not np.all(lower < upper):
-            raise InputError(f"the bounds {lower.tolist()} to {upper.tolist()} enclose nothing, lower ends below upper ones were expected")
+            raise InputError(
+                f"the bounds {lower.tolist()} to {upper.tolist()} enclose nothing, lower ends below upper ones were"
+                " expected"
+            )
         if self.needs_residuals and not hasattr(objective, "residuals"):
-            raise InputError(f"{self.name} needs an objective with residuals, this one is a plain function: take a minimiser that needs values alone")
+            raise InputError(
+                f"{self.name} needs an objective with residuals, this one is a plain function: take a minimiser that"
+                " needs values alone"
+            )
         meter = Meter(objective, lower, upper, budget)
         cube = None if start is None else np.clip((np.asarray(start, float) - lower) / meter.width, 0.0, 1.0)
         try:

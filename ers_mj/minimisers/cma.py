@@ -24,8 +24,15 @@ class CMA(Minimiser):
             size = 4 + int(3 * np.log(meter.size))
             centre = random.random(meter.size) if start is None else start
             while True:
-                options = {"bounds": [0, 1], "popsize": size, "seed": int(random.integers(1, 2**31 - 1)), "verbose": -9, "tolfun": 0, "tolfunhist": 0,
-                           "maxfevals": np.inf}
+                options = {
+                    "bounds": [0, 1],
+                    "popsize": size,
+                    "seed": int(random.integers(1, 2**31 - 1)),
+                    "verbose": -9,
+                    "tolfun": 0,
+                    "tolfunhist": 0,
+                    "maxfevals": np.inf,
+                }
                 search = cma.CMAEvolutionStrategy(centre, self.SPREAD, options)
                 while not search.stop():
                     points = np.array(search.ask())

@@ -16,5 +16,17 @@ class DE(Minimiser):
     SIZE = 5  # times the number of parameters
 
     def _search(self, meter: Meter, random: np.random.Generator, start: np.ndarray | None) -> None:
-        differential_evolution(lambda x: np.minimum(meter(x.T), 1e300), [(0.0, 1.0)] * meter.size, popsize=self.SIZE, tol=0.0, atol=0.0, polish=False,
-                               maxiter=meter.budget, rng=random, x0=start, vectorized=True, updating="deferred", init="latinhypercube")
+        differential_evolution(
+            lambda x: np.minimum(meter(x.T), 1e300),
+            [(0.0, 1.0)] * meter.size,
+            popsize=self.SIZE,
+            tol=0.0,
+            atol=0.0,
+            polish=False,
+            maxiter=meter.budget,
+            rng=random,
+            x0=start,
+            vectorized=True,
+            updating="deferred",
+            init="latinhypercube",
+        )

@@ -6,7 +6,9 @@ from ers_mj.minimisers.iga import IGA
 
 
 class GA(IGA):
-    """IGA with P_c and P_m that stay as they begin; the rest as there, sigma included. The paper gives no numbers: these served it best."""
+    """IGA with P_c and P_m that stay as they begin; the rest as there, sigma included. The paper gives no numbers:
+    these served it best.
+    """
 
     name = "ga"
     sentence = "the paper's GA1: its genetic algorithm with fixed probabilities"

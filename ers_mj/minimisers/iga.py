@@ -20,10 +20,12 @@ def ranked(size: int, best: float) -> np.ndarray:
 
 
 class IGA(Minimiser):
-    """Real coding, linear ranking (14), arithmetic crossover (15), Gaussian mutation (16) that shrinks (17), adaptive probabilities (18).
+    """Real coding, linear ranking (14), arithmetic crossover (15), Gaussian mutation (16) that shrinks (17), adaptive
+    probabilities (18).
 
-    The paper gives neither population nor probabilities nor the unit of (17)'s sigma; these are the best settings that were found (see
-    analysis/table_2.py). sigma is SPREAD of the range times 1 - 0.9 t/G, the mutation acts gene by gene, and one elite survives.
+    The paper gives neither population nor probabilities nor the unit of (17)'s sigma; these are the best settings that
+    were found (see analysis/table_2.py). sigma is SPREAD of the range times 1 - 0.9 t/G, the mutation acts gene by
+    gene, and one elite survives.
 
     Args:
         size: population m.
@@ -36,7 +38,13 @@ class IGA(Minimiser):
     SPREAD = 0.1
     PRESSURE = 1.5  # eta+
 
-    def __init__(self, size: int = 40, crossover: tuple[float, float] = (0.9, 0.6), mutation: tuple[float, float] = (0.3, 0.1), elitist: bool = True):
+    def __init__(
+        self,
+        size: int = 40,
+        crossover: tuple[float, float] = (0.9, 0.6),
+        mutation: tuple[float, float] = (0.3, 0.1),
+        elitist: bool = True,
+    ):
         self.size, self.crossover, self.mutation, self.elitist = size, crossover, mutation, elitist
 
     def probabilities(self, share: float) -> tuple[float, float]:
@@ -53,7 +61,9 @@ class IGA(Minimiser):
             P_c, P_m = self.probabilities(share)
             order = np.argsort(values, kind="stable")
             elite, least = cube[order[0]].copy(), values[order[0]]
-            children = self._mutated(self._crossed(cube[random.choice(order, self.size, p=chances)], P_c, random), P_m, share, random)
+            children = self._mutated(
+                self._crossed(cube[random.choice(order, self.size, p=chances)], P_c, random), P_m, share, random
+            )
             cube, values = children, meter(children)
             if self.elitist and least < values.min():
                 worst = int(np.argmax(values))
@@ -63,7 +73,7 @@ class IGA(Minimiser):
         """Eq. (15) on neighbouring pairs of parents (m, k)."""
         one, two = parents[: self.size // 2 * 2 : 2], parents[1::2]
         c = np.where(random.random((len(two), 1)) < P_c, random.random((len(two), 1)), 1.0)
-        return np.concatenate([c * one + (1.0 - c) * two, c * two + (1.0 - c) * one, parents[2 * len(two):]])
+        return np.concatenate([c * one + (1.0 - c) * two, c * two + (1.0 - c) * one, parents[2 * len(two) :]])
 
     def _mutated(self, children: np.ndarray, P_m: float, share: float, random: np.random.Generator) -> np.ndarray:
         """Eq. (16) with (17), within the cube."""

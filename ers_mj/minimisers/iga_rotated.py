@@ -11,13 +11,15 @@ from ers_mj.minimisers.iga import IGA, ranked
 class RotatedIGA(IGA):
     """IGA whose operators follow the valley that the population lies in.
 
-    Kept: real coding, linear ranking (14), P_c and P_m of (18). Changed, because a valley that is narrow and lies across the parameters is neither followed
-    by (15), which only contracts, nor by (16), whose sigma knows no direction:
+    Kept: real coding, linear ranking (14), P_c and P_m of (18). Changed, because a valley that is narrow and lies
+    across the parameters is neither followed by (15), which only contracts, nor by (16), whose sigma knows no
+    direction:
 
-        axes        genes are exchanged and moved along the principal axes of the better half, not parameter by parameter
-        crossover   x + c_1 (a - x) + c_2 (b - d), a, b, d selected by rank: (15) with a difference that keeps the spread; gene by gene with P_c
-        mutation    as (16), gene by gene with P_m, sigma the population's own spread along that axis instead of (17)
-        survival    a child takes its parent's place if it is better: elitism for everyone
+        axes        genes are exchanged and moved along the principal axes of the better half, not parameter by
+        parameter crossover   x + c_1 (a - x) + c_2 (b - d), a, b, d selected by rank: (15) with a difference that keeps
+        the spread; gene by gene with P_c mutation    as (16), gene by gene with P_m, sigma the population's own spread
+        along that axis instead of (17) survival    a child takes its parent's place if it is better: elitism for
+        everyone
     """
 
     name = "iga-rotated"
@@ -25,7 +27,9 @@ class RotatedIGA(IGA):
     PRESSURE = 1.9  # eta+
     SCALE = (0.3, 0.9)  # of c_2
 
-    def __init__(self, size: int = 40, crossover: tuple[float, float] = (0.9, 1.0), mutation: tuple[float, float] = (0.1, 0.02)):
+    def __init__(
+        self, size: int = 40, crossover: tuple[float, float] = (0.9, 1.0), mutation: tuple[float, float] = (0.1, 0.02)
+    ):
         super().__init__(size, crossover, mutation)
 
     def _search(self, meter: Meter, random: np.random.Generator, start: np.ndarray | None) -> None:

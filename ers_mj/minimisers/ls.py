@@ -1,7 +1,7 @@
-"""Least squares: a bounded trust region (Levenberg-Marquardt) from many starts, for objectives that are sums of squares.
-
-Slopes are forward differences at first, then Broyden's updates as long as the decrease keeps what it promised. An objective's ``stages`` are
-gone through before it, each until a step gains little.
+"""Least squares: a bounded trust region (Levenberg-Marquardt) from many starts, for objectives that are sums of
+squares.
+ Slopes are forward differences at first, then Broyden's updates as long as the decrease keeps what it promised. An
+objective's ``stages`` are gone through before it, each until a step gains little.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ PROMISING = 0.3  # of that share, which a step along fresh slopes must promise t
 KEPT = 0.3  # share of the promised decrease from which a slope is updated, not taken anew
 STAGE_GAIN = 0.01  # share of the value below which a step ends a stage
 END_GAIN = 1e-9  # and the search
-STAGE_LEFT, EXACT = 1e-5, 1e-22  # shares of the first value of an attempt: enough for a stage, and all that rounding leaves
+STAGE_LEFT, EXACT = (
+    1e-5,
+    1e-22,
+)  # shares of the first value of an attempt: enough for a stage, and all that rounding leaves
 BELOW_TARGET = 1e-14  # share of the target that is as good as nothing
 WIDE = 100.0  # times DIFFERENCE: slopes that see over a kink, tried once where others lead no further
 ATTEMPTS = 6
@@ -24,7 +27,8 @@ ALIKE, OFTEN = 0.01, 2  # of the value, within which attempts have ended in one 
 
 
 class LS(Minimiser):
-    """Multi-start trust-region least squares. Further starts follow until one meets the objective's ``target`` or two end alike.
+    """Multi-start trust-region least squares. Further starts follow until one meets the objective's ``target`` or two
+    end alike.
 
     Args:
         attempts: starts at most; 1 polishes what another minimiser has found.
@@ -58,10 +62,11 @@ class LS(Minimiser):
                 return
 
 
-def _descend(meter: Meter, stage: Objective | None, x: np.ndarray, least_gain: float, enough: float,
-             first: float | None = None) -> tuple[np.ndarray, float, float]:
-    """Marquardt's steps from x (k,) until one along fresh slopes gains less than a share ``least_gain``, or a share ``enough`` of the ``first`` value is
-    left (of that at x where it is not given); the end, its value, and the first.
+def _descend(
+    meter: Meter, stage: Objective | None, x: np.ndarray, least_gain: float, enough: float, first: float | None = None
+) -> tuple[np.ndarray, float, float]:
+    """Marquardt's steps from x (k,) until one along fresh slopes gains less than a share ``least_gain``, or a share
+    ``enough`` of the ``first`` value is left (of that at x where it is not given); the end, its value, and the first.
     """
     lower, upper = meter.lower, meter.lower + meter.width
     e = meter.residuals(x, stage)
@@ -77,7 +82,11 @@ def _descend(meter: Meter, stage: Objective | None, x: np.ndarray, least_gain: f
             slopes, fresh = given(x, e) if given else _slopes(meter, stage, x, e, wide * DIFFERENCE), True
         hessian, slope = slopes.T @ slopes, slopes.T @ e
         for attempt in range(8 if fresh else 2):
-            there = np.clip(x + _step(hessian, slope, damping, (x <= lower) & (slope > 0) | (x >= upper) & (slope < 0)), lower, upper)
+            there = np.clip(
+                x + _step(hessian, slope, damping, (x <= lower) & (slope > 0) | (x >= upper) & (slope < 0)),
+                lower,
+                upper,
+            )
             move = there - x
             promised = -(2.0 * slope @ move + move @ hessian @ move)
             if fresh and (given or attempt == 0) and promised < PROMISING * least_gain * value:

@@ -14,8 +14,10 @@ from pathlib import Path
 import numba
 
 COMPILING = "ERS_MJ_COMPILING"  # in the environment of the process that compiles
-EVERY_MODULE = ("import importlib, pkgutil, ers_mj.plants as plants\n"
-                "for module in pkgutil.iter_modules(plants.__path__):\n    importlib.import_module(f'ers_mj.plants.{module.name}')")
+EVERY_MODULE = (
+    "import importlib, pkgutil, ers_mj.plants as plants\n"
+    "for module in pkgutil.iter_modules(plants.__path__):\n    importlib.import_module(f'ers_mj.plants.{module.name}')"
+)
 
 
 def cache_folder() -> Path:
@@ -37,8 +39,8 @@ def cache_folder() -> Path:
 def part(function):
     """Compile a function that compiled ones call, and that makes no arrays of its own.
 
-    Numba counts who holds an array at every call, in atomic additions that cost more than the arithmetic of a small function: a simulation
-    without them takes a half to a third of the time.
+    Numba counts who holds an array at every call, in atomic additions that cost more than the arithmetic of a small
+    function: a simulation without them takes a half to a third of the time.
     """
     return numba.njit(nogil=True, _nrt=False)(function)
 
@@ -49,7 +51,8 @@ def inlined(function):
 
 
 def _compile_once() -> None:
-    """Have another process compile all of plants/, once for each state and place of the sources: what a compiler has taken of memory it does not give back.
+    """Have another process compile all of plants/, once for each state and place of the sources: what a compiler has
+    taken of memory it does not give back.
 
     Where that fails each module compiles for itself when it is imported.
     """
@@ -59,8 +62,12 @@ def _compile_once() -> None:
         return
     logging.getLogger(__name__).warning("ers-mj: compiling the simulator for this machine, once: one to three minutes")
     path = os.pathsep.join([str(package.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
-    compiled = subprocess.run([sys.executable, "-c", EVERY_MODULE], env={**os.environ, COMPILING: "1", "PYTHONPATH": path},
-                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    compiled = subprocess.run(
+        [sys.executable, "-c", EVERY_MODULE],
+        env={**os.environ, COMPILING: "1", "PYTHONPATH": path},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     if compiled.returncode == 0:
         done.touch()
 

@@ -1,21 +1,20 @@
 """The compiled integrator of Eq. (1)/(5): smooth flow between events, every switch of a Sgn located exactly.
-
-State x = (theta, w, j, theta_m, w_m): rudder angle and speed, drive acceleration j (the motor torque over J; current in
-disguise), and the motor's side where a second body exists. Mode m = (s, side, stop, s_m, twist): the values that the set-valued
-terms take until the next event: direction of slip (0 = stuck; 1 throughout without dry friction), side of theta_0 (0 = held in the corner), stop touched,
-motor slip, contact of the play (of two bodies without play: 1 throughout, a spring that pushes and pulls). A flow
-ends where the mode's inequality fails; the instant is found on the flow itself.
-
-A second body without inertia (rho = 0) is the foot of LuGre's bristle z = theta - theta_m: z' = w - |w| k z / F, and the friction is
-k z + d exp(-(w / w_d)^2) z'. It has no speed of its own (w_m stays 0 in x), and the drive acts on the rudder, whose slip s is then 1 wherever the
-preload's corner does not hold it. Its slip s_m is 0 while the bristle bends, which is stepped as a law is, and the direction of motion
-once the bristle is bent to the full: from there to the next reversal friction is Coulomb's and the flow linear. Where a law moves
-the level F, the bristle lags behind it and s_m stays 0.
-
-Within a mode the plant itself is linear: a precomputed map over a whole segment of a sample, a Taylor series to machine
-precision over a part of one. What the laws of effects add is a force; over a segment it enters the same maps as a parabola in time
-through three evaluations (an exponential integrator), over a part of one by a fourth-order Runge-Kutta step. What a shaft that hardens adds
-to its spring's force goes the same ways.
+ State x = (theta, w, j, theta_m, w_m): rudder angle and speed, drive acceleration j (the motor torque over J; current
+in disguise), and the motor's side where a second body exists. Mode m = (s, side, stop, s_m, twist): the values that the
+set-valued terms take until the next event: direction of slip (0 = stuck; 1 throughout without dry friction), side of
+theta_0 (0 = held in the corner), stop touched, motor slip, contact of the play (of two bodies without play: 1
+throughout, a spring that pushes and pulls). A flow ends where the mode's inequality fails; the instant is found on the
+flow itself.
+ A second body without inertia (rho = 0) is the foot of LuGre's bristle z = theta - theta_m: z' = w - |w| k z / F, and
+the friction is k z + d exp(-(w / w_d)^2) z'. It has no speed of its own (w_m stays 0 in x), and the drive acts on the
+rudder, whose slip s is then 1 wherever the preload's corner does not hold it. Its slip s_m is 0 while the bristle
+bends, which is stepped as a law is, and the direction of motion once the bristle is bent to the full: from there to the
+next reversal friction is Coulomb's and the flow linear. Where a law moves the level F, the bristle lags behind it and
+s_m stays 0.
+ Within a mode the plant itself is linear: a precomputed map over a whole segment of a sample, a Taylor series to
+machine precision over a part of one. What the laws of effects add is a force; over a segment it enters the same maps as
+a parabola in time through three evaluations (an exponential integrator), over a part of one by a fourth-order
+Runge-Kutta step. What a shaft that hardens adds to its spring's force goes the same ways.
 """
 
 from __future__ import annotations
@@ -30,26 +29,68 @@ from ers_mj.plants.compiled import compiled_cache, inlined, part
 from ers_mj.plants.laws import drive_torque, friction_level, is_lawful, moved, remember, total_torque
 
 INDEX = {name: k for k, name in enumerate(Coefficients._fields)}
-(A_1, A_PLUS, A_MINUS, A_EMF, B, C_1, C_PLUS, C_MINUS, THETA_0, TAU, BIAS, LOWER, UPPER, K_STOP, D_STOP, DELAY, TWO, RHO,
- BETA, PHI, K_TWIST, D_TWIST, GAP, K_BRISTLE, D_BRISTLE, FADE, DAHL, HARDEN, FALL) = range(len(Coefficients._fields))
-RATE_STEP = 0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
+(
+    A_1,
+    A_PLUS,
+    A_MINUS,
+    A_EMF,
+    B,
+    C_1,
+    C_PLUS,
+    C_MINUS,
+    THETA_0,
+    TAU,
+    BIAS,
+    LOWER,
+    UPPER,
+    K_STOP,
+    D_STOP,
+    DELAY,
+    TWO,
+    RHO,
+    BETA,
+    PHI,
+    K_TWIST,
+    D_TWIST,
+    GAP,
+    K_BRISTLE,
+    D_BRISTLE,
+    FADE,
+    DAHL,
+    HARDEN,
+    FALL,
+) = range(len(Coefficients._fields))
+RATE_STEP = (
+    0.4  # rate [1/s] times step of a Runge-Kutta step: local error RATE_STEP^5 / 120 = 1e-4 of the fast transient
+)
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
 CREPT = 1e-12  # share of its friction by which a motor that has crept to rest may be pulled further
 ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
-EVENT_BUDGET = 4  # events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows; a segment on a bristle, which bounces in the corner
+# events a sample, on average, beyond which a simulation is given up (NaN): a chatter no servo shows; a segment on a
+# bristle, which bounces in the corner
+EVENT_BUDGET = 4
 BRISTLE_CORNER = 0.1  # the same for a rudder that no friction slows: share of c_1 h below which it bounces out of sight
 STILL = 5e-5  # share of a bristle's friction within which its rudder rests
 LEAST_LEVEL = 0.2  # of the mean friction, which laws cannot lower a bristle's beyond
 LEAST_LEFT = 0.2  # of its level that a bristle is taken to have left to bend beyond what it has, where that sets a step
 FULL = 1.0 - 1e-4  # share of its friction's level at which a bristle counts as bent to the full
-CALM = 0.2  # share of a speed, or of a twist's distance to the ends of the play, that a leap over a whole sample must leave
+# share of a speed, or of a twist's distance to the ends of the play, that a leap over a whole sample must leave
+CALM = 0.2
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
 MOST_STEPS = 1e5  # Runge-Kutta steps of a segment, beyond which it is given up as well
 FALL_STEP = 0.1  # length of a segment over the electrical time constant where the inductance falls with the current
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
-ORDER = (0, 4, 1, 2, 3, 5, 6)  # speeds first: between their zeros angles are monotone, so that later events have one root
+ORDER = (
+    0,
+    4,
+    1,
+    2,
+    3,
+    5,
+    6,
+)  # speeds first: between their zeros angles are monotone, so that later events have one root
 GAUSS_X, GAUSS_W = (0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(10)[1])
 
 
@@ -91,8 +132,17 @@ def _hardening(c, x):
 
 @inlined
 def _never_sticks(c, on):
-    """Whether the rudder has no dry friction, and the same damping both ways: its slip s then stays 1, whichever way it moves."""
-    return c[C_PLUS] <= 0 and c[C_MINUS] <= 0 and c[C_1] <= 0 and on[1, 0] == 0 and c[A_PLUS] == c[A_MINUS] and not _has_bristle(c)
+    """Whether the rudder has no dry friction, and the same damping both ways: its slip s then stays 1, whichever way it
+    moves.
+    """
+    return (
+        c[C_PLUS] <= 0
+        and c[C_MINUS] <= 0
+        and c[C_1] <= 0
+        and on[1, 0] == 0
+        and c[A_PLUS] == c[A_MINUS]
+        and not _has_bristle(c)
+    )
 
 
 @inlined
@@ -127,7 +177,7 @@ def _bristle(c, on, p, lawful, x, s_m):
     if x[1] != 0.0:
         way = 1.0 if x[1] > 0 else -1.0
         speed = x[1] * (1.0 - _bending(c, way * pull / _level(c, on, p, lawful, x, way)))
-    return -pull - c[D_BRISTLE] * math.exp(-(x[1] / c[FADE]) ** 2) * (x[1] - speed), speed
+    return -pull - c[D_BRISTLE] * math.exp(-((x[1] / c[FADE]) ** 2)) * (x[1] - speed), speed
 
 
 @inlined
@@ -241,8 +291,13 @@ def _runge_kutta(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
     k2 = _derivative(c, on, p, lawful, t + 0.5 * dt, _plus(x, 0.5 * dt, k1), m, drive, tau, a_emf)
     k3 = _derivative(c, on, p, lawful, t + 0.5 * dt, _plus(x, 0.5 * dt, k2), m, drive, tau, a_emf)
     k4 = _derivative(c, on, p, lawful, t + dt, _plus(x, dt, k3), m, drive, tau, a_emf)
-    d = (k1[0] + 2 * (k2[0] + k3[0]) + k4[0], k1[1] + 2 * (k2[1] + k3[1]) + k4[1], k1[2] + 2 * (k2[2] + k3[2]) + k4[2],
-         k1[3] + 2 * (k2[3] + k3[3]) + k4[3], k1[4] + 2 * (k2[4] + k3[4]) + k4[4])
+    d = (
+        k1[0] + 2 * (k2[0] + k3[0]) + k4[0],
+        k1[1] + 2 * (k2[1] + k3[1]) + k4[1],
+        k1[2] + 2 * (k2[2] + k3[2]) + k4[2],
+        k1[3] + 2 * (k2[3] + k3[3]) + k4[3],
+        k1[4] + 2 * (k2[4] + k3[4]) + k4[4],
+    )
     x = _plus(x, dt / 6.0, d)
     if tau <= 0:
         return x[0], x[1], drive - a_emf * _drive_speed(c, x), x[3], x[4]
@@ -253,7 +308,8 @@ def _runge_kutta(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
 def _linear(c, x, m, drive, tau, a_emf, dt, scale, f, r):
     """The flow within a mode without laws, exact: Taylor series in steps of about one time constant.
 
-    ``scale`` 1 includes the constant forces, f on the rudder and r on the motor among them, 0 leaves them and the drive out (the homogeneous flow).
+    ``scale`` 1 includes the constant forces, f on the rudder and r on the motor among them, 0 leaves them and the drive
+    out (the homogeneous flow).
     """
     theta, w, j, theta_m, w_m = x
     bristle = _has_bristle(c)
@@ -328,7 +384,9 @@ def _push(depth, rate, stiffness, damping):
 
 @inlined
 def _touch(depth, rate, stiffness, damping):
-    """Positive where two bodies that are apart touch: one is inside the other and does not leave it faster than the spring follows."""
+    """Positive where two bodies that are apart touch: one is inside the other and does not leave it faster than the
+    spring follows.
+    """
     return min(depth, _push(depth, rate, stiffness, damping))
 
 
@@ -355,7 +413,9 @@ def _violation(e, c, on, p, lawful, t, x, m):
         return -m[1] * (theta - c[THETA_0]) if m[0] != 0 else -1.0
     if e == 2:
         if m[2] == 0:
-            return max(_touch(theta - c[UPPER], w, c[K_STOP], c[D_STOP]), _touch(c[LOWER] - theta, -w, c[K_STOP], c[D_STOP]))
+            return max(
+                _touch(theta - c[UPPER], w, c[K_STOP], c[D_STOP]), _touch(c[LOWER] - theta, -w, c[K_STOP], c[D_STOP])
+            )
         return -_push(theta - c[UPPER] if m[2] > 0 else c[LOWER] - theta, m[2] * w, c[K_STOP], c[D_STOP])
     if e == 3:
         if m[0] != 0:
@@ -449,11 +509,19 @@ def _rate(c, m, x, tau, a_emf):
         rate = max(rate, math.sqrt(c[K_STOP]) + c[D_STOP])
     if _has_bristle(c):
         if m[3] == 0:
-            most = 2.0  # what is left to bend, over the level, which for exponents above 1 slows the bending as it gets less
+            # what is left to bend, over the level, which for exponents above 1 slows the bending as it gets less
+            most = 2.0
             if c[DAHL] > 1.0:
-                most = min(abs(1.0 - math.copysign(2.0, x[1]) * c[K_BRISTLE] * (x[0] - x[3]) / (c[C_PLUS] + c[C_MINUS])) + LEAST_LEFT, 2.0)
-            rate += (math.sqrt(c[K_BRISTLE]) + c[D_BRISTLE]
-                     + 2.0 * c[DAHL] * most ** (c[DAHL] - 1.0) * c[K_BRISTLE] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS]))
+                most = min(
+                    abs(1.0 - math.copysign(2.0, x[1]) * c[K_BRISTLE] * (x[0] - x[3]) / (c[C_PLUS] + c[C_MINUS]))
+                    + LEAST_LEFT,
+                    2.0,
+                )
+            rate += (
+                math.sqrt(c[K_BRISTLE])
+                + c[D_BRISTLE]
+                + 2.0 * c[DAHL] * most ** (c[DAHL] - 1.0) * c[K_BRISTLE] * abs(x[1]) / (c[C_PLUS] + c[C_MINUS])
+            )
     elif apart:
         rate = max(rate / min(c[RHO], 1.0 - c[RHO]), winding)
         if m[4] != 0:
@@ -465,7 +533,9 @@ def _rate(c, m, x, tau, a_emf):
 
 @part
 def _driven(c, on, p, t, x, m, drive, tau, a_emf, dt):
-    """The flow of two bodies under laws, by the exponential midpoint rule: the linear one under the forces of the middle, whose change is slow."""
+    """The flow of two bodies under laws, by the exponential midpoint rule: the linear one under the forces of the
+    middle, whose change is slow.
+    """
     f, _, r = _beside(c, on, p, True, 0.0, t, x, m)
     f, _, r = _beside(c, on, p, True, 0.0, t + 0.5 * dt, _linear(c, x, m, drive, tau, a_emf, 0.5 * dt, 1.0, f, r), m)
     return _linear(c, x, m, drive, tau, a_emf, dt, 1.0, f, r)
@@ -473,7 +543,9 @@ def _driven(c, on, p, t, x, m, drive, tau, a_emf, dt):
 
 @part
 def _flow(c, on, p, lawful, t, x, m, drive, tau, a_emf, dt):
-    """The state dt later within the mode; NaN of a motion that runs away, since a shaft that hardens gets the stiffer the further it is twisted."""
+    """The state dt later within the mode; NaN of a motion that runs away, since a shaft that hardens gets the stiffer
+    the further it is twisted.
+    """
     if not _bends(c, m) and c[HARDEN] <= 0 and (not lawful or (m[0] == 0 and c[TWO] <= 0)):
         return _linear(c, x, m, drive, tau, a_emf, dt, 1.0, 0.0, 0.0)
     if c[TWO] > 0 and not _has_bristle(c) and c[HARDEN] <= 0:
@@ -597,8 +669,8 @@ def _start_mode(c, on, p, lawful, t, x):
 def _corrected(c, on, p, lawful, t, x, m, jump):
     """The state after the observer has moved the angle by ``jump`` (both bodies), unless the corner holds it.
 
-    On a bristle a rudder bounces in the corner, out of sight, before it rests: there it is moved the less the nearer it is, so that nothing hangs on
-    where in its bounce a sample finds it.
+    On a bristle a rudder bounces in the corner, out of sight, before it rests: there it is moved the less the nearer it
+    is, so that nothing hangs on where in its bounce a sample finds it.
     """
     if c[C_1] > 0 and _has_bristle(c):
         jump *= min(1.0, abs(x[0] - c[THETA_0]) / max(2.0 * abs(jump), 1e-300))
@@ -606,7 +678,9 @@ def _corrected(c, on, p, lawful, t, x, m, jump):
     side = 0
     if c[C_1] > 0:
         side = 1 if theta > c[THETA_0] else -1
-        if m[0] == 0 and m[1] * side < 0:  # a rudder at rest is not pushed through the corner, which would throw it back
+        if (
+            m[0] == 0 and m[1] * side < 0
+        ):  # a rudder at rest is not pushed through the corner, which would throw it back
             theta, side = c[THETA_0], 0
             jump = theta - x[0]
     stop = 1 if theta > c[UPPER] else (-1 if theta < c[LOWER] else 0)
@@ -621,14 +695,21 @@ def _corrected(c, on, p, lawful, t, x, m, jump):
 
 @inlined
 def _unit(k):
-    return (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0, 1.0 if k == 3 else 0.0,
-            1.0 if k == 4 else 0.0)
+    return (
+        1.0 if k == 0 else 0.0,
+        1.0 if k == 1 else 0.0,
+        1.0 if k == 2 else 0.0,
+        1.0 if k == 3 else 0.0,
+        1.0 if k == 4 else 0.0,
+    )
 
 
 @part
 def _fill_map(e, c, m, tau, a_emf, h, driven):
-    """The exact map over h in a mode with side 0: e (5, 17), columns x (5), constant, drive, side, force on the rudder 1, s, s^2 (s = t/h), the same
-    of a force between the two bodies where their shaft hardens, and of one on the motor where it is ``driven`` by laws."""
+    """The exact map over h in a mode with side 0: e (5, 17), columns x (5), constant, drive, side, force on the rudder
+    1, s, s^2 (s = t/h), the same of a force between the two bodies where their shaft hardens, and of one on the motor
+    where it is ``driven`` by laws.
+    """
     for k in range(5):
         z = _linear(c, _unit(k), m, 0.0, tau, a_emf, h, 0.0, 0.0, 0.0)
         for i in range(5):
@@ -658,7 +739,9 @@ def _fill_map(e, c, m, tau, a_emf, h, driven):
                     e[i, 11 + k] += z[i] * h * GAUSS_W[g] * GAUSS_X[g] ** k
     if driven and m[3] != 0:
         for g in range(GAUSS_X.size):
-            z = _linear(c, (0.0, 0.0, 0.0, 0.0, 1.0 / c[RHO]), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0, 0.0, 0.0)
+            z = _linear(
+                c, (0.0, 0.0, 0.0, 0.0, 1.0 / c[RHO]), m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0, 0.0, 0.0
+            )
             for i in range(5):
                 for k in range(3):
                     e[i, 14 + k] += z[i] * h * GAUSS_W[g] * GAUSS_X[g] ** k
@@ -668,8 +751,8 @@ def _fill_map(e, c, m, tau, a_emf, h, driven):
 
 @njit(nogil=True)
 def _no_maps():
-    """Room for the maps over a step and over half of it in every mode away from the stops: (2, 3, 3, 3, 5, 17), indices s + 1, s_m + 1, twist + 1. NaN: not
-    made yet, since most modes are never met, and half steps only under laws.
+    """Room for the maps over a step and over half of it in every mode away from the stops: (2, 3, 3, 3, 5, 17), indices
+    s + 1, s_m + 1, twist + 1. NaN: not made yet, since most modes are never met, and half steps only under laws.
     """
     return np.full((2, 3, 3, 3, 5, 17), np.nan)
 
@@ -684,21 +767,37 @@ def _make(e, half, c, m, tau, a_emf, step, driven):
 
 @inlined
 def _row(e, i, x, drive, side, f0, f1, f2):
-    return (e[i, 0] * x[0] + e[i, 1] * x[1] + e[i, 2] * x[2] + e[i, 5] + e[i, 6] * drive + e[i, 7] * side
-            + e[i, 8] * f0 + e[i, 9] * f1 + e[i, 10] * f2)
+    return (
+        e[i, 0] * x[0]
+        + e[i, 1] * x[1]
+        + e[i, 2] * x[2]
+        + e[i, 5]
+        + e[i, 6] * drive
+        + e[i, 7] * side
+        + e[i, 8] * f0
+        + e[i, 9] * f1
+        + e[i, 10] * f2
+    )
 
 
 @inlined
 def _mapped(e, two, x, drive, side, f0, f1, f2):
     """The state after a map, under the force f0 + f1 s + f2 s^2 (s from 0 to 1) on the rudder."""
     if not two:
-        return (_row(e, 0, x, drive, side, f0, f1, f2), _row(e, 1, x, drive, side, f0, f1, f2),
-                _row(e, 2, x, drive, side, f0, f1, f2), x[3], x[4])
-    return (_row(e, 0, x, drive, side, f0, f1, f2) + e[0, 3] * x[3] + e[0, 4] * x[4],
-            _row(e, 1, x, drive, side, f0, f1, f2) + e[1, 3] * x[3] + e[1, 4] * x[4],
-            _row(e, 2, x, drive, side, f0, f1, f2) + e[2, 3] * x[3] + e[2, 4] * x[4],
-            _row(e, 3, x, drive, side, f0, f1, f2) + e[3, 3] * x[3] + e[3, 4] * x[4],
-            _row(e, 4, x, drive, side, f0, f1, f2) + e[4, 3] * x[3] + e[4, 4] * x[4])
+        return (
+            _row(e, 0, x, drive, side, f0, f1, f2),
+            _row(e, 1, x, drive, side, f0, f1, f2),
+            _row(e, 2, x, drive, side, f0, f1, f2),
+            x[3],
+            x[4],
+        )
+    return (
+        _row(e, 0, x, drive, side, f0, f1, f2) + e[0, 3] * x[3] + e[0, 4] * x[4],
+        _row(e, 1, x, drive, side, f0, f1, f2) + e[1, 3] * x[3] + e[1, 4] * x[4],
+        _row(e, 2, x, drive, side, f0, f1, f2) + e[2, 3] * x[3] + e[2, 4] * x[4],
+        _row(e, 3, x, drive, side, f0, f1, f2) + e[3, 3] * x[3] + e[3, 4] * x[4],
+        _row(e, 4, x, drive, side, f0, f1, f2) + e[4, 3] * x[3] + e[4, 4] * x[4],
+    )
 
 
 @inlined
@@ -708,11 +807,17 @@ def _three(e, i, k, f):
 
 @inlined
 def _parted(e, x, drive, side, f, q, r):
-    """The same of two bodies under the force f (3,) on the rudder, q (3,) between the two, of a shaft that hardens, and r (3,) on the motor."""
+    """The same of two bodies under the force f (3,) on the rudder, q (3,) between the two, of a shaft that hardens, and
+    r (3,) on the motor.
+    """
     z = _mapped(e, True, x, drive, side, f[0], f[1], f[2])
-    return (z[0] + _three(e, 0, 11, q) + _three(e, 0, 14, r), z[1] + _three(e, 1, 11, q) + _three(e, 1, 14, r),
-            z[2] + _three(e, 2, 11, q) + _three(e, 2, 14, r), z[3] + _three(e, 3, 11, q) + _three(e, 3, 14, r),
-            z[4] + _three(e, 4, 11, q) + _three(e, 4, 14, r))
+    return (
+        z[0] + _three(e, 0, 11, q) + _three(e, 0, 14, r),
+        z[1] + _three(e, 1, 11, q) + _three(e, 1, 14, r),
+        z[2] + _three(e, 2, 11, q) + _three(e, 2, 14, r),
+        z[3] + _three(e, 3, 11, q) + _three(e, 3, 14, r),
+        z[4] + _three(e, 4, 11, q) + _three(e, 4, 14, r),
+    )
 
 
 @inlined
@@ -723,21 +828,34 @@ def _parabola(begin, middle, end):
 
 @inlined
 def _extra(c, on, p, load, t, x, s):
-    """What the laws of effects add to the force on a slipping rudder under a known ``load``, per total inertia; what they take of its inertia of one body only."""
+    """What the laws of effects add to the force on a slipping rudder under a known ``load``, per total inertia; what
+    they take of its inertia of one body only.
+    """
     level = c[C_PLUS] if s > 0 else c[C_MINUS]
     share = 1.0 - c[PHI] if c[TWO] > 0 else 1.0
-    force = total_torque(on, p, x[0], x[1], x[2], t) - s * share * (friction_level(on, p, level, x[0], x[1], x[2], float(s)) - level)
+    force = total_torque(on, p, x[0], x[1], x[2], t) - s * share * (
+        friction_level(on, p, level, x[0], x[1], x[2], float(s)) - level
+    )
     if on[2, 0] > 0 and c[TWO] <= 0:
         side = 1.0 if x[0] > c[THETA_0] else -1.0
-        rest = (c[BIAS] + load + c[A_1] * (c[THETA_0] - x[0]) - c[C_1] * side + x[2]
-                - (c[A_PLUS] if s > 0 else c[A_MINUS]) * x[1] - s * level)
+        rest = (
+            c[BIAS]
+            + load
+            + c[A_1] * (c[THETA_0] - x[0])
+            - c[C_1] * side
+            + x[2]
+            - (c[A_PLUS] if s > 0 else c[A_MINUS]) * x[1]
+            - s * level
+        )
         force = moved(on, p, x[0], x[1], rest + force) - rest
     return force
 
 
 @inlined
 def _beside(c, on, p, lawful, load, t, x, m):
-    """(force on the rudder, between the bodies, on the motor) beside the linear ones of two bodies, per total inertia."""
+    """(force on the rudder, between the bodies, on the motor) beside the linear ones of two bodies, per total
+    inertia.
+    """
     f = load + _extra(c, on, p, load, t, x, m[0]) if lawful and m[0] != 0 else load
     r = 0.0
     if lawful and m[3] != 0:
@@ -747,8 +865,8 @@ def _beside(c, on, p, lawful, load, t, x, m):
 
 @inlined
 def _segment(e, step, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, extra):
-    """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they add now (NaN: unknown). ``e`` holds maps
-    over a ``step`` (see _no_maps).
+    """The state a whole segment later if no event falls into it, and what the laws add there; ``extra`` is what they
+    add now (NaN: unknown). ``e`` holds maps over a ``step`` (see _no_maps).
     """
     two = c[TWO] > 0
     if _bends(c, m):
@@ -766,9 +884,14 @@ def _segment(e, step, c, on, p, lawful, t, x, m, drive, tau, a_emf, load, h, ext
         f0, q0, r0 = _beside(c, on, p, lawful, load, t, x, m)
         z = _parted(half, x, drive, m[1], (f0, 0.0, 0.0), (q0, 0.0, 0.0), (r0, 0.0, 0.0))
         fa, qa, ra = _beside(c, on, p, lawful, load, t + 0.5 * h, z, m)
-        z = _parted(whole, x, drive, m[1], (f0, 2.0 * (fa - f0), 0.0), (q0, 2.0 * (qa - q0), 0.0), (r0, 2.0 * (ra - r0), 0.0))
+        z = _parted(
+            whole, x, drive, m[1], (f0, 2.0 * (fa - f0), 0.0), (q0, 2.0 * (qa - q0), 0.0), (r0, 2.0 * (ra - r0), 0.0)
+        )
         fb, qb, rb = _beside(c, on, p, lawful, load, t + h, z, m)
-        return _parted(whole, x, drive, m[1], _parabola(f0, fa, fb), _parabola(q0, qa, qb), _parabola(r0, ra, rb)), np.nan
+        return (
+            _parted(whole, x, drive, m[1], _parabola(f0, fa, fb), _parabola(q0, qa, qb), _parabola(r0, ra, rb)),
+            np.nan,
+        )
     if not lawful or m[0] == 0:
         return _mapped(whole, two, x, drive, m[1], load, 0.0, 0.0), np.nan
     g0 = load + (extra if extra == extra else _extra(c, on, p, load, t, x, m[0]))
@@ -789,24 +912,33 @@ def _grazes(c, x, z, m, h):
 
 @inlined
 def _still(c, on, p, lawful, t, x, m, drive, tau, a_emf):
-    """Whether a rudder on a bent bristle rests: in the corner, or within STILL of the bristle's whole bend from where it would."""
+    """Whether a rudder on a bent bristle rests: in the corner, or within STILL of the bristle's whole bend from where
+    it would.
+    """
     if m[0] == 0:
         return x[1] == 0.0 and _violation(3, c, on, p, lawful, t, x, m) <= 0
     small = STILL * (c[C_PLUS] + c[C_MINUS])
-    return (abs(x[1]) * math.sqrt(c[K_BRISTLE]) < small
-            and abs(_derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1]) < small)
+    return (
+        abs(x[1]) * math.sqrt(c[K_BRISTLE]) < small
+        and abs(_derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1]) < small
+    )
 
 
 @inlined
 def _turns(c, on, p, lawful, t, x, z, m, drive, tau, a_emf, h):
-    """True where a slipping body may have stopped and gone on within the step from x to z: it brakes first, speeds up last."""
+    """True where a slipping body may have stopped and gone on within the step from x to z: it brakes first, speeds up
+    last.
+    """
     if _has_bristle(c):
         return _grazes(c, x, z, m, h)
     if m[0] == 0 or _never_sticks(c, on):
         return False
     d0 = _derivative(c, on, p, lawful, t, x, m, drive, tau, a_emf)[1] * m[0]
-    return (d0 < 0.0 and abs(z[1]) < -d0 * h
-            and _derivative(c, on, p, lawful, t + h, z, m, drive, tau, a_emf)[1] * m[0] > 0.0)
+    return (
+        d0 < 0.0
+        and abs(z[1]) < -d0 * h
+        and _derivative(c, on, p, lawful, t + h, z, m, drive, tau, a_emf)[1] * m[0] > 0.0
+    )
 
 
 @inlined
@@ -817,7 +949,8 @@ def _law_step(c, a_emf):
 
 @njit(nogil=True)
 def _cuts(c, h0, tau, a_emf, lawful, refine):
-    """Segment ends within a uniform sample [s] and whether the input of this sample (1) or the one before (0) acts in each.
+    """Segment ends within a uniform sample [s] and whether the input of this sample (1) or the one before (0) acts in
+    each.
 
     Returns (ends (k,), fresh (k,), whole samples that the delay swallows).
     """
@@ -827,7 +960,9 @@ def _cuts(c, h0, tau, a_emf, lawful, refine):
     if c[FALL] > 0 and c[TAU] > 0:
         step = min(step, FALL_STEP * c[TAU])
     if c[TWO] > 0:
-        step = min(step, CONTACT_STEP / math.sqrt(c[K_TWIST] / (c[RHO] * (1.0 - c[RHO])) if c[RHO] > 0 else c[K_BRISTLE]))
+        step = min(
+            step, CONTACT_STEP / math.sqrt(c[K_TWIST] / (c[RHO] * (1.0 - c[RHO])) if c[RHO] > 0 else c[K_BRISTLE])
+        )
     step /= refine
     skip = int(c[DELAY] / h0 + 1e-9)
     late = c[DELAY] - skip * h0
@@ -871,8 +1006,9 @@ def _steady(x, z):
 
 @inlined
 def _fallen(c, on, p, lawful, t, x, m, drive, h):
-    """The constant drive under which a current whose inductance does not fall comes as far within h as one whose inductance does under ``drive``, with
-    the back-EMF of the segment's middle and what the inductance has fallen to there.
+    """The constant drive under which a current whose inductance does not fall comes as far within h as one whose
+    inductance does under ``drive``, with the back-EMF of the segment's middle and what the inductance has fallen to
+    there.
     """
     d = _derivative(c, on, p, lawful, t, x, m, drive, c[TAU], c[A_EMF])
     speed = _drive_speed(c, x) + 0.5 * h * _drive_speed(c, d)
@@ -896,7 +1032,9 @@ def _last(ends):
 
 @part
 def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh, skip, late, early, whole, leaps, out):
-    """See ``_simulate``: through the samples, by maps over segments (late, early, the first of a sample) or, if it ``leaps``, over a whole sample."""
+    """See ``_simulate``: through the samples, by maps over segments (late, early, the first of a sample) or, if it
+    ``leaps``, over a whole sample.
+    """
     n = t.size
     lawful, two, bristle, slips = is_lawful(on), c[TWO] > 0, _has_bristle(c), _never_sticks(c, on)
     h0, last = t[1] - t[0], _last(ends)
@@ -953,7 +1091,8 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
                     z = (x[0], 0.0, j, x[3], x[4])
                     c[BIAS] = bias + load[k]
                     held = _violation(3, c, on, p, lawful, now + h, z, m) <= 0 and (
-                        (tau > 0 and resting == k) or _violation(3, c, on, p, lawful, now, x, m) <= 0)
+                        (tau > 0 and resting == k) or _violation(3, c, on, p, lawful, now, x, m) <= 0
+                    )
                     c[BIAS] = bias
                     if held:
                         x = z
@@ -962,12 +1101,34 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
                 elif not two:
                     if tau <= 0:
                         x = (x[0], x[1], drive - a_emf * x[1], x[3], x[4])
-                    z, extra = _segment(e, step, c, on, p, lawful, now, x, m, drive, tau, a_emf, load[k], h, extra if tau > 0 else np.nan)
+                    z, extra = _segment(
+                        e,
+                        step,
+                        c,
+                        on,
+                        p,
+                        lawful,
+                        now,
+                        x,
+                        m,
+                        drive,
+                        tau,
+                        a_emf,
+                        load[k],
+                        h,
+                        extra if tau > 0 else np.nan,
+                    )
                     if tau <= 0:
                         z = (z[0], z[1], drive - a_emf * z[1], z[3], z[4])
-                    if ((slips or z[1] * m[0] > 0) and (z[0] - c[THETA_0]) * m[1] >= 0 and z[0] <= c[UPPER] and z[0] >= c[LOWER]
-                            and not (abs(z[1]) < 0.2 * abs(x[1])
-                                     and _turns(c, on, p, lawful, now, x, z, m, drive, tau, a_emf, h))):
+                    if (
+                        (slips or z[1] * m[0] > 0)
+                        and (z[0] - c[THETA_0]) * m[1] >= 0
+                        and z[0] <= c[UPPER]
+                        and z[0] >= c[LOWER]
+                        and not (
+                            abs(z[1]) < 0.2 * abs(x[1]) and _turns(c, on, p, lawful, now, x, z, m, drive, tau, a_emf, h)
+                        )
+                    ):
                         x = z
                         continue
                 else:
@@ -977,7 +1138,9 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
                         j = drive + (x[2] - drive) * math.exp(-h / tau) if tau > 0 else x[2]
                         z = (x[0], x[1], j, x[3], x[4])
                         c[BIAS] = bias + load[k]
-                        still = _still(c, on, p, lawful, now, x, m, drive, tau, a_emf) and _still(c, on, p, lawful, now + h, z, m, drive, tau, a_emf)
+                        still = _still(c, on, p, lawful, now, x, m, drive, tau, a_emf) and _still(
+                            c, on, p, lawful, now + h, z, m, drive, tau, a_emf
+                        )
                         c[BIAS] = bias
                         if still:
                             x = z
@@ -993,22 +1156,24 @@ def _march(t, u, enable, load, y, gain, every, c, on, p, refine, x0, ends, fresh
             if enable[k]:
                 x, m, events = _advance(c, on, p, lawful, now, x, m, drive, tau, a_emf, h, h_max, corner)
             else:
-                x, m, events = _advance(c, on, p, lawful, now, (x[0], x[1], 0.0, x[3], x[4]), m, 0.0, 0.0, 0.0, h, h_max,
-                                        corner)
+                x, m, events = _advance(
+                    c, on, p, lawful, now, (x[0], x[1], 0.0, x[3], x[4]), m, 0.0, 0.0, 0.0, h, h_max, corner
+                )
             c[BIAS] = bias
             budget -= events
         if not _bounded(x) or budget < 0:
-            out[k + 1:, :] = np.nan
+            out[k + 1 :, :] = np.nan
             return
 
 
 def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
     """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
 
-    ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free run. ``y`` may
-    hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``on``
-    holds the rows of the effects with a law (see laws.rows_of), ``p`` (effects, N_PARAMETERS) their constants, of which memories change; ``refine``
-    divides the segments. A motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
+    ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free
+    run. ``y`` may hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an
+    open circuit. ``on`` holds the rows of the effects with a law (see laws.rows_of), ``p`` (effects, N_PARAMETERS)
+    their constants, of which memories change; ``refine`` divides the segments. A motion that runs away, or chatters
+    beyond EVENT_BUDGET, is NaN from there on.
     """
     lawful, h0 = is_lawful(on), t[1] - t[0]
     tau, a_emf = c[TAU], c[A_EMF]
@@ -1026,5 +1191,10 @@ ROWS, LAWS = types.int64[:, ::1], types.float64[:, ::1]
 VECTOR = types.float64[::1]
 
 with compiled_cache():  # one signature each: locked and other arrays alike
-    simulate_kernel = njit(types.void(READ, READ, READ_BOOL, READ, READ, types.float64, types.int64, VECTOR, ROWS, LAWS, types.int64,
-                                      VECTOR, LAWS), nogil=True, cache=True)(_simulate)
+    simulate_kernel = njit(
+        types.void(
+            READ, READ, READ_BOOL, READ, READ, types.float64, types.int64, VECTOR, ROWS, LAWS, types.int64, VECTOR, LAWS
+        ),
+        nogil=True,
+        cache=True,
+    )(_simulate)

@@ -1,10 +1,11 @@
 """A play or a shaft beside a bristle: two bodies by fixed steps, every force taken in the middle of the step.
-
-State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead. Its friction is k z + d exp(-(w / w_d)^2) z',
-its bend goes the way of Dahl's exactly under a speed that is constant over the step. What gives like a spring needs no event; what is left of
-set-valued terms, the motor side's dry friction and the preload's corner, is solved for with the speeds at the end of the step, as in Moreau's time
-stepping: a body that its friction holds stays, a rudder that would not leave the corner's reach within the step ends in it. So a motion moves smoothly with
-the plant's numbers. Positions lead the speeds by half a step (leapfrog), which is of second order where nothing switches; dampers are implicit.
+ State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead.
+Its friction is k z + d exp(-(w / w_d)^2) z', its bend goes the way of Dahl's exactly under a speed that is constant
+over the step. What gives like a spring needs no event; what is left of set-valued terms, the motor side's dry friction
+and the preload's corner, is solved for with the speeds at the end of the step, as in Moreau's time
+stepping: a body that its friction holds stays, a rudder that would not leave the corner's reach within the step ends in
+it. So a motion moves smoothly with the plant's numbers. Positions lead the speeds by half a step (leapfrog), which is
+of second order where nothing switches; dampers are implicit.
 """
 
 from __future__ import annotations
@@ -15,14 +16,51 @@ import numpy as np
 from numba import njit, types
 
 from ers_mj.plants.compiled import compiled_cache, inlined, part
-from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BETA, BIAS, C_1, C_MINUS, C_PLUS, D_BRISTLE, D_STOP, D_TWIST, DAHL, DELAY, FADE, FALL, GAP,
-                                  HARDEN, K_BRISTLE, K_STOP, K_TWIST, LAWS, LEAST_LEVEL, LOWER, PHI, READ, READ_BOOL, RHO, ROWS, RUNAWAY, TAU, THETA_0,
-                                  UPPER, VECTOR, _faster, _motor_level)
+from ers_mj.plants.events import (
+    A_1,
+    A_EMF,
+    A_MINUS,
+    A_PLUS,
+    B,
+    BETA,
+    BIAS,
+    C_1,
+    C_MINUS,
+    C_PLUS,
+    D_BRISTLE,
+    D_STOP,
+    D_TWIST,
+    DAHL,
+    DELAY,
+    FADE,
+    FALL,
+    GAP,
+    HARDEN,
+    K_BRISTLE,
+    K_STOP,
+    K_TWIST,
+    LAWS,
+    LEAST_LEVEL,
+    LOWER,
+    PHI,
+    READ,
+    READ_BOOL,
+    RHO,
+    ROWS,
+    RUNAWAY,
+    TAU,
+    THETA_0,
+    UPPER,
+    VECTOR,
+    _faster,
+    _motor_level,
+)
 from ers_mj.plants.laws import drive_torque, friction_level, is_lawful, remember, total_torque
 
 LONGEST = 2e-4  # [s] of a step
 SPRING_STEP = 0.35  # frequency [rad/s] of the stiffest spring times the step
-FINER = 16  # steps for one where the rudder may reach the preload's corner: one that comes slower than step times c_1 stays there
+# steps for one where the rudder may reach the preload's corner: one that comes slower than step times c_1 stays there
+FINER = 16
 RESTING = 1e-9  # [output unit, and that per second] from the corner, and of speed, within which a rudder rests there
 SWEEPS = 3  # over the two set-valued forces, which only the contact's damper couples
 
@@ -37,7 +75,9 @@ def _step_length(c, refine):
 
 @inlined
 def _unbent(c, left, way):
-    """What is left of a bristle's share of its level to bend, which was ``left``, after a way counted in the displacement of its whole bend."""
+    """What is left of a bristle's share of its level to bend, which was ``left``, after a way counted in the
+    displacement of its whole bend.
+    """
     delta = c[DAHL]
     if delta == 1.0:
         return left * math.exp(-way)
@@ -74,7 +114,9 @@ def _damping(c, w):
 
 @inlined
 def _contact(c, twist):
-    """(force of the spring between the bodies on the rudder per total inertia, damping there) at theta_m - theta; none within the play."""
+    """(force of the spring between the bodies on the rudder per total inertia, damping there) at theta_m - theta; none
+    within the play.
+    """
     x = twist
     if c[GAP] > 0.0:
         if abs(twist) <= c[GAP]:
@@ -95,7 +137,9 @@ def _stop(c, theta):
 
 @inlined
 def _past_corner(a, push, ahead, corner):
-    """(w, mean side of the corner over the step's way, 0 in it) of a w = push - corner sgn(ahead + w), sgn set-valued at 0."""
+    """(w, mean side of the corner over the step's way, 0 in it) of a w = push - corner sgn(ahead + w), sgn set-valued
+    at 0.
+    """
     reach = push + a * ahead
     if abs(reach) <= corner:
         return -ahead, 0.0
@@ -109,7 +153,8 @@ def _past_corner(a, push, ahead, corner):
 
 @inlined
 def _speeds(a, e, d, push, push_m, ahead, corner, holds):
-    """(w, w_m) at the end of a step: a w - d w_m = push - corner sgn(ahead + w), e w_m - d w = push_m - holds sgn(w_m), sgn set-valued at 0.
+    """(w, w_m) at the end of a step: a w - d w_m = push - corner sgn(ahead + w), e w_m - d w = push_m - holds sgn(w_m),
+    sgn set-valued at 0.
 
     Sweeps find which of the two hold, the rest is linear.
     """
@@ -239,14 +284,18 @@ def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
         first = min(late * h / h0, h)
         if first > 0.0:
             x = _through(c, on, p, lawful, t[k], x, c[B] * u[max(k - skip - 1, 0)], enable[k], load[k], first, longest)
-        x = _through(c, on, p, lawful, t[k] + first, x, c[B] * u[max(k - skip, 0)], enable[k], load[k], h - first, longest)
+        x = _through(
+            c, on, p, lawful, t[k] + first, x, c[B] * u[max(k - skip, 0)], enable[k], load[k], h - first, longest
+        )
         if not (abs(x[0]) < RUNAWAY and abs(x[1]) < RUNAWAY):
-            out[k + 1:, :] = np.nan
+            out[k + 1 :, :] = np.nan
             return
 
 
 def _sample(t, h0, before, now, c, on, p, refine, x):
-    """Move x (6,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first, ``now`` afterwards."""
+    """Move x (6,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first, ``now``
+    afterwards.
+    """
     lawful, longest = is_lawful(on), _step_length(c, refine)
     late = c[DELAY] - int(c[DELAY] / h0 + 1e-9) * h0
     z = (x[0], x[1], x[2], x[3], x[4], x[5])
@@ -270,7 +319,14 @@ def _begin(c, x):
 NUMBER = types.float64
 
 with compiled_cache():
-    simulate_kernel = njit(types.void(READ, READ, READ_BOOL, READ, READ, types.float64, types.int64, VECTOR, ROWS, LAWS, types.int64,
-                                      VECTOR, LAWS), nogil=True, cache=True)(_simulate)
-    sample_kernel = njit(types.void(NUMBER, NUMBER, NUMBER, NUMBER, VECTOR, ROWS, LAWS, types.int64, VECTOR), cache=True)(_sample)
+    simulate_kernel = njit(
+        types.void(
+            READ, READ, READ_BOOL, READ, READ, types.float64, types.int64, VECTOR, ROWS, LAWS, types.int64, VECTOR, LAWS
+        ),
+        nogil=True,
+        cache=True,
+    )(_simulate)
+    sample_kernel = njit(
+        types.void(NUMBER, NUMBER, NUMBER, NUMBER, VECTOR, ROWS, LAWS, types.int64, VECTOR), cache=True
+    )(_sample)
     begin_kernel = njit(types.void(VECTOR, VECTOR), cache=True)(_begin)

@@ -37,7 +37,9 @@ def steps(t: np.ndarray) -> np.ndarray:
 
 
 def square(t: np.ndarray) -> np.ndarray:
-    """+4.5 V and -4.5 V for 0.3 s each, 0.7 s of rest after either, in which the preload brings the rudder home to stick."""
+    """+4.5 V and -4.5 V for 0.3 s each, 0.7 s of rest after either, in which the preload brings the rudder home to
+    stick.
+    """
     s = np.mod(t, 2.0)
     return 4.5 * ((s < 0.3).astype(float) - ((s >= 1.0) & (s < 1.3)))
 
@@ -48,5 +50,9 @@ def _triangle(turns: np.ndarray) -> np.ndarray:
 
 
 INPUTS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
-    "multisine": multisine, "chirp": chirp, "ramp": ramp, "steps": steps, "square": square,
+    "multisine": multisine,
+    "chirp": chirp,
+    "ramp": ramp,
+    "steps": steps,
+    "square": square,
 }

@@ -1,4 +1,6 @@
-"""The laws of the effects as the compiled integrator calls them: torques, frictions, inertias and memories, those that are on and no others."""
+"""The laws of the effects as the compiled integrator calls them: torques, frictions, inertias and memories, those that
+are on and no others.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,11 @@ N_PARAMETERS = 7  # constants of a law at most
 def _chain_torque(laws):
     """One compiled function that evaluates the torque of the effect in one row."""
     if not laws:
+
         @njit(nogil=True, inline="always")
         def pick(k, p, theta, w, j, t):
             return 0.0
+
         return pick
     (row, law), rest = laws[0], _chain_torque(laws[1:])
 
@@ -30,15 +34,18 @@ def _chain_torque(laws):
         else:
             a = rest(k, p, theta, w, j, t)
         return a
+
     return pick
 
 
 def _chain_friction(laws):
     """One compiled function that passes the friction level through the effect in one row."""
     if not laws:
+
         @njit(nogil=True, inline="always")
         def pick(k, p, level, theta, w, j, direction):
             return level
+
         return pick
     (row, law), rest = laws[0], _chain_friction(laws[1:])
 
@@ -49,15 +56,18 @@ def _chain_friction(laws):
         else:
             a = rest(k, p, level, theta, w, j, direction)
         return a
+
     return pick
 
 
 def _chain_inertia(laws):
     """One compiled function that evaluates the inertia of the effect in one row."""
     if not laws:
+
         @njit(nogil=True, inline="always")
         def pick(k, p, theta):
             return 1.0, 0.0
+
         return pick
     (row, law), rest = laws[0], _chain_inertia(laws[1:])
 
@@ -68,15 +78,18 @@ def _chain_inertia(laws):
         else:
             a = rest(k, p, theta)
         return a
+
     return pick
 
 
 def _chain_memory(laws):
     """One compiled function that evaluates the memory of the effect in one row."""
     if not laws:
+
         @njit(nogil=True, inline="always")
         def pick(k, p, theta, w, j, h):
             return 0.0
+
         return pick
     (row, law), rest = laws[0], _chain_memory(laws[1:])
 
@@ -87,6 +100,7 @@ def _chain_memory(laws):
         else:
             a = rest(k, p, theta, w, j, h)
         return a
+
     return pick
 
 
@@ -150,7 +164,9 @@ def moved(on, p, theta, w, a):
 
 @inlined
 def remember(on, p, x, h):
-    """Bring the memories of effects, their fifth constants, on by a sample of length h from the state x = (theta, w, j, theta_m, w_m, ...)."""
+    """Bring the memories of effects, their fifth constants, on by a sample of length h from the state x = (theta, w, j,
+    theta_m, w_m, ...).
+    """
     for i in range(on[3, 0]):
         k = on[3, i + 1]
         p[k, MEMORY] = _memory_of(k, _constants(p, k), x[0], x[1], x[2], h)
@@ -161,11 +177,26 @@ def remember(on, p, x, h):
 
 @lru_cache
 def rows_of(names, parted=False):
-    """A tuple of effects as the laws are called: (6, 1 + effects) their number and rows, of torques, of frictions, of inertias and of memories, and where the
-    motor is ``parted`` from the rudder of those torques and memories that are its own."""
+    """A tuple of effects as the laws are called: (6, 1 + effects) their number and rows, of torques, of frictions, of
+    inertias and of memories, and where the motor is ``parted`` from the rudder of those torques and memories that are
+    its own."""
     on = np.zeros((6, 1 + len(EFFECTS)), np.int64)
-    for kind, (law, own) in enumerate((("torque", False), ("friction", False), ("inertia", False), ("memory", False), ("torque", True), ("memory", True))):
-        rows = [row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names and getattr(effect, law)
-                and (law not in ("torque", "memory") or own == (parted and effect.at_motor))]
-        on[kind, 0], on[kind, 1:1 + len(rows)] = len(rows), rows
+    for kind, (law, own) in enumerate(
+        (
+            ("torque", False),
+            ("friction", False),
+            ("inertia", False),
+            ("memory", False),
+            ("torque", True),
+            ("memory", True),
+        )
+    ):
+        rows = [
+            row
+            for row, effect in reversed(list(enumerate(EFFECTS)))
+            if effect.name in names
+            and getattr(effect, law)
+            and (law not in ("torque", "memory") or own == (parted and effect.at_motor))
+        ]
+        on[kind, 0], on[kind, 1 : 1 + len(rows)] = len(rows), rows
     return on

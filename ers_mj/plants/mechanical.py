@@ -1,4 +1,5 @@
-"""The plant in MuJoCo: the reduced model's coefficients and effects as bodies, joints and actuators; voltages in, motion out.
+"""The plant in MuJoCo: the reduced model's coefficients and effects as bodies, joints and actuators; voltages in,
+motion out.
 
 The model is written from what the effects leave in ``Coefficients``, times the inertia: one source for both plants. An
 effect whose law has no MJCF element is evaluated at every step of a Python loop, about three times slower.
@@ -33,11 +34,11 @@ class MechanicalPlant:
     Attributes:
         coefficients: Eq. (6)'s record; tau_e > 0 switches the inductance on.
         effects: (name, parameters (k,)), torques per inertia, as the reduced model takes them.
-        parameters: a datasheet's, of which J [kg m^2], n and K_t [N m/A] make the three-dimensional rudder system; None for
-            one lumped joint of inertia 1 in output units.
+        parameters: a datasheet's, of which J [kg m^2], n and K_t [N m/A] make the three-dimensional rudder system; None
+            for one lumped joint of inertia 1 in output units.
         linkage: "constant" or "rod", of the rudder system.
-        gap: half-width of a rigid play [output unit] (see plants/play.py); the effect ``backlash`` brings its own split and
-            an elastic contact.
+        gap: half-width of a rigid play [output unit] (see plants/play.py); the effect ``backlash`` brings its own split
+            and an elastic contact.
         is_angle: whether the output of a lumped plant turns (rad) or slides (m, V).
         timestep: h [s], at most; a sample is divided into whole steps.
 
@@ -68,10 +69,19 @@ class MechanicalPlant:
     def __reduce__(self) -> tuple:
         """Travel to another process as its settings; the model is built again there."""
         parameters = None if self.parameters is None else dict(self.parameters)
-        return type(self), (self.coefficients, tuple(self.effects), parameters, self.linkage, self.gap, self.is_angle, self.timestep)
+        return type(self), (
+            self.coefficients,
+            tuple(self.effects),
+            parameters,
+            self.linkage,
+            self.gap,
+            self.is_angle,
+            self.timestep,
+        )
 
     def simulate(self, t, u, start=None, *, enable=None, load=None, y=None, gain=0.0, every=1) -> Motion:
-        """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples; the observer form where ``gain`` > 0.
+        """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples; the observer form
+        where ``gain`` > 0.
 
         Args:
             t: sample times (N,) [s], strictly increasing; they need not be uniform.
@@ -87,7 +97,9 @@ class MechanicalPlant:
         t, u = np.ascontiguousarray(t, float), self.terminal(u)
         stepper = self._stepper()
         stepper.reset(self._start(start))
-        rows = stepper.run(t, u, self._lowered.delay, enable, load, Observer(y, gain, every, self._moved) if gain > 0 else None)
+        rows = stepper.run(
+            t, u, self._lowered.delay, enable, load, Observer(y, gain, every, self._moved) if gain > 0 else None
+        )
         return self._motion(t, rows)
 
     def ratio(self, theta: float) -> float:
@@ -159,27 +171,49 @@ class MechanicalPlant:
 
     def _build(self) -> tuple[Skeleton, tuple[Law, ...]]:
         c = self._lowered
-        skeleton = (lumped_skeleton(c, self.is_angle) if self.parameters is None
-                    else rudder_skeleton(c, self.parameters, self.linkage))
+        skeleton = (
+            lumped_skeleton(c, self.is_angle)
+            if self.parameters is None
+            else rudder_skeleton(c, self.parameters, self.linkage)
+        )
         write_coefficients(skeleton, c, self._step)
-        twin = Twin(skeleton.spec, skeleton.inertia, skeleton.is_angle, skeleton.ratio * skeleton.K_t / skeleton.inertia)
+        twin = Twin(
+            skeleton.spec, skeleton.inertia, skeleton.is_angle, skeleton.ratio * skeleton.K_t / skeleton.inertia
+        )
         laws = []
         for name, values in self.effects:
             effect, constants = BY_NAME[name], BY_NAME[name].constants(values, c)
             if not effect.edit_spec(constants, c, twin):
-                laws.append(Law(name, constants, effect.torque, effect.friction, effect.inertia, effect.memory, effect.at_motor))
+                laws.append(
+                    Law(name, constants, effect.torque, effect.friction, effect.inertia, effect.memory, effect.at_motor)
+                )
         if c.a_mech_plus != c.a_mech_minus:
             laws.append(_viscous_asymmetry(c))
         if c.has_bristle and (c.c_2_plus != c.c_2_minus or np.isfinite(c.fade) or c.dahl != 1.0):
-            laws.append(Law("a bristle's asymmetry, fading damping or exponent", np.zeros(0), None, lambda p, level, theta, w, j, direction: level))
+            laws.append(
+                Law(
+                    "a bristle's asymmetry, fading damping or exponent",
+                    np.zeros(0),
+                    None,
+                    lambda p, level, theta, w, j, direction: level,
+                )
+            )
         return skeleton, tuple(laws)
 
     # -- running --
 
     def _stepper(self) -> Stepper:
         c, J = self._lowered, self._skeleton.inertia
-        return Stepper(self.model, c, self._laws, self._step, inertia=J, ratio=self._skeleton.ratio,
-                       motor_joint=self._skeleton.motor_joint, activation=self._activation())
+        return Stepper(
+            self.model,
+            c,
+            self._laws,
+            self._step,
+            inertia=J,
+            ratio=self._skeleton.ratio,
+            motor_joint=self._skeleton.motor_joint,
+            activation=self._activation(),
+        )
 
     def _activation(self) -> float:
         """Drive acceleration for one unit of the motor's activation."""
@@ -187,12 +221,20 @@ class MechanicalPlant:
         return float(np.copysign(motor_gain(s, self._lowered) * s.ratio * s.K_t / s.inertia, self._lowered.b))
 
     def _start(self, start) -> dict[str, tuple[float, float]]:
-        """{joint: (position, velocity)} and, under "drive" and "bristle", (acceleration or deflection, 0) for (theta, omega[, drive])."""
+        """{joint: (position, velocity)} and, under "drive" and "bristle", (acceleration or deflection, 0) for (theta,
+        omega[, drive]).
+        """
         c = self._lowered
         theta, omega, drive = (*start, 0.0)[:3] if start is not None else (c.theta_0, 0.0, 0.0)
         joints = {name: (q, dq * omega) for name, (q, dq) in self._skeleton.pose(theta).items()}
-        joints["lever_up"] = (max(theta, c.theta_0), omega if theta > c.theta_0 else max(omega, 0.0) * (theta == c.theta_0))
-        joints["lever_down"] = (min(theta, c.theta_0), omega if theta < c.theta_0 else min(omega, 0.0) * (theta == c.theta_0))
+        joints["lever_up"] = (
+            max(theta, c.theta_0),
+            omega if theta > c.theta_0 else max(omega, 0.0) * (theta == c.theta_0),
+        )
+        joints["lever_down"] = (
+            min(theta, c.theta_0),
+            omega if theta < c.theta_0 else min(omega, 0.0) * (theta == c.theta_0),
+        )
         slip = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_bristle if c.has_bristle else 0.0
         bent = float(np.clip(omega / np.sqrt(c.k_bristle), -slip, slip)) if c.has_bristle else 0.0
         return joints | {"drive": (drive, 0.0), "bristle": (bent, 0.0)}
@@ -212,13 +254,18 @@ class MechanicalPlant:
 
 
 def _viscous_asymmetry(c: Coefficients) -> Law:
-    """Half the difference of viscous friction between the directions: a force even in the speed, which no damping gives."""
+    """Half the difference of viscous friction between the directions: a force even in the speed, which no damping
+    gives.
+    """
     half = 0.5 * (c.a_mech_plus - c.a_mech_minus) * (1.0 - c.beta if c.has_motor_side else 1.0)
     return Law("asymmetric viscous friction", np.array([half]), lambda p, theta, w, j, t: -p[0] * abs(w), None)
 
 
-def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarray, jobs: int = 0, start=None) -> list[Motion]:
-    """Free runs of many plants (or one plant under many inputs), from rest at theta_0 or all from one ``start``, on many cores.
+def simulate_many(
+    plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarray, jobs: int = 0, start=None
+) -> list[Motion]:
+    """Free runs of many plants (or one plant under many inputs), from rest at theta_0 or all from one ``start``, on
+    many cores.
 
     Args:
         plants: (M,), or one for all inputs.
@@ -233,7 +280,9 @@ def simulate_many(plants: Sequence[MechanicalPlant], t: np.ndarray, u: np.ndarra
     t, u = np.ascontiguousarray(t, float), np.atleast_2d(np.asarray(u, float))
     count = max(len(plants), len(u))
     if len(plants) not in (1, count) or len(u) not in (1, count):
-        raise InputError(f"{len(plants)} plants and {len(u)} inputs were given, equal numbers or one of either were expected")
+        raise InputError(
+            f"{len(plants)} plants and {len(u)} inputs were given, equal numbers or one of either were expected"
+        )
     if t.size > 2 and np.ptp(np.diff(t)) > 1e-6 * (t[1] - t[0]):
         raise InputError("many plants at once need a uniform time, simulate them one by one")
     plants = list(plants) * (count // len(plants))

@@ -1,4 +1,6 @@
-"""The MJCF folder, wherever the package lies, inside an installed wheel or beside the source; and MuJoCo kept silent."""
+"""The MJCF folder, wherever the package lies, inside an installed wheel or beside the source; and MuJoCo kept
+silent.
+"""
 
 from __future__ import annotations
 

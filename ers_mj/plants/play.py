@@ -1,4 +1,6 @@
-"""The play that a bare gap stands for, the same on both plants: two bodies, all friction and damping on the rudder's side."""
+"""The play that a bare gap stands for, the same on both plants: two bodies, all friction and damping on the rudder's
+side.
+"""
 
 import math
 
@@ -6,7 +8,9 @@ from ers_mj.effects.base import Coefficients
 
 MOTOR_SHARE = 0.64  # of J on the motor's side, where no effect says otherwise: n^2 J_m = 0.00198 of 0.0031 kg m^2
 CONTACT_HZ = 2000.0  # of the reduced model's contact, against the total inertia: 0.01 deg RMS from two rigid masses
-CONTACT_DAMPING = 1.0  # its damping ratio, twice critical for the two bodies against each other: they meet all but without a bounce
+CONTACT_DAMPING = (
+    1.0  # its damping ratio, twice critical for the two bodies against each other: they meet all but without a bounce
+)
 
 
 def rigid_play(c: Coefficients, gap: float) -> Coefficients:

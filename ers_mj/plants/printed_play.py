@@ -3,10 +3,10 @@
     T_l = n (T_m - delta)  where T_m rises and T_l lies on that line
           n (T_m + delta)  where T_m falls and T_l lies on that line
           T_l(t-)          otherwise
-
-That is the play operator on the torque: T_l follows n T_m at a distance of n delta and rests while T_m moves within the band.
-delta is called a distance and subtracted from a torque. Read here as a torque, of which an angle gives the only one that the
-model has for it: n delta = k_s gap, what the return spring pulls more from one end of the play to its centre.
+ That is the play operator on the torque: T_l follows n T_m at a distance of n delta and rests while T_m moves within
+the band. delta is called a distance and subtracted from a torque. Read here as a torque, of which an angle gives the
+only one that the model has for it: n delta = k_s gap, what the return spring pulls more from one end of the play to its
+centre.
 """
 
 from __future__ import annotations
@@ -39,8 +39,21 @@ class PrintedPlay:
         """Free run from rest at theta_0, the band centred, under u (N,) held between the samples t (N,) [s]."""
         c, out = self.coefficients, np.empty((t.size, 3))
         substeps = int(np.ceil(np.diff(t).max() / STEP))
-        _run(c.a_1, c.a_mech_plus, c.a_emf, c.b, c.c_1, c.c_2_plus, c.theta_0, c.tau_e, self.threshold,
-             np.ascontiguousarray(t, float), np.ascontiguousarray(u, float), substeps, out)
+        _run(
+            c.a_1,
+            c.a_mech_plus,
+            c.a_emf,
+            c.b,
+            c.c_1,
+            c.c_2_plus,
+            c.theta_0,
+            c.tau_e,
+            self.threshold,
+            np.ascontiguousarray(t, float),
+            np.ascontiguousarray(u, float),
+            substeps,
+            out,
+        )
         theta, omega, drive = out.T.copy()
         return Motion(t, theta, omega, drive, theta, theta)
 
@@ -65,7 +78,9 @@ def _speed(slope, push, corner, friction, preload):
 
 
 def _steps(a_1, a_mech, a_emf, b, c_1, c_2, theta_0, tau, threshold, t, u, substeps, out):
-    """Fill out (N, 3) with angle, speed, transmitted acceleration just before u[k] acts; implicit steps in the speed."""
+    """Fill out (N, 3) with angle, speed, transmitted acceleration just before u[k] acts; implicit steps in the
+    speed.
+    """
     phi = w = motor = through = 0.0
     for k in range(t.size):
         out[k, 0], out[k, 1], out[k, 2] = theta_0 + phi, w, through

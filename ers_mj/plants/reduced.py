@@ -15,14 +15,20 @@ from ers_mj.plants.laws import N_PARAMETERS, rows_of
 from ers_mj.plants.tangents import NUDGE, prepare_kernel, tangent_kernel
 
 ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
-PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = 150, 400, 800, 2000, 60  # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on
+PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = (
+    150,
+    400,
+    800,
+    2000,
+    60,
+)  # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on
 # a bristle, of both; of a tangent
 OVERHEAD = 20  # samples whose handling takes another microsecond
 
 
 class Effort:
-    """What has been simulated so far by this process, in the microseconds that it takes a slow core, about: a clock that goes alike on every machine,
-    whatever runs beside."""
+    """What has been simulated so far by this process, in the microseconds that it takes a slow core, about: a clock
+    that goes alike on every machine, whatever runs beside."""
 
     def __init__(self):
         self._lock, self._spent = threading.Lock(), 0
@@ -49,9 +55,18 @@ def lumped(values: Mapping[str, float]) -> Coefficients:
     share = values.get("emf_share", 0.0)
     a_2 = values.get("a_2", 0.0)
     c_2 = values.get("c_2", 0.0)
-    return Coefficients(a_1=values.get("a_1", 0.0), a_mech_plus=a_2 * (1 - share), a_mech_minus=a_2 * (1 - share),
-                        a_emf=a_2 * share, b=values["b"], c_1=values.get("c_1", 0.0), c_2_plus=c_2, c_2_minus=c_2,
-                        theta_0=values.get("theta_0", 0.0), tau_e=values.get("tau_e", 0.0))
+    return Coefficients(
+        a_1=values.get("a_1", 0.0),
+        a_mech_plus=a_2 * (1 - share),
+        a_mech_minus=a_2 * (1 - share),
+        a_emf=a_2 * share,
+        b=values["b"],
+        c_1=values.get("c_1", 0.0),
+        c_2_plus=c_2,
+        c_2_minus=c_2,
+        theta_0=values.get("theta_0", 0.0),
+        tau_e=values.get("tau_e", 0.0),
+    )
 
 
 @dataclass(frozen=True)
@@ -74,8 +89,8 @@ def _touches_sensor(name: str) -> bool:
 class ReducedModel:
     """Eq. (6)'s coefficients and the effects on top of them.
 
-    ``effects`` is a sequence of (name, parameters (k,)); torques are carried per inertia (see effects/base.py). ``supply`` is what a recording
-    measured of it [V] (N,), or None.
+    ``effects`` is a sequence of (name, parameters (k,)); torques are carried per inertia (see effects/base.py).
+    ``supply`` is what a recording measured of it [V] (N,), or None.
     """
 
     coefficients: Coefficients
@@ -92,7 +107,7 @@ class ReducedModel:
             if (effect.torque or effect.friction or effect.inertia or effect.memory) and effect.is_lawful(values):
                 lawful.append(name)
                 constants = effect.constants(values, c)
-                p[ROW[name], :len(constants)] = constants
+                p[ROW[name], : len(constants)] = constants
         object.__setattr__(self, "_lowered", (np.array(c, float), rows_of(tuple(lawful), c.has_motor_side), p))
 
     @property
@@ -134,21 +149,43 @@ class ReducedModel:
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
         kernel = simulate_kernel
         if both:
-            from ers_mj.plants.fixed_steps import simulate_kernel as kernel  # here alone: it takes seconds to compile and is seldom needed
-        kernel(t, self.terminal(u), enable, load, t if y is None else y, gain, every, c.copy(), on, p.copy(), refine, x0, out)
+            from ers_mj.plants.fixed_steps import (
+                simulate_kernel as kernel,
+            )  # here alone: it takes seconds to compile and is seldom needed
+        kernel(
+            t,
+            self.terminal(u),
+            enable,
+            load,
+            t if y is None else y,
+            gain,
+            every,
+            c.copy(),
+            on,
+            p.copy(),
+            refine,
+            x0,
+            out,
+        )
         return out
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
-        """What the sensor reads (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see events.simulate_kernel).
+        """What the sensor reads (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see
+        events.simulate_kernel).
 
-        ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool. An observer beside a
-        sensor effect that is not ``instant`` runs twice: what the sensor adds on the first way is taken off the measurement on the second.
+        ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool. An
+        observer beside a sensor effect that is not ``instant`` runs twice: what the sensor adds on the first way is
+        taken off the measurement on the second.
         """
         return self.outputs(t, u, start, enable=enable, load=load, y=y, gain=gain, every=every)[0]
 
-    def outputs(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> tuple[np.ndarray, np.ndarray]:
+    def outputs(
+        self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1
+    ) -> tuple[np.ndarray, np.ndarray]:
         """As ``theta``, with the motion (N, 4) beside it: theta, omega, drive acceleration and motor side's angle."""
-        motion = self._run(t, u, start, enable, load, self.behind(y) if gain > 0 and self._is_instant else y, gain, every, 1)
+        motion = self._run(
+            t, u, start, enable, load, self.behind(y) if gain > 0 and self._is_instant else y, gain, every, 1
+        )
         read = self.read(t, motion[:, 0])
         if gain > 0 and not self._is_instant:
             motion = self._run(t, u, start, enable, load, y - (read - motion[:, 0]), gain, every, 1)
@@ -156,7 +193,9 @@ class ReducedModel:
         return read, motion
 
     def current(self, t: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """n K_t i / J (N,) of the winding's current along a motion (N, 4): what effects take from the drive acceleration is not in it."""
+        """n K_t i / J (N,) of the winding's current along a motion (N, 4): what effects take from the drive
+        acceleration is not in it.
+        """
         j = motion[:, 2]
         for name, values in self.effects:
             j = BY_NAME[name].winding(values, self.coefficients, t, motion, j)
@@ -178,22 +217,37 @@ class ReducedModel:
 
     @property
     def is_told_by_motion(self) -> bool:
-        """Whether the angle read, the speed and the drive at a moment tell all that comes: not what a delay, a sensor, a law or a second body remembers."""
-        return (not self.coupled and Coefficients(*self._lowered[0]).delay <= 0
-                and not any(_touches_sensor(name) or BY_NAME[name].memory for name, _ in self.effects))
+        """Whether the angle read, the speed and the drive at a moment tell all that comes: not what a delay, a sensor,
+        a law or a second body remembers.
+        """
+        return (
+            not self.coupled
+            and Coefficients(*self._lowered[0]).delay <= 0
+            and not any(_touches_sensor(name) or BY_NAME[name].memory for name, _ in self.effects)
+        )
 
     @property
     def has_tangents(self) -> bool:
-        """Whether ``tangents`` can tell how the output changes: of one body, on a bristle or not, that meets no stop, read by a sensor of a smooth law."""
+        """Whether ``tangents`` can tell how the output changes: of one body, on a bristle or not, that meets no stop,
+        read by a sensor of a smooth law.
+        """
         c = Coefficients(*self._lowered[0])
-        return (not self.has_motor_side and c.lower == -np.inf and c.upper == np.inf
-                and all(BY_NAME[name].tangible for name, _ in self.effects if _touches_sensor(name)))
+        return (
+            not self.has_motor_side
+            and c.lower == -np.inf
+            and c.upper == np.inf
+            and all(BY_NAME[name].tangible for name, _ in self.effects if _touches_sensor(name))
+        )
 
-    def tangents(self, t, u, path, others, scale, *, enable=None, load=None, y=None, gain=0.0, every=1) -> list[np.ndarray]:
-        """First-order changes (N, 4) of theta, omega, drive acceleration and reading along a ``path`` (see ``outputs``), towards each of the ``others``.
+    def tangents(
+        self, t, u, path, others, scale, *, enable=None, load=None, y=None, gain=0.0, every=1
+    ) -> list[np.ndarray]:
+        """First-order changes (N, 4) of theta, omega, drive acceleration and reading along a ``path`` (see
+        ``outputs``), towards each of the ``others``.
 
-        Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect. An observer's second way (see ``theta``)
-        is taken to follow what the other sensor adds, not what the change of the motion makes of it.
+        Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect. An
+        observer's second way (see ``theta``) is taken to follow what the other sensor adds, not what the change of the
+        motion makes of it.
         """
         c, on, p = self._lowered
         enable = np.ones(t.size, np.bool_) if enable is None else enable
@@ -209,14 +263,36 @@ class ReducedModel:
             if self._touches_reading or other._touches_reading:
                 added = (other.read(t, theta) - read) * scale
                 dy = (other.behind(y) - followed) * scale if instant else -added
-            tangent_kernel(t, arriving, (other._arriving(t, u) - arriving) * scale, enable, load, followed if instant else y, dy, path, maps, slopes,
-                           gain, every, c.copy(), on, p.copy(), c_2, on_2, p_2.copy(), scale, change)
+            tangent_kernel(
+                t,
+                arriving,
+                (other._arriving(t, u) - arriving) * scale,
+                enable,
+                load,
+                followed if instant else y,
+                dy,
+                path,
+                maps,
+                slopes,
+                gain,
+                every,
+                c.copy(),
+                on,
+                p.copy(),
+                c_2,
+                on_2,
+                p_2.copy(),
+                scale,
+                change,
+            )
             change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
             out.append(change)
         return out
 
     def _arriving(self, t: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Mean (N,) over each uniform sample of the input that arrives at the motor: after a dead time the impulse of a switch within a sample is exact."""
+        """Mean (N,) over each uniform sample of the input that arrives at the motor: after a dead time the impulse of a
+        switch within a sample is exact.
+        """
         u, delay, h = self.terminal(u), Coefficients(*self._lowered[0]).delay, t[1] - t[0]
         if delay <= 0:
             return u

@@ -9,7 +9,9 @@ from ers_mj.plants.stepping import unlogged
 
 
 class SampledMuJoCo:
-    """A MuJoCo plant under a voltage that is given sample by sample, with the interface of :class:`ers_mj.plants.sampled_reduced.SampledReduced`."""
+    """A MuJoCo plant under a voltage that is given sample by sample, with the interface of
+    :class:`ers_mj.plants.sampled_reduced.SampledReduced`.
+    """
 
     def __init__(self, plant: MechanicalPlant, rate_hz: float, start: tuple[float, float]):
         self._stepper = plant._stepper()

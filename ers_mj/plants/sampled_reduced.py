@@ -1,4 +1,6 @@
-"""The reduced model one sample at a time, its state carried: what a control loop needs, as event-exact as a free run."""
+"""The reduced model one sample at a time, its state carried: what a control loop needs, as event-exact as a free
+run.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +12,38 @@ from numba import njit, types
 from ers_mj.effects import BY_NAME
 from ers_mj.plants import fixed_steps
 from ers_mj.plants.compiled import compiled_cache
-from ers_mj.plants.events import (A_EMF, B, BRISTLE_CORNER, C_1, C_PLUS, CONTACT_STEP, CORNER, D_STOP, DELAY, K_BRISTLE, K_STOP, LOWER, RHO, TAU, TWO, UPPER,
-                                  _advance, _bounded, _cuts, _has_bristle, _last, _start_mode)
+from ers_mj.plants.events import (
+    A_EMF,
+    B,
+    BRISTLE_CORNER,
+    C_1,
+    C_PLUS,
+    CONTACT_STEP,
+    CORNER,
+    D_STOP,
+    DELAY,
+    K_BRISTLE,
+    K_STOP,
+    LOWER,
+    RHO,
+    TAU,
+    TWO,
+    UPPER,
+    _advance,
+    _bounded,
+    _cuts,
+    _has_bristle,
+    _last,
+    _start_mode,
+)
 from ers_mj.plants.laws import is_lawful, remember
 from ers_mj.plants.reduced import ReducedModel
 
 
 def _begin(t, c, on, p, x, m):
-    """Fill x (5,) after its first three entries, theta w j, and the mode m (5,) that fits them: both bodies together, a bristle bent."""
+    """Fill x (5,) after its first three entries, theta w j, and the mode m (5,) that fits them: both bodies together, a
+    bristle bent.
+    """
     lawful, bristle = is_lawful(on), _has_bristle(c)
     x[3], x[4] = x[0], 0.0
     if bristle:
@@ -31,7 +57,8 @@ def _begin(t, c, on, p, x, m):
 
 
 def _sample(t, h0, before, now, c, on, p, refine, x, m):
-    """Move x (5,) and m (5,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first, ``now`` afterwards.
+    """Move x (5,) and m (5,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first,
+    ``now`` afterwards.
 
     The slow road of events._simulate, which goes by the same segments. A motion that runs away becomes NaN.
     """
@@ -66,7 +93,9 @@ MODE, NUMBER = types.int64[::1], types.float64
 
 with compiled_cache():
     begin_kernel = njit(types.void(NUMBER, VECTOR, ROWS, LAWS, VECTOR, MODE), cache=True)(_begin)
-    sample_kernel = njit(types.void(NUMBER, NUMBER, NUMBER, NUMBER, VECTOR, ROWS, LAWS, types.int64, VECTOR, MODE), cache=True)(_sample)
+    sample_kernel = njit(
+        types.void(NUMBER, NUMBER, NUMBER, NUMBER, VECTOR, ROWS, LAWS, types.int64, VECTOR, MODE), cache=True
+    )(_sample)
 
 
 class SampledReduced:
@@ -116,7 +145,20 @@ class SampledReduced:
         self._sent = [*self._sent[1:], v]
         now = self._samples * self._h
         if self._fixed:
-            fixed_steps.sample_kernel(now, self._h, self._sent[0], self._sent[1], self._c, self._on, self._p, self._refine, self._x)
+            fixed_steps.sample_kernel(
+                now, self._h, self._sent[0], self._sent[1], self._c, self._on, self._p, self._refine, self._x
+            )
         else:
-            sample_kernel(now, self._h, self._sent[0], self._sent[1], self._c, self._on, self._p, self._refine, self._x, self._mode)
+            sample_kernel(
+                now,
+                self._h,
+                self._sent[0],
+                self._sent[1],
+                self._c,
+                self._on,
+                self._p,
+                self._refine,
+                self._x,
+                self._mode,
+            )
         self._samples += 1

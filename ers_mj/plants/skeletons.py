@@ -1,8 +1,8 @@
 """The bodies and joints of a MuJoCo plant, before any of Eq. (6)'s numbers acts on them.
-
-Two roads to one set of names: the rudder system in three dimensions from the folder mjcf/, for a servo with a datasheet, and
-one joint in output units (J = 1), for a plant of which only Eq. (6)'s coefficients are known. In both the joint ``rocker``
-is the output of the drive, ``gap`` the play behind it, and the tendon ``rudder_angle`` their sum, the absolute output.
+ Two roads to one set of names: the rudder system in three dimensions from the folder mjcf/, for a servo with a
+datasheet, and one joint in output units (J = 1), for a plant of which only Eq. (6)'s coefficients are known. In both
+the joint ``rocker`` is the output of the drive, ``gap`` the play behind it, and the tendon ``rudder_angle`` their sum,
+the absolute output.
 """
 
 from __future__ import annotations
@@ -70,7 +70,8 @@ def bodily(parameters: Mapping[str, float], is_angle: bool, b: float) -> Mapping
 def rudder_skeleton(c: Coefficients, parameters: Mapping[str, float], linkage: str) -> Skeleton:
     """The rudder system of mjcf/ with the inertia J, the ratio n and the torque constant K_t of a datasheet.
 
-    The share c.rho of J (MOTOR_SHARE with one body) sits on the motor's side. The rod, where there is one, comes on top.
+    The share c.rho of J (MOTOR_SHARE with one body) sits on the motor's side. The rod, where there is one, comes on
+    top.
 
     Raises:
         InputError: a parameter is missing or the linkage unknown.
@@ -96,7 +97,9 @@ def _load(name: str, has_play: bool) -> mujoco.MjSpec:
     """A model of the folder; without play the lines that name the joint ``gap`` are left out."""
     texts = read_mjcf()
     if not has_play:
-        texts = {key: "\n".join(line for line in text.splitlines() if '"gap"' not in line) for key, text in texts.items()}
+        texts = {
+            key: "\n".join(line for line in text.splitlines() if '"gap"' not in line) for key, text in texts.items()
+        }
     return mujoco.MjSpec.from_string(texts[name], include={key: text.encode() for key, text in texts.items()})
 
 
@@ -107,7 +110,13 @@ def _share_inertia(spec: mujoco.MjSpec, J: float, n: float, rho: float) -> tuple
     lever = LEVER_SHARE * J
     rudder = (1.0 - rho) * J - lever
     spec.body("nut").mass = nut / ARM**2
-    for body, inertia in {"motor": rotor, "rocker": rocker, "rudder": rudder, "lever_up": lever, "lever_down": lever}.items():
+    for body, inertia in {
+        "motor": rotor,
+        "rocker": rocker,
+        "rudder": rudder,
+        "lever_up": lever,
+        "lever_down": lever,
+    }.items():
         spec.body(body).inertia = [inertia] * 3
     return rocker, rudder
 
@@ -123,8 +132,12 @@ def _rod_pose(n: float) -> Pose:
         rise, slope = ARM * (1.0 - math.cos(theta)), ARM * math.sin(theta)
         level = math.sqrt(ROD**2 - rise**2)
         nut, rate = slope + ROD - level, ARM * math.cos(theta) + rise * slope / level
-        return {"rocker": (theta, 1.0), "nut": (nut, rate), "rotor": (nut * n / ARM, rate * n / ARM),
-                "rod": (math.asin(rise / ROD), slope / level)}
+        return {
+            "rocker": (theta, 1.0),
+            "nut": (nut, rate),
+            "rotor": (nut * n / ARM, rate * n / ARM),
+            "rod": (math.asin(rise / ROD), slope / level),
+        }
 
     return pose
 
@@ -145,12 +158,16 @@ def lumped_skeleton(c: Coefficients, is_angle: bool) -> Skeleton:
     rho = c.rho if c.has_motor_side else MOTOR_SHARE
     rocker = _lumped_body(spec.worldbody, "rocker", rho, is_angle, "rocker")
     rudder = _lumped_body(rocker, "rudder", 1.0 - rho - LEVER_SHARE, is_angle, "gap" if c.has_motor_side else "")
-    rudder.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.3, 0.1, 0.01], pos=[0.2, 0, 0], mass=0, contype=0, conaffinity=0)
+    rudder.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.3, 0.1, 0.01], pos=[0.2, 0, 0], mass=0, contype=0, conaffinity=0
+    )
     for name in ("lever_up", "lever_down"):
         _lumped_body(spec.worldbody, name, LEVER_SHARE, is_angle, name)
     _lumped_tendons(spec, ["rocker", "gap"] if c.has_motor_side else ["rocker"])
     _lumped_actuators(spec)
-    return Skeleton(spec, 1.0, 1.0, 1.0, "rocker", is_angle, lambda theta: {"rocker": (theta, 1.0)}, (rho, 1 - rho - LEVER_SHARE))
+    return Skeleton(
+        spec, 1.0, 1.0, 1.0, "rocker", is_angle, lambda theta: {"rocker": (theta, 1.0)}, (rho, 1 - rho - LEVER_SHARE)
+    )
 
 
 def _lumped_body(parent: mujoco.MjsBody, name: str, inertia: float, is_angle: bool, joint: str) -> mujoco.MjsBody:

@@ -1,4 +1,6 @@
-"""A plant on its stage: the floor, the lights and the camera of mjcf/scene.xml around it, and a shape for a lumped joint."""
+"""A plant on its stage: the floor, the lights and the camera of mjcf/scene.xml around it, and a shape for a lumped
+joint.
+"""
 
 from __future__ import annotations
 
@@ -89,10 +91,16 @@ def _shape_blade(spec: mujoco.MjSpec) -> None:
 def _shape_slide(spec: mujoco.MjSpec, scale: float) -> None:
     """A lumped position: a carriage on a rail."""
     box = mujoco.mjtGeom.mjGEOM_BOX
-    for size, pos, rgba in (((0.15, 0.012, 0.006), (0, 0.03, -0.045), WHITE), ((0.15, 0.004, 0.006), (0, 0.03, -0.033), STEEL)):
+    for size, pos, rgba in (
+        ((0.15, 0.012, 0.006), (0, 0.03, -0.045), WHITE),
+        ((0.15, 0.004, 0.006), (0, 0.03, -0.033), STEEL),
+    ):
         _add(spec.worldbody, box, _times(scale, size), _times(scale, pos), rgba)
     rudder = _bare(spec, "rudder")
-    for size, pos, rgba in (((0.030, 0.025, 0.010), (0, 0.03, -0.017), BLUE), ((0.004, 0.025, 0.004), (0, 0.03, -0.003), RED)):
+    for size, pos, rgba in (
+        ((0.030, 0.025, 0.010), (0, 0.03, -0.017), BLUE),
+        ((0.004, 0.025, 0.004), (0, 0.03, -0.003), RED),
+    ):
         _add(rudder, box, _times(scale, size), _times(scale, pos), rgba)
 
 

@@ -16,14 +16,15 @@ from ers_mj.plants.mjcf import unlogged
 
 MOTOR_GROUP = 1  # actuator group that an open circuit disables
 TIME_CONSTANT = 0  # where MuJoCo keeps a motor's electrical time constant in its actuator's dynprm
-LAW_STEPS = 4  # steps over which a law keeps its value; one beside a bristle, whose level is stiff, and where the inductance falls
+# steps over which a law keeps its value; one beside a bristle, whose level is stiff, and where the inductance falls
+LAW_STEPS = 4
 LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dynprm
 
 
 @dataclass(frozen=True)
 class Law:
-    """A law that the stepping evaluates: an effect's torque, friction, inertia or memory (see effects/base.py) and its constants p; its torque and memory
-    are the motor's where that is a body of its own and the law ``at_motor``."""
+    """A law that the stepping evaluates: an effect's torque, friction, inertia or memory (see effects/base.py) and its
+    constants p; its torque and memory are the motor's where that is a body of its own and the law ``at_motor``."""
 
     name: str
     p: np.ndarray
@@ -36,7 +37,8 @@ class Law:
 
 @dataclass(frozen=True)
 class Observer:
-    """Corrections on the way, as events.simulate_kernel makes them: at one sample in ``every`` the output is moved by gain (y - theta).
+    """Corrections on the way, as events.simulate_kernel makes them: at one sample in ``every`` the output is moved by
+    gain (y - theta).
 
     ``moved(theta, by)`` gives {joint: change of its position} of such a move; y is (N,), NaN where there is none.
     """
@@ -51,8 +53,8 @@ class Observer:
 class Stepper:
     """One run of one plant, on a copy of its model.
 
-    ``inertia``, ``ratio`` and ``motor_joint`` are the skeleton's; ``activation`` turns the motor's activation into a drive
-    acceleration.
+    ``inertia``, ``ratio`` and ``motor_joint`` are the skeleton's; ``activation`` turns the motor's activation into a
+    drive acceleration.
     """
 
     model: mujoco.MjModel
@@ -98,7 +100,9 @@ class Stepper:
             self.data.act[self.model.actuator_actadr[self.bristle]] = start["bristle"][0]
 
     @unlogged()
-    def run(self, t: np.ndarray, u: np.ndarray, delay: float, enable=None, load=None, observer: Observer | None = None) -> np.ndarray:
+    def run(
+        self, t: np.ndarray, u: np.ndarray, delay: float, enable=None, load=None, observer: Observer | None = None
+    ) -> np.ndarray:
         """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration."""
         model, data, rows = self.model, self.data, np.full((t.size, 5), np.nan)
         late = _delayed(t, u, delay) if delay > 0 else None
@@ -176,16 +180,22 @@ class Stepper:
         return theta, omega, theta, v[self.rotor] / self.ratio, self.drive
 
     def _apply_laws(self, v: float, load: float, h: float) -> None:
-        """Set load torque, motor torque, frictionloss, armature and inductance from the laws at the present state, for the next h [s]."""
+        """Set load torque, motor torque, frictionloss, armature and inductance from the laws at the present state, for
+        the next h [s].
+        """
         theta, w, theta_m, w_m, _ = self._observe()
         j, t, c = self._drive(v), self.data.time, self.c
         if self.falls:
-            self.model.actuator_dynprm[self.motor, TIME_CONSTANT] = c.tau_e * max(1.0 / (1.0 + (c.fall * j) ** 2), LEAST_IRON)
+            self.model.actuator_dynprm[self.motor, TIME_CONSTANT] = c.tau_e * max(
+                1.0 / (1.0 + (c.fall * j) ** 2), LEAST_IRON
+            )
         for memory, p, own in self.memories:
             p[-1] = memory(p, theta_m if own else theta, w_m if own else w, j, h)
         force = load + sum(torque(p, theta, w, j, t) for torque, p, own in self.torques if not own)
         if c.has_motor_side:
-            self.data.qfrc_applied[self.turning] = self.inertia * sum(torque(p, theta_m, w_m, j, t) for torque, p, own in self.torques if own)
+            self.data.qfrc_applied[self.turning] = self.inertia * sum(
+                torque(p, theta_m, w_m, j, t) for torque, p, own in self.torques if own
+            )
         for inertia, p in self.inertias:
             relative, half_slope = inertia(p, theta)
             self.model.dof_armature[self.turning] = self.armature + self.inertia * (relative - 1.0)
@@ -194,13 +204,19 @@ class Stepper:
             share = 1.0 - c.phi if c.has_motor_side else 1.0
             up, down = self._levels(theta, w, j)
             if c.has_motor_side:
-                self.model.dof_frictionloss[self.turning] = 0.5 * c.phi * self.inertia * sum(self._levels(theta, w_m, j))
+                self.model.dof_frictionloss[self.turning] = (
+                    0.5 * c.phi * self.inertia * sum(self._levels(theta, w_m, j))
+                )
             if self.bristle is None:
                 self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
                 force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
             else:
-                self.model.actuator_biasprm[self.bristle, 3:5] = share * self.inertia * self._yielding(up if w > 0 else down, w)
-                self.model.actuator_dynprm[self.bristle, LUGRE_DAMPING] = share * self.inertia * c.d_bristle * math.exp(-(w / c.fade) ** 2)
+                self.model.actuator_biasprm[self.bristle, 3:5] = (
+                    share * self.inertia * self._yielding(up if w > 0 else down, w)
+                )
+                self.model.actuator_dynprm[self.bristle, LUGRE_DAMPING] = (
+                    share * self.inertia * c.d_bristle * math.exp(-((w / c.fade) ** 2))
+                )
         self.data.ctrl[self.load] = self.inertia * force
 
     def _levels(self, theta: float, w: float, j: float) -> tuple[float, float]:
@@ -211,8 +227,12 @@ class Stepper:
         return up, down
 
     def _yielding(self, level: float, w: float) -> float:
-        """The level at which MuJoCo's bristle, of exponent 1, bends as fast as one of another exponent under this ``level`` (both per inertia)."""
-        share = math.copysign(1.0, w) * self.c.k_bristle * self.data.act[self.model.actuator_actadr[self.bristle]] / level
+        """The level at which MuJoCo's bristle, of exponent 1, bends as fast as one of another exponent under this
+        ``level`` (both per inertia).
+        """
+        share = (
+            math.copysign(1.0, w) * self.c.k_bristle * self.data.act[self.model.actuator_actadr[self.bristle]] / level
+        )
         if self.c.dahl == 1.0:
             return level
         if abs(share) < 1e-9:
@@ -230,7 +250,9 @@ def _delayed(t: np.ndarray, u: np.ndarray, delay: float) -> Callable[[np.ndarray
 
 @unlogged()
 def step_many(steppers: Sequence[Stepper], t: np.ndarray, u: np.ndarray, jobs: int = 0) -> np.ndarray:
-    """Rows (M, N, 5) as Stepper.run's, of plants without laws or delay and of one layout, on ``jobs`` cores (0: all); u is (M, N)."""
+    """Rows (M, N, 5) as Stepper.run's, of plants without laws or delay and of one layout, on ``jobs`` cores (0: all); u
+    is (M, N).
+    """
     first = steppers[0]
     batch = mujoco.batch.Batch(first.model, len(steppers), jobs)
     h, steps = first._divide(t[1] - t[0])

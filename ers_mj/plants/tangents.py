@@ -1,19 +1,19 @@
-"""How a motion of one body changes with anything that its model is made of, to first order, without simulating it again.
-
-Along a motion (theta, w, j) that the kernel of events.py has made, the change (a, b, d) of the three obeys the same equations within
-each mode, driven by what the changed model adds to the forces there. Where the mode changes inside a sample:
+"""How a motion of one body changes with anything that its model is made of, to first order, without simulating it
+again.
+ Along a motion (theta, w, j) that the kernel of events.py has made, the change (a, b, d) of the three obeys the same
+equations within each mode, driven by what the changed model adds to the forces there. Where the mode changes inside a
+sample:
 
     slip ends        the speed's change ends with it, the angle's stays
     slip begins      the force balance is zero there: nothing jumps
     w passes zero    b is stretched by the accelerations' ratio, after over before
     theta_0 crossed  the preload's jump strikes earlier or later: b loses 2 c_1 (a - d theta_0) / |w|
     caught at theta_0    the angle follows it, from when the preload can stop the rudder within a sample
-
-A rudder on a bristle (see events.py) has no such instants: its friction is a force that bends, stiff while it holds, and its change is one more state,
-stepped implicitly.
-
-The instants are taken from the states at the ends of the sample, so a column is good to a few per cent: enough for the steps of a
-search, which weighs every step by a simulation. One costs about as much as a simulation of the bare plant, half of one under a law.
+ A rudder on a bristle (see events.py) has no such instants: its friction is a force that bends, stiff while it holds,
+and its change is one more state, stepped implicitly.
+ The instants are taken from the states at the ends of the sample, so a column is good to a few per cent: enough for the
+steps of a search, which weighs every step by a simulation. One costs about as much as a simulation of the bare plant,
+half of one under a law.
 """
 
 from __future__ import annotations
@@ -24,14 +24,42 @@ import numpy as np
 from numba import njit, types
 
 from ers_mj.plants.compiled import compiled_cache, inlined
-from ers_mj.plants.events import (A_1, A_EMF, A_MINUS, A_PLUS, B, BIAS, C_1, C_MINUS, C_PLUS, DAHL, D_BRISTLE, FADE, K_BRISTLE, READ, READ_BOOL, ROWS, LAWS, TAU,
-                                  THETA_0, VECTOR, _derivative, _extra, _fill_map, _has_bristle, _level)
+from ers_mj.plants.events import (
+    A_1,
+    A_EMF,
+    A_MINUS,
+    A_PLUS,
+    B,
+    BIAS,
+    C_1,
+    C_MINUS,
+    C_PLUS,
+    DAHL,
+    D_BRISTLE,
+    FADE,
+    K_BRISTLE,
+    READ,
+    READ_BOOL,
+    ROWS,
+    LAWS,
+    TAU,
+    THETA_0,
+    VECTOR,
+    _derivative,
+    _extra,
+    _fill_map,
+    _has_bristle,
+    _level,
+)
 from ers_mj.plants.laws import remember
 
 NUDGE = 1e-6  # of the motion's largest angle, speed and drive: step of a law's slopes
-MOST = 10.0  # times the motion's extent and largest speed by which a unit of change may move it: beyond, stick and slip only fork otherwise
+# times the motion's extent and largest speed by which a unit of change may move it: beyond, stick and slip only fork
+# otherwise
+MOST = 10.0
 CORNER = 1e-12  # [output unit] within which a rudder at rest is held in the corner
-AHEAD = 0.6  # of a sample, at which the forces of a bristle's step are taken: beyond the middle, so that what is stiff dies out
+# of a sample, at which the forces of a bristle's step are taken: beyond the middle, so that what is stiff dies out
+AHEAD = 0.6
 
 
 @inlined
@@ -55,8 +83,8 @@ def _direct(c, dc, on, p, on_2, p_2, c_2, laws, scale, load, t, x, s, side):
 
 
 def _prepare(t, load, path, c, on, p, maps, out):
-    """Fill maps (2, 3, 5, 14) for a closed and an open circuit, by slip (see events), and out (N, 3) with the slopes of the laws' force
-    by theta, w and j along the motion."""
+    """Fill maps (2, 3, 5, 14) for a closed and an open circuit, by slip (see events), and out (N, 3) with the slopes of
+    the laws' force by theta, w and j along the motion."""
     h = t[1] - t[0]
     if not _has_bristle(c):
         made = np.empty((5, 17))
@@ -141,13 +169,17 @@ def _along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, on
         share, ratio, m = 1.0, 1.0, s
         if s == 0:
             m = s_1
-            forward = _acceleration(c, on, p, lawful, t[k + 1], x_1, s_1, int(side_1), drive, rate_tau, rate_emf, load[k])
+            forward = _acceleration(
+                c, on, p, lawful, t[k + 1], x_1, s_1, int(side_1), drive, rate_tau, rate_emf, load[k]
+            )
             share = min(1.0, 2.0 * w_1 / (forward * h)) if forward * w_1 > 0 else 1.0
         elif s_1 != s:
             before = _acceleration(c, on, p, lawful, t[k], x, s, int(side), drive, rate_tau, rate_emf, load[k])
             share = min(1.0, -w / (before * h)) if before * w < 0 else 1.0
             if s_1 != 0:
-                after = _acceleration(c, on, p, lawful, t[k + 1], x_1, s_1, int(side_1), drive, rate_tau, rate_emf, load[k])
+                after = _acceleration(
+                    c, on, p, lawful, t[k + 1], x_1, s_1, int(side_1), drive, rate_tau, rate_emf, load[k]
+                )
                 ratio = min(max(after / before, 0.0), 1.0) if before != 0.0 else 1.0
                 m = s if share > 0.5 else s_1
                 share = 1.0
@@ -183,7 +215,11 @@ def _along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, on
                 b_1 -= 2.0 * c[C_1] * (a_1 - dc[THETA_0]) / passing
             else:
                 a_1, b_1 = dc[THETA_0], 0.0
-        a, b, d = min(max(a_1, -MOST * (high - low)), MOST * (high - low)), min(max(b_1, -MOST * fastest), MOST * fastest), d_1
+        a, b, d = (
+            min(max(a_1, -MOST * (high - low)), MOST * (high - low)),
+            min(max(b_1, -MOST * fastest), MOST * fastest),
+            d_1,
+        )
 
 
 @inlined
@@ -194,7 +230,9 @@ def _fading(c, w):
 
 @inlined
 def _unbent(c, left, way):
-    """What is left of a bristle's share of its level to bend, which was ``left``, after a way counted in the displacement of its whole bend."""
+    """What is left of a bristle's share of its level to bend, which was ``left``, after a way counted in the
+    displacement of its whole bend.
+    """
     if c[DAHL] == 1.0 or left <= 0.0:
         return left * math.exp(-way)
     power = 1.0 - c[DAHL]
@@ -203,7 +241,9 @@ def _unbent(c, left, way):
 
 @inlined
 def _along_bristle(t, u, du, enable, load, y, dy, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out):
-    """See ``_tangent``: of a rudder on a bristle, whose bend z along the path and its change bent are integrated here."""
+    """See ``_tangent``: of a rudder on a bristle, whose bend z along the path and its change bent are integrated
+    here.
+    """
     n, h = t.size, t[1] - t[0]
     lawful, k = on[0, 0] + on[1, 0] > 0, c[K_BRISTLE]
     lawful_2 = on_2[0, 0] + on_2[1, 0] > 0
@@ -260,15 +300,35 @@ def _along_bristle(t, u, du, enable, load, y, dy, path, slopes, gain, every, c, 
             passed = min(max((c[THETA_0] - theta) / (theta_1 - theta), 0.0), 1.0)
         viscous, more = (c[A_PLUS], dc[A_PLUS]) if s > 0 else (c[A_MINUS], dc[A_MINUS])
         damping = _fading(c, x[1])
-        force = (dc[BIAS] + dc[A_1] * (c[THETA_0] - x[0]) + c[A_1] * dc[THETA_0] - dc[C_1] * (side * passed + side_1 * (1.0 - passed)) - more * x[1]
-                 - dc[K_BRISTLE] * z_mean - (_fading(c_2, x[1]) - damping) * scale * (z_1 - z) / h)
+        force = (
+            dc[BIAS]
+            + dc[A_1] * (c[THETA_0] - x[0])
+            + c[A_1] * dc[THETA_0]
+            - dc[C_1] * (side * passed + side_1 * (1.0 - passed))
+            - more * x[1]
+            - dc[K_BRISTLE] * z_mean
+            - (_fading(c_2, x[1]) - damping) * scale * (z_1 - z) / h
+        )
         if lawful or lawful_2:
-            force += (_extra(c_2, on_2, p_2, load[i], t[i] + 0.5 * h, x, s) - _extra(c, on, p, load[i], t[i] + 0.5 * h, x, s)) * scale
+            force += (
+                _extra(c_2, on_2, p_2, load[i], t[i] + 0.5 * h, x, s) - _extra(c, on, p, load[i], t[i] + 0.5 * h, x, s)
+            ) * scale
         bent_0, per_speed = (bent + part * grows) / (1.0 + part * lets_go), part * bends / (1.0 + part * lets_go)
-        drawn, back = (pull, -emf) if rate <= 0 else ((d + part / rate * pull) / (1.0 + part / rate), -part / rate * emf / (1.0 + part / rate))
+        drawn, back = (
+            (pull, -emf)
+            if rate <= 0
+            else ((d + part / rate * pull) / (1.0 + part / rate), -part / rate * emf / (1.0 + part / rate))
+        )
         spring, share = c[A_1] - slopes[i, 0], 1.0 + slopes[i, 2]
-        b_m = ((b / part + force - spring * a + share * drawn - k * bent_0 - damping * (bent_0 - bent) / part)
-               / (1.0 / part + spring * part + viscous - slopes[i, 1] - share * back + k * per_speed + damping * per_speed / part))
+        b_m = (b / part + force - spring * a + share * drawn - k * bent_0 - damping * (bent_0 - bent) / part) / (
+            1.0 / part
+            + spring * part
+            + viscous
+            - slopes[i, 1]
+            - share * back
+            + k * per_speed
+            + damping * per_speed / part
+        )
         a_1, b_1 = a + h * b_m, b + (b_m - b) / AHEAD
         d = drawn + back * b_m if rate <= 0 else d + (drawn + back * b_m - d) / AHEAD
         bent += (bent_0 + per_speed * b_m - bent) / AHEAD
@@ -283,17 +343,20 @@ def _along_bristle(t, u, du, enable, load, y, dy, path, slopes, gain, every, c, 
 
 
 def _tangent(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, scale, out):
-    """Fill out (N, >= 3) with the change of (theta, w, j) per unit of the change that made c_2, on_2, p_2 of c, on, p, times ``scale``.
+    """Fill out (N, >= 3) with the change of (theta, w, j) per unit of the change that made c_2, on_2, p_2 of c, on, p,
+    times ``scale``.
 
-    ``du`` (N,) and ``dy`` (N,) are the changes per unit of the input and of what an observer follows. The rest as in simulate_kernel, which has made
-    ``path`` (N, >= 3) of it.
+    ``du`` (N,) and ``dy`` (N,) are the changes per unit of the input and of what an observer follows. The rest as in
+    simulate_kernel, which has made ``path`` (N, >= 3) of it.
     """
     dc = np.zeros(c.size)
     for i in range(c.size):
         if c[i] != c_2[i]:
             dc[i] = (c_2[i] - c[i]) * scale
     if _has_bristle(c):
-        _along_bristle(t, u, du, enable, load, y, dy, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
+        _along_bristle(
+            t, u, du, enable, load, y, dy, path, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out
+        )
     else:
         _along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, on, p, c_2, on_2, p_2, dc, scale, out)
 
@@ -301,6 +364,32 @@ def _tangent(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, 
 TABLE, MAPS = types.float64[:, ::1], types.float64[:, :, :, ::1]
 
 with compiled_cache():
-    prepare_kernel = njit(types.void(READ, READ, TABLE, VECTOR, ROWS, LAWS, MAPS, TABLE), nogil=True, cache=True)(_prepare)
-    tangent_kernel = njit(types.void(READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, types.float64, types.int64, VECTOR, ROWS, LAWS,
-                                     VECTOR, ROWS, LAWS, types.float64, TABLE), nogil=True, cache=True)(_tangent)
+    prepare_kernel = njit(types.void(READ, READ, TABLE, VECTOR, ROWS, LAWS, MAPS, TABLE), nogil=True, cache=True)(
+        _prepare
+    )
+    tangent_kernel = njit(
+        types.void(
+            READ,
+            READ,
+            READ,
+            READ_BOOL,
+            READ,
+            READ,
+            READ,
+            TABLE,
+            MAPS,
+            TABLE,
+            types.float64,
+            types.int64,
+            VECTOR,
+            ROWS,
+            LAWS,
+            VECTOR,
+            ROWS,
+            LAWS,
+            types.float64,
+            TABLE,
+        ),
+        nogil=True,
+        cache=True,
+    )(_tangent)

@@ -1,11 +1,12 @@
-"""Eq. (6)'s coefficients written into a skeleton: every force of a MuJoCo plant, from the record that the reduced model uses.
+"""Eq. (6)'s coefficients written into a skeleton: every force of a MuJoCo plant, from the record that the reduced model
+uses.
 
 With J the inertia and h the timestep, on the absolute output theta:
 
     spring J a_1 (theta - theta_0), damping J a_mech, frictionloss J c_2, levers J c_1, motor n K_t i = J j
-
-Rigid limits have a time constant of 2 h, the stiffest that MuJoCo integrates. A limit with a negative solref is a physical
-spring-damper K, D if its impedance is the smallest one and both are scaled by the inverse inertia A that it acts on.
+ Rigid limits have a time constant of 2 h, the stiffest that MuJoCo integrates. A limit with a negative solref is a
+physical spring-damper K, D if its impedance is the smallest one and both are scaled by the inverse inertia A that it
+acts on.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ RIGID = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 PLAY = [0.99, 0.9999, 1e-5, 0.5, 2.0]
 OVERDAMPED = 2.0  # damping ratio of the play's rigid ends: a limit that does not pull still bounces at critical damping
 ELASTIC = [1e-4, 1e-4, 0.001, 0.5, 2.0]  # mjMINIMP: the limit's force does not depend on the other forces
-RESOLVED = 0.8  # decay rate [1/s] of a contact times h, above which a rigid limit is nearer to it than its own spring-damper
+RESOLVED = (
+    0.8  # decay rate [1/s] of a contact times h, above which a rigid limit is nearer to it than its own spring-damper
+)
 NO_TORQUE = 1e-9  # [N m/A] the constant of a motor that only rubs
 FAR = 1e6  # [output unit] an end that is not there
 
@@ -66,8 +69,9 @@ def _write_solver(spec: mujoco.MjSpec, h: float) -> None:
 def _write_motor(skeleton: Skeleton, c: Coefficients) -> None:
     """The motor: ctrl the input, force the current [A].
 
-    One constant K stands for K_t and K_e in MuJoCo. With the gear K_t, the constant K_e/K_t and the impedance (R, L) times
-    K_e/K_t both keep their values: torque K_t i, back-EMF K_e w_m. From Eq. (6): n K_e = a_emf/b, R = n K_t/(J b).
+    One constant K stands for K_t and K_e in MuJoCo. With the gear K_t, the constant K_e/K_t and the impedance (R, L)
+    times K_e/K_t both keep their values: torque K_t i, back-EMF K_e w_m. From Eq. (6): n K_e = a_emf/b, R = n K_t/(J
+    b).
     """
     motor = skeleton.spec.actuator("motor")
     motor.gear[0] = math.copysign(skeleton.K_t, c.b)
@@ -84,7 +88,9 @@ def _write_motor(skeleton: Skeleton, c: Coefficients) -> None:
 
 
 def _write_friction(skeleton: Skeleton, c: Coefficients) -> None:
-    """Dry and viscous friction, shared by rocker and rudder; the asymmetry of the dry one is a constant torque, on a bristle a law."""
+    """Dry and viscous friction, shared by rocker and rudder; the asymmetry of the dry one is a constant torque, on a
+    bristle a law.
+    """
     J, tendon, rocker = skeleton.inertia, skeleton.spec.tendon("rudder_angle"), skeleton.spec.joint("rocker")
     beta, phi = (c.beta, c.phi) if c.has_motor_side else (0.0, 0.0)
     damping, level = 0.5 * J * (c.a_mech_plus + c.a_mech_minus), 0.5 * J * (c.c_2_plus + c.c_2_minus)
@@ -95,15 +101,32 @@ def _write_friction(skeleton: Skeleton, c: Coefficients) -> None:
         _write_bristle(skeleton, c, 1 - phi, level)
         tendon.frictionloss, push = 0.0, J * c.bias
     if push:
-        skeleton.spec.add_actuator(name="bias", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle", gainprm=np.zeros(10),
-                                   biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[push, *[0.0] * 9])
+        skeleton.spec.add_actuator(
+            name="bias",
+            trntype=mujoco.mjtTrn.mjTRN_TENDON,
+            target="rudder_angle",
+            gainprm=np.zeros(10),
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            biasprm=[push, *[0.0] * 9],
+        )
 
 
 def _write_bristle(skeleton: Skeleton, c: Coefficients, share: float, level: float) -> None:
-    """LuGre friction, which MuJoCo has as a part of a motor: one without torque, its activation the bristle's deflection."""
+    """LuGre friction, which MuJoCo has as a part of a motor: one without torque, its activation the bristle's
+    deflection.
+    """
     bristle = skeleton.spec.add_actuator(name="bristle", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="rudder_angle")
-    bristle.set_to_dcmotor(motorconst=[NO_TORQUE, NO_TORQUE], resistance=1.0,
-                           lugre=[share * skeleton.inertia * c.k_bristle, share * skeleton.inertia * c.d_bristle, share * level, share * level, 1.0])
+    bristle.set_to_dcmotor(
+        motorconst=[NO_TORQUE, NO_TORQUE],
+        resistance=1.0,
+        lugre=[
+            share * skeleton.inertia * c.k_bristle,
+            share * skeleton.inertia * c.d_bristle,
+            share * level,
+            share * level,
+            1.0,
+        ],
+    )
 
 
 def _write_spring(skeleton: Skeleton, c: Coefficients) -> None:
@@ -131,17 +154,25 @@ def _write_stops(skeleton: Skeleton, c: Coefficients) -> None:
 
 
 def _write_play(skeleton: Skeleton, c: Coefficients) -> None:
-    """The play: elastic where c gives its contact a stiffness and the timestep resolves its damping, else rigid; a shaft if it has no width."""
+    """The play: elastic where c gives its contact a stiffness and the timestep resolves its damping, else rigid; a
+    shaft if it has no width.
+    """
     joint, (rocker, rudder) = skeleton.spec.joint("gap"), skeleton.local
     if c.gap <= 0:
         joint.limited = False
         stiffness = skeleton.inertia * c.k_twist
-        joint.stiffness, joint.damping = [stiffness, 0.0, stiffness * c.harden], [skeleton.inertia * c.d_twist, 0.0, 0.0]
+        joint.stiffness, joint.damping = (
+            [stiffness, 0.0, stiffness * c.harden],
+            [skeleton.inertia * c.d_twist, 0.0, 0.0],
+        )
         return
     joint.limited, joint.range, joint.solimp_limit = True, [-c.gap, c.gap], PLAY
     joint.solref_limit = [2 * skeleton.spec.option.timestep, OVERDAMPED]
     if c.k_twist > 0 and c.d_twist / (c.rho * (1.0 - c.rho)) * skeleton.spec.option.timestep < RESOLVED:
-        joint.solref_limit, joint.solimp_limit = _elastic(skeleton, 1 / rocker + 1 / rudder, c.k_twist, c.d_twist), ELASTIC
+        joint.solref_limit, joint.solimp_limit = (
+            _elastic(skeleton, 1 / rocker + 1 / rudder, c.k_twist, c.d_twist),
+            ELASTIC,
+        )
 
 
 def _elastic(skeleton: Skeleton, mobility: float, stiffness: float, damping: float) -> list[float]:

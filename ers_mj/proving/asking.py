@@ -1,4 +1,6 @@
-"""Asks the diagnosis about one case, blind: a fresh process in an empty folder that holds its recordings and datasheet, nothing else."""
+"""Asks the diagnosis about one case, blind: a fresh process in an empty folder that holds its recordings and datasheet,
+nothing else.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ class Asker:
         self.stopped = False
 
     def ask(self, case: Path) -> dict | None:
-        """The answer with what it cost; a failure or a run out of time is an answer without a document. None once stopped."""
+        """The answer with what it cost; a failure or a run out of time is an answer without a document. None once
+        stopped.
+        """
         bound = {"case": case.name, "files_sha256": hashes(case), "code": self.code}
         with tempfile.TemporaryDirectory(prefix="ers-blind-") as folder:
             for path in case.iterdir():
@@ -45,28 +49,59 @@ class Asker:
         except ValueError:
             error = "its answer is no JSON"
         if document is None and error is None:
-            late = cost["exit"] in (-signal.SIGXCPU, -signal.SIGKILL) and max(cost["cpu_s"], cost["wall_s"]) > 0.9 * self.limit
-            error = f"no answer within {self.limit:g} s" if late else (complaint.strip().splitlines() or [f"exit code {cost['exit']}"])[-1][:300]
+            late = (
+                cost["exit"] in (-signal.SIGXCPU, -signal.SIGKILL)
+                and max(cost["cpu_s"], cost["wall_s"]) > 0.9 * self.limit
+            )
+            error = (
+                f"no answer within {self.limit:g} s"
+                if late
+                else (complaint.strip().splitlines() or [f"exit code {cost['exit']}"])[-1][:300]
+            )
         return {**bound, **cost, "error": error, "document": document}
 
     def _run(self, folder: Path) -> tuple[dict, str, str]:
-        recordings = sorted((p.name for p in folder.iterdir() if p.name.startswith("rec")), key=lambda name: (len(name), name))
+        recordings = sorted(
+            (p.name for p in folder.iterdir() if p.name.startswith("rec")), key=lambda name: (len(name), name)
+        )
         sheet = ["--datasheet", "datasheet.toml"] if (folder / "datasheet.toml").exists() else []
-        command = [sys.executable, "-c", START.format(limit=int(self.limit)), "diagnose", *recordings, *sheet, "--json", "--jobs", "1"]
+        command = [
+            sys.executable,
+            "-c",
+            START.format(limit=int(self.limit)),
+            "diagnose",
+            *recordings,
+            *sheet,
+            "--json",
+            "--jobs",
+            "1",
+        ]
         package = str(Path(__file__).resolve().parents[2])
         paths = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
         single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
         began = time.monotonic()
         with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
-            child = subprocess.Popen(command, cwd=folder, env={**os.environ, **single, "PYTHONPATH": paths}, stdin=subprocess.DEVNULL,
-                                     stdout=out, stderr=err, start_new_session=True)
+            child = subprocess.Popen(
+                command,
+                cwd=folder,
+                env={**os.environ, **single, "PYTHONPATH": paths},
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=err,
+                start_new_session=True,
+            )
             self.children.add(child)
             code, usage = self._wait(child, began)
             self.children.discard(child)
             out.seek(0), err.seek(0)
             text, complaint = out.read(), err.read()
         scale = 2**20 if sys.platform == "darwin" else 2**10
-        cost = {"exit": code, "wall_s": time.monotonic() - began, "cpu_s": usage.ru_utime + usage.ru_stime, "peak_MiB": usage.ru_maxrss / scale}
+        cost = {
+            "exit": code,
+            "wall_s": time.monotonic() - began,
+            "cpu_s": usage.ru_utime + usage.ru_stime,
+            "peak_MiB": usage.ru_maxrss / scale,
+        }
         return cost, text, complaint
 
     def _wait(self, child: subprocess.Popen, began: float) -> tuple[int, object]:

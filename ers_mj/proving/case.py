@@ -1,4 +1,6 @@
-"""One case of the proof: a servo is drawn, something is concealed in it, MuJoCo records it; what is handed out, and the truth."""
+"""One case of the proof: a servo is drawn, something is concealed in it, MuJoCo records it; what is handed out, and the
+truth.
+"""
 
 from __future__ import annotations
 
@@ -70,40 +72,98 @@ def make(plan: Plan, seed: int) -> tuple[dict[str, str], dict]:
     servo = draw_servo(rng, 0.0, RATES, WEIGHTS)
     linkage = "rod" if "variable_ratio" in plan.labels and rng.random() < ROD else "constant"
     ruler, context = Ruler(servo), servo["context"]
-    concealed = [conceal(rng, ruler, name, context) for name in plan.labels if (name, linkage) != ("variable_ratio", "rod")]
+    concealed = [
+        conceal(rng, ruler, name, context) for name in plan.labels if (name, linkage) != ("variable_ratio", "rod")
+    ]
     faint = clutter(rng, ruler, [*plan.labels, *(TWO_MASS if linkage == "rod" else ())], context)
     step = float(np.exp(rng.uniform(np.log(FINE_STEP), np.log(ROUGH_STEP))))
     runs = [_recorded(servo, k, [*concealed, *faint], linkage, step) for k in range(len(servo["records"]))]
     left = refit(servo, runs, 8)
     if linkage == "rod":
-        concealed.append({"label": "variable_ratio", "strength_name": "rod linkage of mjcf/", "strength": None, "shape": {"form": "rod"}})
+        concealed.append(
+            {
+                "label": "variable_ratio",
+                "strength_name": "rod linkage of mjcf/",
+                "strength": None,
+                "shape": {"form": "rod"},
+            }
+        )
     files = {"datasheet.toml": _datasheet(servo["sensor"]["sample_rate_hz"])}
-    files |= {f"rec{k + 1}.csv": _csv(r, x, servo["sensor"], rng) for k, (r, x) in enumerate(zip(servo["records"], runs))}
+    files |= {
+        f"rec{k + 1}.csv": _csv(r, x, servo["sensor"], rng) for k, (r, x) in enumerate(zip(servo["records"], runs))
+    }
     return files, _truth(plan, seed, servo, linkage, step, concealed, faint, runs, left)
 
 
 def _recorded(servo: dict, number: int, effects: list[dict], linkage: str, step: float) -> Run:
     r, sensor = servo["records"][number], servo["sensor"]
-    return record(servo["params"], effects, r["t"], r["u"], number=number, step=step, linkage=linkage, noise=r["noise"],
-                  adc_step=sensor["adc_step_rad"], controller=servo["controller"] if r["closed_loop"] else None, theta_ref=r["ref"], decimals=4)
+    return record(
+        servo["params"],
+        effects,
+        r["t"],
+        r["u"],
+        number=number,
+        step=step,
+        linkage=linkage,
+        noise=r["noise"],
+        adc_step=sensor["adc_step_rad"],
+        controller=servo["controller"] if r["closed_loop"] else None,
+        theta_ref=r["ref"],
+        decimals=4,
+    )
 
 
-def _truth(plan: Plan, seed: int, servo: dict, linkage: str, step: float, concealed: list, faint: list, runs: list[Run], left: list) -> dict:
+def _truth(
+    plan: Plan,
+    seed: int,
+    servo: dict,
+    linkage: str,
+    step: float,
+    concealed: list,
+    faint: list,
+    runs: list[Run],
+    left: list,
+) -> dict:
     sensor, rest = servo["sensor"], servo["params"]["theta_0"]
-    records = [{"kind": r["kind"], "closed_loop": r["closed_loop"], "duration_s": float(r["t"][-1]),
-                "travel_deg": [float((x.true.min() - rest) / DEG), float((x.true.max() - rest) / DEG)]}
-               for r, x in zip(servo["records"], runs)]
-    return {"case": f"case-{plan.index + 1:03d}", "kind": plan.kind, "labels": list(plan.labels), "effects": concealed, "clutter": faint,
-            "linkage": linkage, "visibility_after_refit_sigma": pooled(servo, left), "visibility_per_record": left,
-            "true_parameters": servo["params"], "lumped": lumped(servo["params"]), "mujoco_step_s": step, **sensor,
-            "controller": servo["controller"], "records": records, "seed": [seed, plan.index]}
+    records = [
+        {
+            "kind": r["kind"],
+            "closed_loop": r["closed_loop"],
+            "duration_s": float(r["t"][-1]),
+            "travel_deg": [float((x.true.min() - rest) / DEG), float((x.true.max() - rest) / DEG)],
+        }
+        for r, x in zip(servo["records"], runs)
+    ]
+    return {
+        "case": f"case-{plan.index + 1:03d}",
+        "kind": plan.kind,
+        "labels": list(plan.labels),
+        "effects": concealed,
+        "clutter": faint,
+        "linkage": linkage,
+        "visibility_after_refit_sigma": pooled(servo, left),
+        "visibility_per_record": left,
+        "true_parameters": servo["params"],
+        "lumped": lumped(servo["params"]),
+        "mujoco_step_s": step,
+        **sensor,
+        "controller": servo["controller"],
+        "records": records,
+        "seed": [seed, plan.index],
+    }
 
 
 def lumped(p: Mapping[str, float]) -> dict[str, float]:
     """Eq. (6)'s coefficients."""
     n, J = p["n"], p["J"]
-    return {"a_1": p["k_s"] / J, "a_2": p["B"] / J + n**2 * p["K_t"] * p["K_e"] / (p["R"] * J), "b": n * p["K_t"] / (p["R"] * J),
-            "c_1": p["T_LH"] / J, "c_2": p["F_c"] / J, "theta_0": p["theta_0"]}
+    return {
+        "a_1": p["k_s"] / J,
+        "a_2": p["B"] / J + n**2 * p["K_t"] * p["K_e"] / (p["R"] * J),
+        "b": n * p["K_t"] / (p["R"] * J),
+        "c_1": p["T_LH"] / J,
+        "c_2": p["F_c"] / J,
+        "theta_0": p["theta_0"],
+    }
 
 
 # -- files ---------------------------------------------------------------------------------------------------
@@ -111,7 +171,16 @@ def lumped(p: Mapping[str, float]) -> dict[str, float]:
 
 def _datasheet(rate: int) -> str:
     """Table 1 and the sample rate."""
-    return "\n".join(["[parameters]", *(f"{name} = {value}" for name, value in TABLE_1.items()), "", "[recording]", f"sample_rate_hz = {rate}", ""])
+    return "\n".join(
+        [
+            "[parameters]",
+            *(f"{name} = {value}" for name, value in TABLE_1.items()),
+            "",
+            "[recording]",
+            f"sample_rate_hz = {rate}",
+            "",
+        ]
+    )
 
 
 def _csv(record: dict, run: Run, sensor: dict, rng: np.random.Generator) -> str:

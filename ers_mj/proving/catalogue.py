@@ -1,9 +1,9 @@
-"""The effects that the independent simulator can hide in a servo: what their strength means, how they are drawn and set.
-
-A catalogue entry draws a shape (its functional form and the numbers beside the strength) and writes strength and shape into the
-simulator's record. Forms differ on purpose from one case to the next, and from the textbook form, so that a library is not proven on
-its own formulas. `context` describes the servo and its effect-free records: params, peak_V, peak_A, travel (rad about theta_0),
-records, durations, dt.
+"""The effects that the independent simulator can hide in a servo: what their strength means, how they are drawn and
+set.
+ A catalogue entry draws a shape (its functional form and the numbers beside the strength) and writes strength and shape
+into the simulator's record. Forms differ on purpose from one case to the next, and from the textbook form, so that a
+library is not proven on its own formulas. `context` describes the servo and its effect-free records: params, peak_V,
+peak_A, travel (rad about theta_0), records, durations, dt.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ def index(options, form):
     return float(options.index(form))
 
 
-# ---- friction ---------------------------------------------------------------------------------------------------------
+# ---- friction
+# ---------------------------------------------------------------------------------------------------------
 
 STRIBECK = ("1/(1+(w/v)^2)", "exp(-(w/v)^2)", "exp(-|w|/v)")
 HYPERBOLIC = "1/cosh(w/v)"
@@ -67,15 +68,21 @@ def draw_stribeck(rng, context):
 
 def put_stribeck(p, s, shape, record):
     """Strength (Fs - Fc)/Fc."""
-    p["stri_f"], p["stri_v"], p["stri_form"] = s, shape["v_stribeck_rad_s"], index((*STRIBECK, HYPERBOLIC), shape.get("form", STRIBECK[1]))
+    p["stri_f"], p["stri_v"], p["stri_form"] = (
+        s,
+        shape["v_stribeck_rad_s"],
+        index((*STRIBECK, HYPERBOLIC), shape.get("form", STRIBECK[1])),
+    )
 
 
 def draw_presliding(rng, context):
     """LuGre (bristle damping fading with speed or not) or Dahl."""
     form = choose(rng, "LuGre", "LuGre, constant bristle damping", "Dahl")
     shape = {"form": form, "bristle_damping_ratio": 0.0 if form == "Dahl" else float(rng.uniform(0.2, 0.8))}
-    return shape | {"v_d_rad_s": between(rng, 0.05, 0.3) if form == "LuGre" else 0.0,
-                    "delta": float(choose(rng, 1.0, 1.5)) if form == "Dahl" else 1.0}
+    return shape | {
+        "v_d_rad_s": between(rng, 0.05, 0.3) if form == "LuGre" else 0.0,
+        "delta": float(choose(rng, 1.0, 1.5)) if form == "Dahl" else 1.0,
+    }
 
 
 def put_presliding(p, s, shape, record):
@@ -141,7 +148,8 @@ def put_position(p, s, shape, record):
     p["pos_form"] = index(POSITION, shape["form"])
 
 
-# ---- transmission -----------------------------------------------------------------------------------------------------
+# ---- transmission
+# -----------------------------------------------------------------------------------------------------
 
 CONTACT = ("spring and damper", "Hunt-Crossley")
 SHAFT = ("linear", "sinh", "in stages")
@@ -151,8 +159,12 @@ RIGID = "rigid limit"
 
 def draw_backlash(rng, context):
     """Stiffness and damping of the flanks, share of the dry friction on the motor's side."""
-    return {"form": choose(rng, *CONTACT), "contact_k": between(rng, 1200.0, 3000.0), "contact_zeta": float(rng.uniform(0.1, 0.25)),
-            "motor_friction_share": float(rng.uniform(0.15, 0.4))}
+    return {
+        "form": choose(rng, *CONTACT),
+        "contact_k": between(rng, 1200.0, 3000.0),
+        "contact_zeta": float(rng.uniform(0.1, 0.25)),
+        "motor_friction_share": float(rng.uniform(0.15, 0.4)),
+    }
 
 
 def split(p, k, zeta, share):
@@ -171,8 +183,11 @@ def put_backlash(p, s, shape, record):
 
 def draw_compliance(rng, context):
     """A linear shaft, or one that gets stiffer."""
-    return {"form": choose(rng, *SHAFT), "zeta": float(rng.uniform(0.03, 0.2)),
-            "motor_friction_share": float(rng.uniform(0.15, 0.4))}
+    return {
+        "form": choose(rng, *SHAFT),
+        "zeta": float(rng.uniform(0.03, 0.2)),
+        "motor_friction_share": float(rng.uniform(0.15, 0.4)),
+    }
 
 
 def put_compliance(p, s, shape, record):
@@ -184,8 +199,16 @@ def put_compliance(p, s, shape, record):
 def draw_ratio(rng, context):
     """Crank and rod (start angle, crank over rod) or a polynomial along the travel."""
     if rng.random() < 0.5:
-        return {"form": "crank and rod", "psi0_rad": float(rng.uniform(0.2, 0.5)) * sign(rng), "lam": float(rng.uniform(-0.4, 0.4))}
-    return {"form": "polynomial", "slope": float(rng.uniform(0.3, 1.0)) * sign(rng), "curvature": float(rng.uniform(-0.8, 0.8))}
+        return {
+            "form": "crank and rod",
+            "psi0_rad": float(rng.uniform(0.2, 0.5)) * sign(rng),
+            "lam": float(rng.uniform(-0.4, 0.4)),
+        }
+    return {
+        "form": "polynomial",
+        "slope": float(rng.uniform(0.3, 1.0)) * sign(rng),
+        "curvature": float(rng.uniform(-0.8, 0.8)),
+    }
 
 
 def put_ratio(p, s, shape, record):
@@ -198,7 +221,11 @@ def put_ratio(p, s, shape, record):
 def draw_ripple(rng, context):
     """Teeth a turn of the output, and a share of the second harmonic in half of the cases."""
     turns = float(choose(rng, 18.0, 22.26, 36.0, rng.uniform(14.0, 60.0)))
-    return {"cycles_per_output_rev": turns, "phase": angle(rng), "second_harmonic": float(choose(rng, 0.0, rng.uniform(0.1, 0.3)))}
+    return {
+        "cycles_per_output_rev": turns,
+        "phase": angle(rng),
+        "second_harmonic": float(choose(rng, 0.0, rng.uniform(0.1, 0.3))),
+    }
 
 
 def put_ripple(p, s, shape, record):
@@ -207,13 +234,17 @@ def put_ripple(p, s, shape, record):
     p["rip_h2"] = shape.get("second_harmonic", 0.0)
 
 
-# ---- drive ------------------------------------------------------------------------------------------------------------
+# ---- drive
+# ------------------------------------------------------------------------------------------------------------
 
 
 def draw_cogging(rng, context):
     """Poles times slots a turn of the motor."""
-    return {"cycles_per_motor_rev": int(choose(rng, 4, 6, 8, 12)), "phase": angle(rng),
-            "second_harmonic": float(choose(rng, 0.0, rng.uniform(0.1, 0.3)))}
+    return {
+        "cycles_per_motor_rev": int(choose(rng, 4, 6, 8, 12)),
+        "phase": angle(rng),
+        "second_harmonic": float(choose(rng, 0.0, rng.uniform(0.1, 0.3))),
+    }
 
 
 def put_cogging(p, s, shape, record):
@@ -276,13 +307,22 @@ def put_delay(p, s, shape, record):
 
 def draw_thermal(rng, context):
     """One node, or a third of the heat in a winding eight times as fast."""
-    return {"tau_s": float(rng.uniform(3.0, 14.0)), "alpha_R_per_K": 0.0039, "beta_K_per_K": float(rng.uniform(0.0008, 0.0012)),
-            "fast_share": float(choose(rng, 0.0, 0.33))}
+    return {
+        "tau_s": float(rng.uniform(3.0, 14.0)),
+        "alpha_R_per_K": 0.0039,
+        "beta_K_per_K": float(rng.uniform(0.0008, 0.0012)),
+        "fast_share": float(choose(rng, 0.0, 0.33)),
+    }
 
 
 def put_thermal(p, s, shape, record):
     """Strength: thermal resistance [K/W]."""
-    p["th_R"], p["th_tau"], p["th_alpha"], p["th_beta"] = s, shape["tau_s"], shape["alpha_R_per_K"], shape["beta_K_per_K"]
+    p["th_R"], p["th_tau"], p["th_alpha"], p["th_beta"] = (
+        s,
+        shape["tau_s"],
+        shape["alpha_R_per_K"],
+        shape["beta_K_per_K"],
+    )
     p["th_fast"] = shape.get("fast_share", 0.0)
 
 
@@ -291,7 +331,11 @@ SAG = ("motor's power", "motor's current")
 
 def draw_sag(rng, context):
     """Bus capacitor's time constant (0: none), nominal supply, what the drive draws."""
-    return {"form": choose(rng, *SAG), "tau_s": float(choose(rng, 0.0, between(rng, 0.03, 0.4))), "V_nominal": context["umax_V"]}
+    return {
+        "form": choose(rng, *SAG),
+        "tau_s": float(choose(rng, 0.0, between(rng, 0.03, 0.4))),
+        "V_nominal": context["umax_V"],
+    }
 
 
 def put_sag(p, s, shape, record):
@@ -300,7 +344,8 @@ def put_sag(p, s, shape, record):
     p["sag_form"] = index(SAG, shape.get("form", SAG[1]))
 
 
-# ---- load -------------------------------------------------------------------------------------------------------------
+# ---- load
+# -------------------------------------------------------------------------------------------------------------
 
 
 def draw_sign(rng, context):
@@ -338,8 +383,13 @@ def put_hinge(p, s, shape, record):
 
 def draw_stop(rng, context):
     """One side or both, springy or Hunt-Crossley."""
-    return {"form": choose(rng, *CONTACT), "k": between(rng, 800.0, 3000.0), "zeta": float(rng.uniform(0.1, 0.4)),
-            "side": choose(rng, "upper", "lower", "both"), "free_travel_deg": [float(x / DEG) for x in context["travel"]]}
+    return {
+        "form": choose(rng, *CONTACT),
+        "k": between(rng, 800.0, 3000.0),
+        "zeta": float(rng.uniform(0.1, 0.4)),
+        "side": choose(rng, "upper", "lower", "both"),
+        "free_travel_deg": [float(x / DEG) for x in context["travel"]],
+    }
 
 
 def put_stop(p, s, shape, record):
@@ -376,8 +426,11 @@ GUST = ("sine", "flat-topped", "swelling")
 
 def draw_gust(rng, context):
     """One frequency, a phase for each record."""
-    return {"form": choose(rng, *GUST), "freq_hz": float(rng.uniform(0.7, 5.0)),
-            "phase_per_record": [angle(rng) for _ in range(context["records"])]}
+    return {
+        "form": choose(rng, *GUST),
+        "freq_hz": float(rng.uniform(0.7, 5.0)),
+        "phase_per_record": [angle(rng) for _ in range(context["records"])],
+    }
 
 
 def put_gust(p, s, shape, record):
@@ -386,7 +439,8 @@ def put_gust(p, s, shape, record):
     p["gust_form"] = index(GUST, shape.get("form", GUST[0]))
 
 
-# ---- sensor -----------------------------------------------------------------------------------------------------------
+# ---- sensor
+# -----------------------------------------------------------------------------------------------------------
 
 LAG = ("", "first order", "pure delay", "mean over 2 tau")
 
@@ -432,14 +486,19 @@ def put_quantum(p, s, shape, record):
 
 def draw_dropout(rng, context):
     """Single spikes, or stretches in which the reading stands still."""
-    return {"form": choose(rng, "spikes", "stuck"), "rate_per_s": float(rng.uniform(1.0, 5.0)), "seed": int(rng.integers(2**31))}
+    return {
+        "form": choose(rng, "spikes", "stuck"),
+        "rate_per_s": float(rng.uniform(1.0, 5.0)),
+        "seed": int(rng.integers(2**31)),
+    }
 
 
 def put_in_samples(p, s, shape, record):
     """Acts on the samples: see `samples_of`."""
 
 
-# ---- outside the list -------------------------------------------------------------------------------------------------
+# ---- outside the list
+# -------------------------------------------------------------------------------------------------
 
 
 def draw_appendage(rng, context):
@@ -505,7 +564,11 @@ def put_tacho(p, s, shape, record):
 
 def draw_gaps(rng, context):
     """When the drive's gain breaks down: on average so often, so long."""
-    return {"rate_per_s": float(rng.uniform(0.4, 1.5)), "mean_s": between(rng, 0.04, 0.3), "seed": int(rng.integers(2**31))}
+    return {
+        "rate_per_s": float(rng.uniform(0.4, 1.5)),
+        "mean_s": between(rng, 0.04, 0.3),
+        "seed": int(rng.integers(2**31)),
+    }
 
 
 def put_magnetic(p, s, shape, record):
@@ -538,58 +601,111 @@ def put_running_in(p, s, shape, record):
     p["run_a"], p["run_D"] = s * shape["sign"], shape["distance_deg"] * DEG
 
 
-CATALOGUE = {e.name: e for e in (
-    Effect("stribeck", "(Fs-Fc)/Fc", 0.002, 1.2, draw_stribeck, put_stribeck),
-    Effect("presliding", "presliding displacement Fc/sigma0 (deg)", 0.04, 3.0, draw_presliding, put_presliding),
-    Effect("asymmetric_friction", "Coulomb asymmetry a: Fc(1+a) fwd, Fc(1-a) back", 0.0005, 0.5, draw_asymmetric, put_asymmetric),
-    Effect("load_dependent_friction", "mu in Fc + mu*|n Kt i|", 0.0005, 0.25, draw_load, put_load),
-    Effect("quadratic_drag", "c (N m (s/rad)^p) in c |w|^p", 0.0001, 0.12, draw_quadratic, put_quadratic),
-    Effect("position_dependent_friction", "relative modulation of Fc", 0.004, 0.8, draw_position, put_position),
-    Effect("backlash", "total gap at output (deg)", 0.02, 3.0, draw_backlash, put_backlash),
-    Effect("shaft_compliance", "compliance (deg per N m)", 0.1, 6.0, draw_compliance, put_compliance),
-    Effect("variable_ratio", "scale of n(theta)/n0-1", 0.003, 0.9, draw_ratio, put_ratio),
-    Effect("transmission_ripple", "amplitude (N m at output)", 0.0008, 0.3, draw_ripple, put_ripple),
-    Effect("cogging", "amplitude (N m reflected to output; /n at the motor)", 0.002, 0.3, draw_cogging, put_cogging),
-    Effect("voltage_saturation", "fraction of the command peak clipped", 0.005, 0.55, draw_saturation, put_saturation),
-    Effect("current_limit", "fraction of the current peak cut", 0.01, 0.6, draw_limit, put_limit),
-    Effect("drive_dead_zone", "half width (V)", 0.002, 2.0, draw_dead, put_dead),
-    Effect("inductance", "L (H)", 0.004, 0.03, draw_nothing, put_inductance),
-    Effect("input_delay", "delay (s)", 0.0004, 0.03, draw_nothing, put_delay),
-    Effect("thermal_drift", "thermal resistance (K/W)", 0.03, 20.0, draw_thermal, put_thermal),
-    Effect("supply_sag", "source resistance (ohm)", 0.002, 1.2, draw_sag, put_sag),
-    Effect("bias_torque", "|torque| (N m)", 0.0001, 0.11, draw_sign, put_bias),
-    Effect("gravity_imbalance", "m g l (N m) in mgl sin(theta+ph)", 0.0003, 0.2, draw_gravity, put_gravity),
-    Effect("hinge_moment_cubic", "k3 (N m/rad3)", 0.004, 8.0, draw_hinge, put_hinge),
-    Effect("end_stop", "fraction of the free travel cut off", 0.01, 0.5, draw_stop, put_stop),
-    Effect("load_disturbance", "pulse torque (N m)", 0.01, 1.0, draw_disturbance, put_disturbance),
-    Effect("periodic_gust", "torque amplitude (N m)", 0.003, 0.25, draw_gust, put_gust),
-    Effect("sensor_lag", "time constant / delay (s)", 0.0003, 0.03, draw_lag, put_lag),
-    Effect("sensor_nonlinearity", "deviation amplitude (deg)", 0.02, 3.0, draw_bend, put_bend),
-    Effect("sensor_quantisation", "step (deg)", 0.04, 1.0, draw_quantum, put_quantum),
-    Effect("sensor_dropout", "spike scale (deg), or mean time stuck (units of 10 ms)", 0.3, 20.0, draw_dropout, put_in_samples),
-    Effect("second_resonance", "inertia of the appendage over J", 0.01, 0.5, draw_appendage, put_appendage, False),
-    Effect("hysteretic_spring", "Bouc-Wen torque (N m)", 0.0005, 0.2, draw_hysteresis, put_hysteresis, False),
-    Effect("friction_ageing", "growth of Fc per e-fold of dwell", 0.001, 0.3, draw_ageing, put_ageing, False),
-    Effect("brush_drop", "V (V) in V sgn(i) log(1+|i|/i0)", 0.0005, 0.5, draw_brush, put_brush, False),
-    Effect("angle_dependent_damping", "damping added at the end of travel (N m s/rad)", 0.0005, 0.5, draw_angle_damping,
-           put_angle_damping, False),
-    Effect("tacho_eccentricity", "share of back-EMF rippling", 0.003, 0.4, draw_tacho, put_tacho, False),
-    Effect("intermittent_gain", "share of the drive's gain lost", 0.01, 0.9, draw_gaps, put_in_samples, False),
-    Effect("magnetic_saturation", "share of K_t lost at the current's peak", 0.005, 0.5, draw_peak, put_magnetic, False),
-    Effect("viscoelastic_spring", "stiffness of the relaxing element (N m/rad)", 0.005, 0.6, draw_maxwell, put_maxwell, False),
-    Effect("running_in", "relative change of Fc", 0.002, 0.6, draw_running_in, put_running_in, False),
-)}
+CATALOGUE = {
+    e.name: e
+    for e in (
+        Effect("stribeck", "(Fs-Fc)/Fc", 0.002, 1.2, draw_stribeck, put_stribeck),
+        Effect("presliding", "presliding displacement Fc/sigma0 (deg)", 0.04, 3.0, draw_presliding, put_presliding),
+        Effect(
+            "asymmetric_friction",
+            "Coulomb asymmetry a: Fc(1+a) fwd, Fc(1-a) back",
+            0.0005,
+            0.5,
+            draw_asymmetric,
+            put_asymmetric,
+        ),
+        Effect("load_dependent_friction", "mu in Fc + mu*|n Kt i|", 0.0005, 0.25, draw_load, put_load),
+        Effect("quadratic_drag", "c (N m (s/rad)^p) in c |w|^p", 0.0001, 0.12, draw_quadratic, put_quadratic),
+        Effect("position_dependent_friction", "relative modulation of Fc", 0.004, 0.8, draw_position, put_position),
+        Effect("backlash", "total gap at output (deg)", 0.02, 3.0, draw_backlash, put_backlash),
+        Effect("shaft_compliance", "compliance (deg per N m)", 0.1, 6.0, draw_compliance, put_compliance),
+        Effect("variable_ratio", "scale of n(theta)/n0-1", 0.003, 0.9, draw_ratio, put_ratio),
+        Effect("transmission_ripple", "amplitude (N m at output)", 0.0008, 0.3, draw_ripple, put_ripple),
+        Effect(
+            "cogging", "amplitude (N m reflected to output; /n at the motor)", 0.002, 0.3, draw_cogging, put_cogging
+        ),
+        Effect(
+            "voltage_saturation", "fraction of the command peak clipped", 0.005, 0.55, draw_saturation, put_saturation
+        ),
+        Effect("current_limit", "fraction of the current peak cut", 0.01, 0.6, draw_limit, put_limit),
+        Effect("drive_dead_zone", "half width (V)", 0.002, 2.0, draw_dead, put_dead),
+        Effect("inductance", "L (H)", 0.004, 0.03, draw_nothing, put_inductance),
+        Effect("input_delay", "delay (s)", 0.0004, 0.03, draw_nothing, put_delay),
+        Effect("thermal_drift", "thermal resistance (K/W)", 0.03, 20.0, draw_thermal, put_thermal),
+        Effect("supply_sag", "source resistance (ohm)", 0.002, 1.2, draw_sag, put_sag),
+        Effect("bias_torque", "|torque| (N m)", 0.0001, 0.11, draw_sign, put_bias),
+        Effect("gravity_imbalance", "m g l (N m) in mgl sin(theta+ph)", 0.0003, 0.2, draw_gravity, put_gravity),
+        Effect("hinge_moment_cubic", "k3 (N m/rad3)", 0.004, 8.0, draw_hinge, put_hinge),
+        Effect("end_stop", "fraction of the free travel cut off", 0.01, 0.5, draw_stop, put_stop),
+        Effect("load_disturbance", "pulse torque (N m)", 0.01, 1.0, draw_disturbance, put_disturbance),
+        Effect("periodic_gust", "torque amplitude (N m)", 0.003, 0.25, draw_gust, put_gust),
+        Effect("sensor_lag", "time constant / delay (s)", 0.0003, 0.03, draw_lag, put_lag),
+        Effect("sensor_nonlinearity", "deviation amplitude (deg)", 0.02, 3.0, draw_bend, put_bend),
+        Effect("sensor_quantisation", "step (deg)", 0.04, 1.0, draw_quantum, put_quantum),
+        Effect(
+            "sensor_dropout",
+            "spike scale (deg), or mean time stuck (units of 10 ms)",
+            0.3,
+            20.0,
+            draw_dropout,
+            put_in_samples,
+        ),
+        Effect("second_resonance", "inertia of the appendage over J", 0.01, 0.5, draw_appendage, put_appendage, False),
+        Effect("hysteretic_spring", "Bouc-Wen torque (N m)", 0.0005, 0.2, draw_hysteresis, put_hysteresis, False),
+        Effect("friction_ageing", "growth of Fc per e-fold of dwell", 0.001, 0.3, draw_ageing, put_ageing, False),
+        Effect("brush_drop", "V (V) in V sgn(i) log(1+|i|/i0)", 0.0005, 0.5, draw_brush, put_brush, False),
+        Effect(
+            "angle_dependent_damping",
+            "damping added at the end of travel (N m s/rad)",
+            0.0005,
+            0.5,
+            draw_angle_damping,
+            put_angle_damping,
+            False,
+        ),
+        Effect("tacho_eccentricity", "share of back-EMF rippling", 0.003, 0.4, draw_tacho, put_tacho, False),
+        Effect("intermittent_gain", "share of the drive's gain lost", 0.01, 0.9, draw_gaps, put_in_samples, False),
+        Effect(
+            "magnetic_saturation", "share of K_t lost at the current's peak", 0.005, 0.5, draw_peak, put_magnetic, False
+        ),
+        Effect(
+            "viscoelastic_spring",
+            "stiffness of the relaxing element (N m/rad)",
+            0.005,
+            0.6,
+            draw_maxwell,
+            put_maxwell,
+            False,
+        ),
+        Effect("running_in", "relative change of Fc", 0.002, 0.6, draw_running_in, put_running_in, False),
+    )
+}
 """Every effect by name; `listed` tells those of the contract from those that no library can name."""
 
 LISTED = tuple(name for name, effect in CATALOGUE.items() if effect.listed)
 OUTSIDE = tuple(name for name, effect in CATALOGUE.items() if not effect.listed)
-FIRST = ("asymmetric_friction", "bias_torque", "stribeck", "load_dependent_friction", "quadratic_drag", "backlash",
-         "voltage_saturation", "drive_dead_zone", "input_delay", "inductance", "gravity_imbalance", "hinge_moment_cubic",
-         "end_stop", "sensor_quantisation")
+FIRST = (
+    "asymmetric_friction",
+    "bias_torque",
+    "stribeck",
+    "load_dependent_friction",
+    "quadratic_drag",
+    "backlash",
+    "voltage_saturation",
+    "drive_dead_zone",
+    "input_delay",
+    "inductance",
+    "gravity_imbalance",
+    "hinge_moment_cubic",
+    "end_stop",
+    "sensor_quantisation",
+)
 
 
 def put_effects(plant, effects, record):
-    """Write effects (mappings with label, strength, shape) into the simulator's record for recording number `record` (from 0)."""
+    """Write effects (mappings with label, strength, shape) into the simulator's record for recording number `record`
+    (from 0).
+    """
     for effect in effects:
         if effect["label"] not in CATALOGUE:
             raise ValueError(f"effect {effect['label']!r} is not known; there are {', '.join(CATALOGUE)}")

@@ -13,7 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ers_mj.proving.asking import LIMIT, Asker
-from ers_mj.proving.sealing import answer_of, begin, has_case, hash_of_diagnosis, hash_of_maker, held, keep_answer, keep_case, opened, seal
+from ers_mj.proving.sealing import (
+    answer_of,
+    begin,
+    has_case,
+    hash_of_diagnosis,
+    hash_of_maker,
+    held,
+    keep_answer,
+    keep_case,
+    opened,
+    seal,
+)
 
 Progress = Callable[[str, float], None]
 MAKING = 0.4  # share of the bar
@@ -37,8 +48,17 @@ class Proof:
     sha256: str
 
 
-def conduct(folder: Path, tasks: Sequence[Task], settings: dict, *, force: bool = False, jobs: int = 1, limit: float = LIMIT,
-            tell: Callable[[str], None] = lambda text: None, progress: Progress = lambda text, share: None) -> Proof:
+def conduct(
+    folder: Path,
+    tasks: Sequence[Task],
+    settings: dict,
+    *,
+    force: bool = False,
+    jobs: int = 1,
+    limit: float = LIMIT,
+    tell: Callable[[str], None] = lambda text: None,
+    progress: Progress = lambda text, share: None,
+) -> Proof:
     """Carry out a proof in this folder, or carry on with it.
 
     Args:
@@ -57,7 +77,13 @@ def conduct(folder: Path, tasks: Sequence[Task], settings: dict, *, force: bool 
         digest = seal(folder, names)
         tell(f"the truth of {len(names)} cases is sealed, sha256 {digest}")
         code = hash_of_diagnosis()
-        _ask(folder, [name for name in names if answer_of(folder, name, code) is None], Asker(code, limit), jobs, progress)
+        _ask(
+            folder,
+            [name for name in names if answer_of(folder, name, code) is None],
+            Asker(code, limit),
+            jobs,
+            progress,
+        )
         return Proof(opened(folder, digest), {name: answer_of(folder, name, code) or {} for name in names}, digest)
 
 
@@ -68,7 +94,9 @@ def _make(folder: Path, tasks: Sequence[Task], jobs: int, progress: Progress) ->
             progress(f"making case {k + 1} of {len(tasks)}", MAKING * k / len(tasks))
             _made((folder, task))
         return
-    with multiprocessing.get_context("spawn").Pool(min(jobs, len(tasks)), initializer=_deaf) as pool:  # left early, it ends its processes
+    with multiprocessing.get_context("spawn").Pool(
+        min(jobs, len(tasks)), initializer=_deaf
+    ) as pool:  # left early, it ends its processes
         for k, _ in enumerate(pool.imap_unordered(_made, [(folder, task) for task in tasks])):
             progress(f"making case {k + 2} of {len(tasks)}", MAKING * (k + 1) / len(tasks))
 

@@ -1,7 +1,7 @@
 """The laws of the independent servo: Eq. (1) of the paper with everything that may be concealed in it, compiled.
-
-All on the rudder side of the gear, angles rad, torques N m, voltages V, currents A, times s. Two simulators read these laws,
-the quick one (quick.py) and MuJoCo's (mechanism.py, recorder.py); neither shares a line with the package that is put to the test.
+ All on the rudder side of the gear, angles rad, torques N m, voltages V, currents A, times s. Two simulators read these
+laws, the quick one (quick.py) and MuJoCo's (mechanism.py, recorder.py); neither shares a line with the package that is
+put to the test.
 """
 
 from __future__ import annotations
@@ -11,8 +11,19 @@ from numba import njit
 
 DEG = np.pi / 180.0
 
-TABLE_1 = {"J": 0.0031, "B": 0.0098, "K_t": 0.0175, "K_e": 0.0295, "k_s": 0.0877, "T_LH": 0.46, "F_c": 0.34, "R": 1.55,
-           "L": 0.0016, "theta_0": 0.261799, "n": 22.26}
+TABLE_1 = {
+    "J": 0.0031,
+    "B": 0.0098,
+    "K_t": 0.0175,
+    "K_e": 0.0295,
+    "k_s": 0.0877,
+    "T_LH": 0.46,
+    "F_c": 0.34,
+    "R": 1.55,
+    "L": 0.0016,
+    "theta_0": 0.261799,
+    "n": 22.26,
+}
 """Table 1 of the paper, SI."""
 
 FIELDS = """J B K_t K_e k_s T_LH F_c R L theta_0 n share_J share_B share_F
@@ -29,13 +40,16 @@ PLANT = np.dtype([(name, "f8") for name in FIELDS])
 """Everything that the compiled code reads, one number a field; zero means absent."""
 
 CONTROLLER = ("KP", "KI", "KD", "TF", "UMAX", "FF_ON", "FF_C", "FF_TLH", "FF_KS", "FF_TH0")
-"""PID on the measured angle [V/rad, V/(rad s), V s/rad, s, V], feed-forward of spring and preload [V/(N m), N m, N m/rad, rad]."""
+"""PID on the measured angle [V/rad, V/(rad s), V s/rad, s, V], feed-forward of spring and preload [V/(N m), N m, N
+m/rad, rad].
+"""
 
 TH, W, CUR, THM, WM, BRI, HYS, APP, APV, TEMP, FAST, BUS, LAG, MXW, AGE, RUN = range(16)
 STATES = 16
 
 
-# ---- drive ------------------------------------------------------------------------------------------------------------
+# ---- drive
+# ------------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -64,7 +78,9 @@ def saturate(p, v):
 
 @njit(cache=True)
 def bus_target(p, v, i):
-    """[V] supply behind its source resistance; drawn: 0 the motor's power (the bus takes none back), 1 the motor's current."""
+    """[V] supply behind its source resistance; drawn: 0 the motor's power (the bus takes none back), 1 the motor's
+    current.
+    """
     if p.sag_form == 1.0:
         return p.sag_V - p.sag_R * abs(i)
     return p.sag_V - p.sag_R * max(v * i / p.sag_V, 0.0)
@@ -129,7 +145,8 @@ def current_rate(p, y, u, gain):
     return rate
 
 
-# ---- friction ---------------------------------------------------------------------------------------------------------
+# ---- friction
+# ---------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -193,7 +210,8 @@ def viscous(p, y, w):
     return b * w
 
 
-# ---- load -------------------------------------------------------------------------------------------------------------
+# ---- load
+# -------------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -208,7 +226,9 @@ def hinge(p, x):
 
 @njit(cache=True)
 def stop_torque(p, x, w):
-    """[N m] end stops at x = stop_hi and stop_lo, never pulling: 0 (and 2, rigid in MuJoCo) spring and damper, 1 Hunt-Crossley."""
+    """[N m] end stops at x = stop_hi and stop_lo, never pulling: 0 (and 2, rigid in MuJoCo) spring and damper, 1
+    Hunt-Crossley.
+    """
     side, depth = 1.0, x - p.stop_hi
     if depth <= 0.0:
         side, depth = -1.0, p.stop_lo - x
@@ -291,7 +311,9 @@ def contact_torque(p, y):
     if p.con_form == 2.0:
         return p.con_k * 0.02 * np.sinh(d / 0.02) + p.con_c * speed
     if p.con_form == 4.0:
-        staged = d + 0.6 * (max(d - 0.008, 0.0) + min(d + 0.008, 0.0)) + 0.9 * (max(d - 0.024, 0.0) + min(d + 0.024, 0.0))
+        staged = (
+            d + 0.6 * (max(d - 0.008, 0.0) + min(d + 0.008, 0.0)) + 0.9 * (max(d - 0.024, 0.0) + min(d + 0.024, 0.0))
+        )
         return p.con_k * staged + p.con_c * speed
     if p.gap <= 0.0:
         return p.con_k * d + p.con_c * speed
@@ -333,7 +355,8 @@ def inertia(p, x):
     return j + p.J * p.share_J * (r * r - 1.0), 2.0 * p.J * p.share_J * r * slope
 
 
-# ---- the differential inclusion ---------------------------------------------------------------------------------------
+# ---- the differential inclusion
+# ---------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -366,7 +389,8 @@ def slow_rates(p, y, u, gain, dy):
     dy[RUN] = abs(w)
 
 
-# ---- sensor and controller --------------------------------------------------------------------------------------------
+# ---- sensor and controller
+# --------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -409,7 +433,9 @@ def sensed(p, y, ring, step, late):
 
 @njit(cache=True)
 def pid(c, memory, target, angle, dt):
-    """[V] PID with filtered derivative, held integral at the limit, optional feed-forward; memory = (integral, slope, last)."""
+    """[V] PID with filtered derivative, held integral at the limit, optional feed-forward; memory = (integral, slope,
+    last).
+    """
     error = target - angle
     memory[1] = (c[3] * memory[1] + c[2] * (error - memory[2])) / (c[3] + dt)
     memory[2] = error
@@ -429,7 +455,19 @@ def plant_of(params):
     for name in ("share_J", "share_B"):
         if plant[name][0] == 0.0:
             plant[name] = 0.5
-    for name in ("stri_v", "bw_x", "brush_i", "age_t0", "age_D", "run_D", "angdamp_P", "mxw_tau", "nl_P", "quad_p", "pre_delta"):
+    for name in (
+        "stri_v",
+        "bw_x",
+        "brush_i",
+        "age_t0",
+        "age_D",
+        "run_D",
+        "angdamp_P",
+        "mxw_tau",
+        "nl_P",
+        "quad_p",
+        "pre_delta",
+    ):
         plant[name] = 1.0
     plant["stop_hi"], plant["stop_lo"] = 1e9, -1e9
     plant["sag_V"] = 24.0

@@ -1,7 +1,6 @@
 """The rudder system of mjcf/ as the generator uses it: bodies, linkage, spring, dry friction and play are MuJoCo's.
-
-What MuJoCo has no element for is left to `recorder.py`, which sets two torques (on the rotor, on the rudder) and the levels of dry
-friction at every step. All numbers come from a record of `laws.PLANT`.
+ What MuJoCo has no element for is left to `recorder.py`, which sets two torques (on the rotor, on the rudder) and the
+levels of dry friction at every step. All numbers come from a record of `laws.PLANT`.
 """
 
 from __future__ import annotations
@@ -61,8 +60,14 @@ def mechanism(plant: np.ndarray, linkage: str, h: float) -> Mechanism:
     laws["rod"] = float(linkage == "rod")
     model = spec.compile()
     joint = lambda name: int(model.jnt_qposadr[model.joint(name).id])  # noqa: E731
-    places = [joint("rocker"), joint("gap") if two else -1, joint("rotor"), model.actuator("motor").id, model.actuator("load").id,
-              model.tendon("rudder_angle").id]
+    places = [
+        joint("rocker"),
+        joint("gap") if two else -1,
+        joint("rotor"),
+        model.actuator("motor").id,
+        model.actuator("load").id,
+        model.tendon("rudder_angle").id,
+    ]
     return Mechanism(model, laws, np.array(places), _pose(float(p["theta_0"]), linkage))
 
 
@@ -70,7 +75,9 @@ def _load(name: str, has_gap: bool) -> mujoco.MjSpec:
     """A model of mjcf/; lines that name the joint ``gap`` are left out where there is none."""
     texts = read_mjcf()
     if not has_gap:
-        texts = {key: "\n".join(line for line in text.splitlines() if '"gap"' not in line) for key, text in texts.items()}
+        texts = {
+            key: "\n".join(line for line in text.splitlines() if '"gap"' not in line) for key, text in texts.items()
+        }
     return mujoco.MjSpec.from_string(texts[name], include={key: text.encode() for key, text in texts.items()})
 
 
@@ -137,12 +144,22 @@ def _native(spec: mujoco.MjSpec, p: np.void, laws: np.ndarray, two: bool, h: flo
             laws["con_k"] = laws["con_c"] = 0.0
     if p["stop_k"] > 0 and p["stop_form"] == 2:
         tendon = spec.tendon("rudder_angle")
-        tendon.limited, tendon.range = True, [max(p["theta_0"] + p["stop_lo"], -1e6), min(p["theta_0"] + p["stop_hi"], 1e6)]
+        tendon.limited, tendon.range = (
+            True,
+            [max(p["theta_0"] + p["stop_lo"], -1e6), min(p["theta_0"] + p["stop_hi"], 1e6)],
+        )
         laws["stop_k"] = 0.0
     if p["app_J"] > 0:
-        body = spec.body("rudder").add_body(name="appendage", explicitinertial=True, mass=0.01, inertia=[p["app_J"]] * 3, ipos=[0, 0, 0])
-        body.add_joint(name="appendage", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, -1, 0], stiffness=[p["app_k"], 0.0, 0.0],
-                       damping=[p["app_c"], 0.0, 0.0])
+        body = spec.body("rudder").add_body(
+            name="appendage", explicitinertial=True, mass=0.01, inertia=[p["app_J"]] * 3, ipos=[0, 0, 0]
+        )
+        body.add_joint(
+            name="appendage",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, -1, 0],
+            stiffness=[p["app_k"], 0.0, 0.0],
+            damping=[p["app_c"], 0.0, 0.0],
+        )
         laws["app_J"] = 0.0
 
 

@@ -14,11 +14,18 @@ BASELINE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 
 
 def covered(truth: Mapping, document: Mapping) -> list[dict]:
-    """One entry a parameter that can be compared: owner, name, truth, value, whether ci95 holds the truth, relative error."""
+    """One entry a parameter that can be compared: owner, name, truth, value, whether ci95 holds the truth, relative
+    error.
+    """
     out = []
     if truth.get("linkage") == "constant" and "lumped" in truth:
         rows = document.get("parameters") or {}
-        out += [entry for name in BASELINE if name in rows for entry in _compared("baseline", name, truth["lumped"][name], rows[name])]
+        out += [
+            entry
+            for name in BASELINE
+            if name in rows
+            for entry in _compared("baseline", name, truth["lumped"][name], rows[name])
+        ]
     for effect in truth.get("effects", []):
         answer = next((m for m in document.get("missing") or [] if m["effect"] == effect["label"]), None)
         if answer is None:
@@ -34,12 +41,23 @@ def _compared(owner: str, name: str, true: float, entry: Mapping) -> list[dict]:
     if value is None:
         return []
     inside = None if low is None or high is None else bool(low <= true <= high)
-    return [{"owner": owner, "name": name, "true": true, "value": value, "ci95": [low, high], "inside": inside,
-             "relative_error": abs(value - true) / abs(true) if true else None}]
+    return [
+        {
+            "owner": owner,
+            "name": name,
+            "true": true,
+            "value": value,
+            "ci95": [low, high],
+            "inside": inside,
+            "relative_error": abs(value - true) / abs(true) if true else None,
+        }
+    ]
 
 
 def meant(effect: Mapping, truth: Mapping) -> dict[str, float]:
-    """The answer's names of this effect's parameters -> what they should be; empty where the form leaves no single meaning."""
+    """The answer's names of this effect's parameters -> what they should be; empty where the form leaves no single
+    meaning.
+    """
     s, shape, p = effect["strength"], effect["shape"], truth.get("true_parameters") or {}
     if s is None:
         return {}
@@ -49,7 +67,10 @@ def meant(effect: Mapping, truth: Mapping) -> dict[str, float]:
         "input_delay": lambda: {"T_d": s},
         "sensor_lag": lambda: {"T": s},
         "bias_torque": lambda: {"tau_0": -s * shape["sign"] * torque},
-        "gravity_imbalance": lambda: {"g_s": s * math.cos(shape["phase"]) * torque, "g_c": s * math.sin(shape["phase"]) * torque},
+        "gravity_imbalance": lambda: {
+            "g_s": s * math.cos(shape["phase"]) * torque,
+            "g_c": s * math.sin(shape["phase"]) * torque,
+        },
         "voltage_saturation": lambda: {"u_max": (1.0 - s) * shape["command_peak_V"]},
         "sensor_quantisation": lambda: {"step": s * DEG},
         "periodic_gust": lambda: {"f": shape["freq_hz"]},

@@ -1,14 +1,15 @@
-"""An independent simulator of the electric rudder servo: quick enough to size what is concealed, and a check on MuJoCo's.
+"""An independent simulator of the electric rudder servo: quick enough to size what is concealed, and a check on
+MuJoCo's.
 
 It shares no line and no method with the package. Eq. (1) of the paper, all on the rudder side of the gear:
 
     L i' = v(u) - R i - K_e n w
     J w' = n K_t i - B w - F_c Sgn(w) - k_s (theta - theta_0) - T_LH Sgn(theta - theta_0) + effects
-
-is stepped with Heun's rule at 5-10 us; Sgn is set-valued. Within a step the instants at which w or theta - theta_0 pass zero
-are located and the step is cut there; at rest the inclusion is solved in closed form (the servo stays where the torque lies inside
-the stick band, whose width is F_c + T_LH on theta = theta_0 and F_c elsewhere), so nothing creeps. Backlash and shaft compliance
-split J, B and F_c into a motor side and a rudder side joined by a spring with an optional gap.
+ is stepped with Heun's rule at 5-10 us; Sgn is set-valued. Within a step the instants at which w or theta - theta_0
+pass zero are located and the step is cut there; at rest the inclusion is solved in closed form (the servo stays where
+the torque lies inside the stick band, whose width is F_c + T_LH on theta = theta_0 and F_c elsewhere), so nothing
+creeps. Backlash and shaft compliance split J, B and F_c into a motor side and a rudder side joined by a spring with an
+optional gap.
 
 Angles rad, torques N m, voltages V, currents A, times s. What each effect means stands in `catalogue.py`.
 """
@@ -21,8 +22,30 @@ import numpy as np
 from numba import njit
 
 from ers_mj.proving.catalogue import put_effects, samples_of
-from ers_mj.proving.laws import (APP, BRI, BUS, CONTROLLER, CUR, LAG, STATES, TH, THM, W, WM, bristle_rate, current_rate, dry,
-                                 free_torques, friction_level, inertia, pid, plant_of, quantise, sensed, slow_rates)
+from ers_mj.proving.laws import (
+    APP,
+    BRI,
+    BUS,
+    CONTROLLER,
+    CUR,
+    LAG,
+    STATES,
+    TH,
+    THM,
+    W,
+    WM,
+    bristle_rate,
+    current_rate,
+    dry,
+    free_torques,
+    friction_level,
+    inertia,
+    pid,
+    plant_of,
+    quantise,
+    sensed,
+    slow_rates,
+)
 
 STAND_S = 0.25
 """[s] how long the servo stands with u = 0 before t = 0."""
@@ -31,7 +54,9 @@ COARSE, FINE, ROUGH = 4e-5, 1e-5, 1e-4
 
 
 class Run(NamedTuple):
-    """One simulated recording, (samples,) each; `theta` [rad] is measured, `clean` lacks noise and ordinary converter."""
+    """One simulated recording, (samples,) each; `theta` [rad] is measured, `clean` lacks noise and ordinary
+    converter.
+    """
 
     theta: np.ndarray
     clean: np.ndarray
@@ -147,7 +172,8 @@ def settle(p, y, t):
         y[TH], y[W] = p.theta_0, 0.0
 
 
-# ---- sampling ---------------------------------------------------------------------------------------------------------
+# ---- sampling
+# ---------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -193,14 +219,29 @@ def march(plant, u_in, target, c, closed, dt, substeps, noise, stuck, spike, gai
     return out
 
 
-# ---- the way in -------------------------------------------------------------------------------------------------------
+# ---- the way in
+# -------------------------------------------------------------------------------------------------------
 
 
-def simulate(params, effects, t, u, *, record=0, step=1e-5, noise=None, adc_step=0.0, controller=None, theta_ref=None,
-             stand=STAND_S, decimals=None):
-    """A `Run` at the times t [s] (uniform) under u [V] held between samples, or under `controller` (a mapping with the keys
-    CONTROLLER) following `theta_ref` [rad]. `effects`: mappings with label, strength, shape as the truth files have them;
-    `noise` [rad], (samples,), is added to the angle; `decimals` rounds the applied voltage; `step` [s] is the longest step.
+def simulate(
+    params,
+    effects,
+    t,
+    u,
+    *,
+    record=0,
+    step=1e-5,
+    noise=None,
+    adc_step=0.0,
+    controller=None,
+    theta_ref=None,
+    stand=STAND_S,
+    decimals=None,
+):
+    """A `Run` at the times t [s] (uniform) under u [V] held between samples, or under `controller` (a mapping with the
+    keys CONTROLLER) following `theta_ref` [rad]. `effects`: mappings with label, strength, shape as the truth files
+    have them; `noise` [rad], (samples,), is added to the angle; `decimals` rounds the applied voltage; `step` [s] is
+    the longest step.
     """
     t, samples = np.asarray(t, float), len(t)
     dt = (t[-1] - t[0]) / (samples - 1)
@@ -213,18 +254,43 @@ def simulate(params, effects, t, u, *, record=0, step=1e-5, noise=None, adc_step
     target = np.asarray(theta_ref, float) if closed else np.zeros(samples)
     u_in = np.zeros(samples) if closed else np.asarray(u, float)
     noise = np.zeros(samples) if noise is None else np.asarray(noise, float)
-    out = march(plant, u_in, target, c, closed, dt, max(1, int(np.ceil(dt / step - 1e-9))), noise, stuck, spike, gain, stand,
-                0.0 if decimals is None else 10.0**decimals)
+    out = march(
+        plant,
+        u_in,
+        target,
+        c,
+        closed,
+        dt,
+        max(1, int(np.ceil(dt / step - 1e-9))),
+        noise,
+        stuck,
+        spike,
+        gain,
+        stand,
+        0.0 if decimals is None else 10.0**decimals,
+    )
     return Run(*out)
 
 
 def own_error(params, t, u, step=1e-5):
     """[rad] largest change of the effect-free angle when the step is halved: how far this simulator can be trusted."""
-    return float(np.abs(simulate(params, [], t, u, step=step).true - simulate(params, [], t, u, step=0.5 * step).true).max())
+    return float(
+        np.abs(simulate(params, [], t, u, step=step).true - simulate(params, [], t, u, step=0.5 * step).true).max()
+    )
 
 
 def run(servo, record, number, effects, step):
     """The recording with the effects: closed loops close around the noisy measured angle."""
-    return simulate(servo["params"], effects, record["t"], record["u"], record=number, step=step, noise=record["noise"],
-                    adc_step=servo["sensor"]["adc_step_rad"], controller=servo["controller"] if record["closed_loop"] else None,
-                    theta_ref=record["ref"], decimals=4)
+    return simulate(
+        servo["params"],
+        effects,
+        record["t"],
+        record["u"],
+        record=number,
+        step=step,
+        noise=record["noise"],
+        adc_step=servo["sensor"]["adc_step_rad"],
+        controller=servo["controller"] if record["closed_loop"] else None,
+        theta_ref=record["ref"],
+        decimals=4,
+    )

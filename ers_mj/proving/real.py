@@ -1,8 +1,9 @@
-"""Conceals effects in real recordings: EMPS, a throttle valve, a Feetech servo (their README says where they come from).
-
-What is done to the untouched records of a rig, by a sealed seed: the command acts later than it says (input_delay), the reading lags
-(sensor_lag), is rounded down (sensor_quantisation) or held for a while (sensor_dropout), or a constant part of the command goes
-unrecorded, which is a constant torque (bias_torque). Each rig is also diagnosed as it is: what is named there is its own.
+"""Conceals effects in real recordings: EMPS, a throttle valve, a Feetech servo (their README says where they come
+from).
+ What is done to the untouched records of a rig, by a sealed seed: the command acts later than it says (input_delay),
+the reading lags (sensor_lag), is rounded down (sensor_quantisation) or held for a while (sensor_dropout), or a constant
+part of the command goes unrecorded, which is a constant torque (bias_torque). Each rig is also diagnosed as it is: what
+is named there is its own.
 """
 
 from __future__ import annotations
@@ -20,10 +21,18 @@ from ers_mj.proving.catalogue import between, spells
 from ers_mj.proving.scoring import class_of, scored
 
 RIGS = {"emps": ("u_V", "x_m"), "throttle": ("u_duty_pct", "y_sensor_V"), "sts3215": ("u_V", "theta_rad")}
-FILES = {"emps": ("train.csv", "test_pulses.csv"), "throttle": ("aprbs_25s.csv", "aprbs_63s.csv"), "sts3215": ("runs.parquet", "runs_index.csv")}
+FILES = {
+    "emps": ("train.csv", "test_pulses.csv"),
+    "throttle": ("aprbs_25s.csv", "aprbs_63s.csv"),
+    "sts3215": ("runs.parquet", "runs_index.csv"),
+}
 EFFECTS = ("input_delay", "sensor_lag", "sensor_quantisation", "sensor_dropout", "bias_torque")
 COVERAGE = [(rig, name) for rig in RIGS for name in (None, *EFFECTS)]
-LATE = {"emps": (0.002, 0.03), "throttle": (0.02, 0.1), "sts3215": (0.02, 0.1)}  # [s] delay or lag, a few samples and more
+LATE = {
+    "emps": (0.002, 0.03),
+    "throttle": (0.02, 0.1),
+    "sts3215": (0.02, 0.1),
+}  # [s] delay or lag, a few samples and more
 UNTOUCHED = "untouched"  # the kind of a case that is a rig as it is: what is named there is no false alarm
 ALSO = ("torque_enable", "vin_V", "pulse_V")  # columns handed on as they are
 
@@ -56,7 +65,10 @@ def refuse_missing(folder: Path, chosen: Sequence[RealPlan]) -> None:
     for rig in dict.fromkeys(plan.rig for plan in chosen):
         for name in FILES[rig]:
             if not (folder / rig / name).is_file():
-                raise InputError(f"{folder / rig / name}: there is no such file, --real needs a folder with {', '.join(RIGS)} as ../shared/data has them")
+                raise InputError(
+                    f"{folder / rig / name}: there is no such file, --real needs a folder with {', '.join(RIGS)} as"
+                    " ../shared/data has them"
+                )
 
 
 def make(plan: RealPlan, folder: Path, seed: int) -> tuple[dict[str, str], dict]:
@@ -71,14 +83,35 @@ def make(plan: RealPlan, folder: Path, seed: int) -> tuple[dict[str, str], dict]
         touched.append(new)
         moved.append(change)
     size = None if plan.label in (None, "bias_torque") else float(np.sqrt(np.nanmean(np.concatenate(moved) ** 2)))
-    effects = [{"label": plan.label, "strength": strength, "shape": {"form": "rounded down" if plan.label == "sensor_quantisation" else ""}}] if plan.label else []
-    truth = {"case": plan.name, "kind": "single" if plan.label else UNTOUCHED, "labels": [plan.label] if plan.label else [], "rig": plan.rig,
-             "effects": effects, "size": size, "size_unit": y.rpartition("_")[2], "visibility_after_refit_sigma": None, "seed": [seed, plan.index]}
+    effects = (
+        [
+            {
+                "label": plan.label,
+                "strength": strength,
+                "shape": {"form": "rounded down" if plan.label == "sensor_quantisation" else ""},
+            }
+        ]
+        if plan.label
+        else []
+    )
+    truth = {
+        "case": plan.name,
+        "kind": "single" if plan.label else UNTOUCHED,
+        "labels": [plan.label] if plan.label else [],
+        "rig": plan.rig,
+        "effects": effects,
+        "size": size,
+        "size_unit": y.rpartition("_")[2],
+        "visibility_after_refit_sigma": None,
+        "seed": [seed, plan.index],
+    }
     return {f"rec{k + 1}.csv": _csv(record) for k, record in enumerate(touched)}, truth
 
 
 def _records(folder: Path, rig: str, rng: np.random.Generator) -> list[dict[str, np.ndarray]]:
-    """Columns by name of every record of a rig; of the many of the servo, those of one trajectory and load, the same in every case."""
+    """Columns by name of every record of a rig; of the many of the servo, those of one trajectory and load, the same in
+    every case.
+    """
     u, y = RIGS[rig]
     wanted = ("t_s", u, y, *ALSO)
     if rig != "sts3215":
@@ -88,8 +121,14 @@ def _records(folder: Path, rig: str, rng: np.random.Generator) -> list[dict[str,
     rows = [k for k, trajectory in enumerate(index["trajectory"]) if trajectory not in ("brutal", "lift_and_drop")]
     setups = sorted({tuple(index[c][k] for c in ("trajectory", "kp", "mass_kg", "length_m")) for k in rows})
     setup = setups[int(rng.integers(len(setups)))]
-    runs = [index["run"][k] for k in rows if tuple(index[c][k] for c in ("trajectory", "kp", "mass_kg", "length_m")) == setup][:3]
-    table = pyarrow.parquet.read_table(folder / rig / "runs.parquet", columns=["run", *(c for c in wanted if c != "pulse_V")])
+    runs = [
+        index["run"][k]
+        for k in rows
+        if tuple(index[c][k] for c in ("trajectory", "kp", "mass_kg", "length_m")) == setup
+    ][:3]
+    table = pyarrow.parquet.read_table(
+        folder / rig / "runs.parquet", columns=["run", *(c for c in wanted if c != "pulse_V")]
+    )
     number = np.asarray(table["run"])
     return [{c: np.asarray(table[c], float)[number == run] for c in table.column_names if c != "run"} for run in runs]
 
@@ -98,7 +137,9 @@ def _records(folder: Path, rig: str, rng: np.random.Generator) -> list[dict[str,
 
 
 def draw(rng: np.random.Generator, plan: RealPlan, records: Sequence[Mapping], u: str, y: str) -> float:
-    """Strength: delay or lag [s], step [output unit], mean length of a dropout [s], unrecorded part of the command [input unit]."""
+    """Strength: delay or lag [s], step [output unit], mean length of a dropout [s], unrecorded part of the command
+    [input unit].
+    """
     if plan.label in ("input_delay", "sensor_lag"):
         return between(rng, *LATE[plan.rig])
     if plan.label == "sensor_quantisation":
@@ -106,17 +147,26 @@ def draw(rng: np.random.Generator, plan: RealPlan, records: Sequence[Mapping], u
     if plan.label == "sensor_dropout":
         return between(rng, 0.05, 0.4)
     if plan.label == "bias_torque":
-        return float(np.nanmean([np.nanstd(r[u]) for r in records])) * between(rng, 0.05, 0.3) * float(rng.choice([-1.0, 1.0]))
+        return (
+            float(np.nanmean([np.nanstd(r[u]) for r in records]))
+            * between(rng, 0.05, 0.3)
+            * float(rng.choice([-1.0, 1.0]))
+        )
     return 0.0
 
 
-def conceal(rng: np.random.Generator, record: Mapping[str, np.ndarray], label: str | None, s: float, u: str, y: str) -> tuple[dict, np.ndarray]:
+def conceal(
+    rng: np.random.Generator, record: Mapping[str, np.ndarray], label: str | None, s: float, u: str, y: str
+) -> tuple[dict, np.ndarray]:
     """(the record with the effect, how far it moved the output (N,))."""
     out = {name: values.copy() for name, values in record.items()}
     t, theta = out["t_s"], out[y]
     if label == "input_delay":
         late = max(1, round(s / float(np.median(np.diff(t)))))
-        out = {name: (values[late:] if name in (u, "pulse_V") else values[: values.size - late]) for name, values in out.items()}
+        out = {
+            name: values[late:] if name in (u, "pulse_V") else values[: values.size - late]
+            for name, values in out.items()
+        }
         return out, theta[late:] - theta[:-late]
     if label == "sensor_lag":
         out[y] = lagged(t, theta, s)
@@ -148,7 +198,9 @@ def lagged(t: np.ndarray, theta: np.ndarray, tau: float) -> np.ndarray:
 
 
 def _csv(record: Mapping[str, np.ndarray]) -> str:
-    columns = {name: (np.round(values).astype(int) if name == "torque_enable" else values) for name, values in record.items()}
+    columns = {
+        name: np.round(values).astype(int) if name == "torque_enable" else values for name, values in record.items()
+    }
     rows = zip(*([("" if x != x else f"{x:.10g}") for x in values.tolist()] for values in columns.values()))
     return "\n".join([",".join(columns), *(",".join(row) for row in rows), ""])
 
@@ -157,7 +209,9 @@ def _csv(record: Mapping[str, np.ndarray]) -> str:
 
 
 def scored_real(rows: Sequence[dict]) -> dict:
-    """The shares of the contract, and those that count here: what was concealed found again beside what the rig has of its own."""
+    """The shares of the contract, and those that count here: what was concealed found again beside what the rig has of
+    its own.
+    """
     own = {r["rig"]: r for r in rows if r["kind"] == UNTOUCHED}
     told = []
     singles = [r for r in rows if r["kind"] == "single"]
@@ -165,11 +219,29 @@ def scored_real(rows: Sequence[dict]) -> dict:
         alone = own.get(r["rig"], {"named": [], "floor": None})
         its_own, named = {class_of(n) for n in alone["named"]}, {class_of(n) for n in r["named"]}
         over = r["size"] / alone["floor"] if r["size"] and alone["floor"] else None
-        told.append({"case": r["case"], "rig": r["rig"], "concealed": r["labels"][0], "strength": r["strength"], "size_over_floor": over, "named": r["named"],
-                     "found": class_of(r["labels"][0]) in named, "was_its_own": class_of(r["labels"][0]) in its_own,
-                     "own_kept": sum(c in named for c in its_own), "own": len(its_own),
-                     "others": sorted(n for n in r["named"] if class_of(n) not in its_own | {class_of(r["labels"][0])})})
+        told.append(
+            {
+                "case": r["case"],
+                "rig": r["rig"],
+                "concealed": r["labels"][0],
+                "strength": r["strength"],
+                "size_over_floor": over,
+                "named": r["named"],
+                "found": class_of(r["labels"][0]) in named,
+                "was_its_own": class_of(r["labels"][0]) in its_own,
+                "own_kept": sum(c in named for c in its_own),
+                "own": len(its_own),
+                "others": sorted(n for n in r["named"] if class_of(n) not in its_own | {class_of(r["labels"][0])}),
+            }
+        )
     fresh = [x for x in told if not x["was_its_own"]]
-    return {**scored(singles), "cases": len(rows), "untouched": len(own), "found": sum(x["found"] for x in told) / len(told) if told else None,
-            "found_new": sum(x["found"] for x in fresh) / len(fresh) if fresh else None, "found_new_of": len(fresh),
-            "own": {rig: r["named"] for rig, r in own.items()}, "concealed_in_real": told}
+    return {
+        **scored(singles),
+        "cases": len(rows),
+        "untouched": len(own),
+        "found": sum(x["found"] for x in told) / len(told) if told else None,
+        "found_new": sum(x["found"] for x in fresh) / len(fresh) if fresh else None,
+        "found_new_of": len(fresh),
+        "own": {rig: r["named"] for rig, r in own.items()},
+        "concealed_in_real": told,
+    }

@@ -1,8 +1,8 @@
-"""Records a servo in MuJoCo: its mechanics are MuJoCo's, its electrics, sensor, controller and remaining laws a compiled function's.
-
-MuJoCo's step v += h a, q += h v is second order if q is read as the angle half a step later. So the laws take q as the
-middle of the coming step, and what is observed is q - h v / 2. The winding's current and every other state of the laws is
-stepped by Heun's rule at 15 us or less, with the speed running on as in the last step.
+"""Records a servo in MuJoCo: its mechanics are MuJoCo's, its electrics, sensor, controller and remaining laws a
+compiled function's.
+ MuJoCo's step v += h a, q += h v is second order if q is read as the angle half a step later. So the laws take q as the
+middle of the coming step, and what is observed is q - h v / 2. The winding's current and every other state of the laws
+is stepped by Heun's rule at 15 us or less, with the speed running on as in the last step.
 """
 
 from __future__ import annotations
@@ -15,8 +15,29 @@ from numba import njit
 
 from ers_mj.plants.mjcf import unlogged
 from ers_mj.proving.catalogue import put_effects, samples_of
-from ers_mj.proving.laws import (APP, BRI, BUS, CONTROLLER, CUR, LAG, STATES, TABLE_1, TH, THM, W, WM, bristle_rate, current_rate, dry, free_torques,
-                                 friction_level, inertia, motor_torque, plant_of, slow_rates)
+from ers_mj.proving.laws import (
+    APP,
+    BRI,
+    BUS,
+    CONTROLLER,
+    CUR,
+    LAG,
+    STATES,
+    TABLE_1,
+    TH,
+    THM,
+    W,
+    WM,
+    bristle_rate,
+    current_rate,
+    dry,
+    free_torques,
+    friction_level,
+    inertia,
+    motor_torque,
+    plant_of,
+    slow_rates,
+)
 from ers_mj.proving.mechanism import LIGHT, mechanism
 from ers_mj.proving.quick import STAND_S, Run, take
 
@@ -25,9 +46,21 @@ TOUCH = 1e-7  # [rad] from theta_0 within which the rudder stands on it
 N = TABLE_1["n"]
 
 
-def record(params: Mapping[str, float], effects: Sequence[Mapping], t: np.ndarray, u: np.ndarray | None, *, number: int = 0,
-           step: float = 5e-5, linkage: str = "constant", noise: np.ndarray | None = None, adc_step: float = 0.0,
-           controller: Mapping[str, float] | None = None, theta_ref: np.ndarray | None = None, decimals: int | None = None) -> Run:
+def record(
+    params: Mapping[str, float],
+    effects: Sequence[Mapping],
+    t: np.ndarray,
+    u: np.ndarray | None,
+    *,
+    number: int = 0,
+    step: float = 5e-5,
+    linkage: str = "constant",
+    noise: np.ndarray | None = None,
+    adc_step: float = 0.0,
+    controller: Mapping[str, float] | None = None,
+    theta_ref: np.ndarray | None = None,
+    decimals: int | None = None,
+) -> Run:
     """A `Run` at the uniform times t (samples,) [s], as `quick.simulate` gives one, from MuJoCo.
 
     Args:
@@ -56,10 +89,24 @@ def record(params: Mapping[str, float], effects: Sequence[Mapping], t: np.ndarra
     printed = 0.0 if decimals is None else 10.0**decimals
 
     laws, e = m.laws, h / parts
-    y, work, speeds, memory, out = _relaxed(laws), np.zeros((4, STATES)), np.zeros(2), np.zeros(3), np.zeros((5, samples))
+    y, work, speeds, memory, out = (
+        _relaxed(laws),
+        np.zeros((4, STATES)),
+        np.zeros(2),
+        np.zeros(3),
+        np.zeros((5, samples)),
+    )
     delay, late = round(float(laws["delay_s"][0]) / e), round(float(laws["lag_s"][0]) / e)
     ring = np.full(max(2 * late, 1) if laws["lag_form"][0] == 3 else late + 1, float(laws["theta_0"][0]))
-    views = (data.qpos, data.qvel, data.ctrl, model.tendon_frictionloss, model.dof_frictionloss, model.dof_armature, m.places)
+    views = (
+        data.qpos,
+        data.qvel,
+        data.ctrl,
+        model.tendon_frictionloss,
+        model.dof_frictionloss,
+        model.dof_armature,
+        m.places,
+    )
     stood = -round(STAND_S / h)
     with unlogged():
         for count in range(stood, 0):
@@ -68,7 +115,25 @@ def record(params: Mapping[str, float], effects: Sequence[Mapping], t: np.ndarra
         count = 0
         for k in range(samples):
             observe(y, h, speeds, data.qpos, data.qvel, m.places)
-            take(laws[0], y, k, out, ring, count * parts, late, noise, stuck, spike, c, memory, target, u_in, controller is not None, dt, printed)
+            take(
+                laws[0],
+                y,
+                k,
+                out,
+                ring,
+                count * parts,
+                late,
+                noise,
+                stuck,
+                spike,
+                c,
+                memory,
+                target,
+                u_in,
+                controller is not None,
+                dt,
+                printed,
+            )
             for count in range(k * substeps, (k + 1) * substeps):
                 push(laws, y, work, speeds, count, h, parts, out, substeps, delay, gain[k], ring, *views)
                 mujoco.mj_step(model, data)
@@ -85,7 +150,9 @@ def _relaxed(laws: np.ndarray) -> np.ndarray:
 
 @njit(cache=True)
 def observe(y, h, speeds, qpos, qvel, places):
-    """Write angle and speed of rudder and motor at this instant into y; (rudder, motor) speeds before it stand in `speeds`."""
+    """Write angle and speed of rudder and motor at this instant into y; (rudder, motor) speeds before it stand in
+    `speeds`.
+    """
     rocker, gap, rotor = places[0], places[1], places[2]
     y[TH], y[W] = qpos[rocker], qvel[rocker]
     if gap >= 0:
@@ -107,10 +174,11 @@ def fast_rates(p, y, u, gain, dy):
 
 @njit(cache=True)
 def preload(p, x, w, h, drive, level):
-    """(torque, dry friction) [N m] of T_LH Sgn(theta - theta_0) in a step that begins at x = theta - theta_0 with speed w.
+    """(torque, dry friction) [N m] of T_LH Sgn(theta - theta_0) in a step that begins at x = theta - theta_0 with speed
+    w.
 
-    Where theta_0 is passed the torque is the mean over the step. Where the rudder stops there, under a torque `drive` within
-    the band, T_LH is one more dry friction, which MuJoCo solves as a set.
+    Where theta_0 is passed the torque is the mean over the step. Where the rudder stops there, under a torque `drive`
+    within the band, T_LH is one more dry friction, which MuJoCo solves as a set.
     """
     after = x + h * w
     push_on = p.J * (1.0 - p.two * p.share_J) * w / h + drive
@@ -125,9 +193,30 @@ def preload(p, x, w, h, drive, level):
 
 
 @njit(cache=True)
-def push(laws, y, work, speeds, count, h, parts, out, substeps, delay, gain, ring, qpos, qvel, ctrl, frictionloss, joint_friction,
-         joint_armature, places):
-    """Carry the states of the laws over MuJoCo's coming step number `count`, and set the torques and friction that act in it."""
+def push(
+    laws,
+    y,
+    work,
+    speeds,
+    count,
+    h,
+    parts,
+    out,
+    substeps,
+    delay,
+    gain,
+    ring,
+    qpos,
+    qvel,
+    ctrl,
+    frictionloss,
+    joint_friction,
+    joint_armature,
+    places,
+):
+    """Carry the states of the laws over MuJoCo's coming step number `count`, and set the torques and friction that act
+    in it.
+    """
     p = laws[0]
     observe(y, h, speeds, qpos, qvel, places)
     pull, pull_m = (y[W] - speeds[0]) / h, (y[WM] - speeds[1]) / h

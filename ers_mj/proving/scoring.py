@@ -13,10 +13,23 @@ from scipy.stats import binomtest
 
 from ers_mj.proving.parameters import covered
 
-CLASSES = ({"bias_torque", "asymmetric_friction"}, {"inductance", "input_delay", "sensor_lag"},
-           {"voltage_saturation", "current_limit", "supply_sag"}, {"cogging", "transmission_ripple"})
+CLASSES = (
+    {"bias_torque", "asymmetric_friction"},
+    {"inductance", "input_delay", "sensor_lag"},
+    {"voltage_saturation", "current_limit", "supply_sag"},
+    {"cogging", "transmission_ripple"},
+)
 SUBSYSTEMS = {
-    "drive": {"cogging", "voltage_saturation", "current_limit", "drive_dead_zone", "inductance", "input_delay", "thermal_drift", "supply_sag"},
+    "drive": {
+        "cogging",
+        "voltage_saturation",
+        "current_limit",
+        "drive_dead_zone",
+        "inductance",
+        "input_delay",
+        "thermal_drift",
+        "supply_sag",
+    },
     "transmission": {"backlash", "shaft_compliance", "variable_ratio", "transmission_ripple"},
     "sensor": {"sensor_lag", "sensor_nonlinearity", "sensor_quantisation", "sensor_dropout"},
 }
@@ -43,15 +56,31 @@ def row_of(truth: Mapping, answer: Mapping) -> dict:
     fit, remainder = document.get("fit") or {}, document.get("remainder") or {}
     missing = document.get("missing") or []
     where = [entry.get("label") for entry in document.get("where") or [] if entry.get("axis") == "subsystem"]
-    return {"case": truth["case"], "kind": truth["kind"], "labels": truth["labels"], "linkage": truth.get("linkage"),
-            "clutter": [e["label"] for e in truth.get("clutter", [])], "rig": truth.get("rig"), "size": truth.get("size"),
-            "strength": truth["effects"][0]["strength"] if truth.get("effects") else None, "visibility": _or_nan(truth["visibility_after_refit_sigma"]),
-            "each": {e["label"]: e.get("quick_visibility_sigma") for e in truth.get("effects", [])},
-            "named": [m["effect"] for m in missing], "verdict": document.get("verdict") or NO_ANSWER, "error": answer.get("error"),
-            "significant": bool(remainder.get("significant")), "where": where[:1], "beliefs": beliefs(missing),
-            "before": fit.get("heldout_rmse_before_rad"), "after": fit.get("heldout_rmse_after_rad"), "floor": fit.get("noise_floor_rad"),
-            "cpu_s": answer.get("cpu_s"), "wall_s": answer.get("wall_s"), "peak_MiB": answer.get("peak_MiB"),
-            "parameters": covered(truth, document)}
+    return {
+        "case": truth["case"],
+        "kind": truth["kind"],
+        "labels": truth["labels"],
+        "linkage": truth.get("linkage"),
+        "clutter": [e["label"] for e in truth.get("clutter", [])],
+        "rig": truth.get("rig"),
+        "size": truth.get("size"),
+        "strength": truth["effects"][0]["strength"] if truth.get("effects") else None,
+        "visibility": _or_nan(truth["visibility_after_refit_sigma"]),
+        "each": {e["label"]: e.get("quick_visibility_sigma") for e in truth.get("effects", [])},
+        "named": [m["effect"] for m in missing],
+        "verdict": document.get("verdict") or NO_ANSWER,
+        "error": answer.get("error"),
+        "significant": bool(remainder.get("significant")),
+        "where": where[:1],
+        "beliefs": beliefs(missing),
+        "before": fit.get("heldout_rmse_before_rad"),
+        "after": fit.get("heldout_rmse_after_rad"),
+        "floor": fit.get("noise_floor_rad"),
+        "cpu_s": answer.get("cpu_s"),
+        "wall_s": answer.get("wall_s"),
+        "peak_MiB": answer.get("peak_MiB"),
+        "parameters": covered(truth, document),
+    }
 
 
 def _or_nan(x: float | None) -> float:
@@ -62,7 +91,11 @@ def beliefs(missing: Sequence[Mapping]) -> list[tuple[str, float]]:
     """(name, probability) of the first named effect and of its alternatives; what they leave is the first one's."""
     if not missing:
         return []
-    others = [(o["effect"], float(o["probability"])) for o in missing[0].get("alternatives") or [] if o.get("probability") is not None]
+    others = [
+        (o["effect"], float(o["probability"]))
+        for o in missing[0].get("alternatives") or []
+        if o.get("probability") is not None
+    ]
     own = missing[0].get("probability")
     return [(missing[0]["effect"], float(own) if own is not None else 1.0 - sum(p for _, p in others)), *others]
 
@@ -90,21 +123,30 @@ def scored(rows: Sequence[Mapping]) -> dict:
         "top1_class": (sum(map(right, singles)), len(singles)),
         "top1_class_visible": (sum(map(right, visible)), len(visible)),
         "false_alarm_rate": (sum(bool(r["named"]) for r in by["null"]), len(by["null"])),
-        "pair_recall": (found, concealed), "pair_recall_visible": (sum(seen), len(seen)),
+        "pair_recall": (found, concealed),
+        "pair_recall_visible": (sum(seen), len(seen)),
         "pair_spurious": (spurious, concealed),
         "unexplained_recall": (sum(r["significant"] for r in by[OUTSIDE]), len(by[OUTSIDE])),
         "false_flag_rate": (sum(r["significant"] for r in rows if r["kind"] != OUTSIDE), len(rows) - len(by[OUTSIDE])),
         "subsystem_recall": (sum(r["where"] == [subsystem_of(r["labels"][0])] for r in singles), len(singles)),
     }
-    return {"cases": len(rows), "counts": {kind: len(group) for kind, group in by.items()},
-            **{name: k / n if n else None for name, (k, n) in counted.items()},
-            "confusion": confusion(rows), "of": {name: list(pair) for name, pair in counted.items()},
-            "ci95": {name: list(wilson(k, n)) for name, (k, n) in counted.items() if n and k <= n},
-            "accuracy": accuracy(singles), "reliability": reliability(rows), "error_over_floor": _over_floor(rows),
-            "parameters": _parameters(rows), "failures": [f"{r['case']}: {r['error']}" for r in rows if r["error"]],
-            "cpu_s": _spread([r["cpu_s"] for r in rows]), "wall_s": _spread([r["wall_s"] for r in rows]),
-            "cpu_s_of_a_pair": _spread([r["cpu_s"] for r in by[SEVERAL] if len(r["labels"]) == 2]),
-            "peak_MiB": max((r["peak_MiB"] for r in rows if r["peak_MiB"] is not None), default=None)}
+    return {
+        "cases": len(rows),
+        "counts": {kind: len(group) for kind, group in by.items()},
+        **{name: k / n if n else None for name, (k, n) in counted.items()},
+        "confusion": confusion(rows),
+        "of": {name: list(pair) for name, pair in counted.items()},
+        "ci95": {name: list(wilson(k, n)) for name, (k, n) in counted.items() if n and k <= n},
+        "accuracy": accuracy(singles),
+        "reliability": reliability(rows),
+        "error_over_floor": _over_floor(rows),
+        "parameters": _parameters(rows),
+        "failures": [f"{r['case']}: {r['error']}" for r in rows if r["error"]],
+        "cpu_s": _spread([r["cpu_s"] for r in rows]),
+        "wall_s": _spread([r["wall_s"] for r in rows]),
+        "cpu_s_of_a_pair": _spread([r["cpu_s"] for r in by[SEVERAL] if len(r["labels"]) == 2]),
+        "peak_MiB": max((r["peak_MiB"] for r in rows if r["peak_MiB"] is not None), default=None),
+    }
 
 
 def _several(rows: Iterable[Mapping]) -> tuple[int, int, int]:
@@ -118,7 +160,9 @@ def _several(rows: Iterable[Mapping]) -> tuple[int, int, int]:
 
 
 def _hits(row: Mapping) -> list[tuple[float, bool]]:
-    """(visibility of its own [sigma], whether it is named by class) of each effect of several; a linkage, which has no such number, is seen."""
+    """(visibility of its own [sigma], whether it is named by class) of each effect of several; a linkage, which has no
+    such number, is seen.
+    """
     named, own, out = Counter(map(class_of, row["named"])), row.get("each") or {}, []
     for label in sorted(row["labels"], key=lambda label: -(own.get(label) or np.inf)):
         out.append((own.get(label) or np.inf, named[class_of(label)] > 0))
@@ -131,7 +175,9 @@ def confusion(rows: Iterable[Mapping]) -> dict[str, dict[str, int]]:
     table: dict[str, Counter] = {}
     for row in rows:
         truth = {"null": NOTHING, OUTSIDE: OUTSIDE}.get(row["kind"]) or "+".join(sorted(row["labels"]))
-        table.setdefault(truth, Counter())["+".join(sorted(row["named"])) if row["kind"] == SEVERAL and row["named"] else first(row)] += 1
+        table.setdefault(truth, Counter())[
+            "+".join(sorted(row["named"])) if row["kind"] == SEVERAL and row["named"] else first(row)
+        ] += 1
     return {truth: dict(named.most_common()) for truth, named in sorted(table.items())}
 
 
@@ -147,8 +193,19 @@ def accuracy(singles: Sequence[Mapping]) -> list[dict]:
     for low, high in zip(EDGES, EDGES[1:]):
         inside = [r for r in singles if low <= r["visibility"] < high]
         k = sum(map(right, inside))
-        out += [{"from_sigma": low, "to_sigma": high if np.isfinite(high) else None, "right": k, "of": len(inside), "ci95": list(wilson(k, len(inside)))}
-                ] if inside else []
+        out += (
+            [
+                {
+                    "from_sigma": low,
+                    "to_sigma": high if np.isfinite(high) else None,
+                    "right": k,
+                    "of": len(inside),
+                    "ci95": list(wilson(k, len(inside))),
+                }
+            ]
+            if inside
+            else []
+        )
     return out
 
 
@@ -160,7 +217,14 @@ def reliability(rows: Iterable[Mapping]) -> list[dict]:
         inside = [(p, so) for p, so in said if low <= p < high or (high == 1.0 and p == 1.0)]
         if inside:
             k = sum(so for _, so in inside)
-            out.append({"probability": float(np.mean([p for p, _ in inside])), "right": k, "of": len(inside), "ci95": list(wilson(k, len(inside)))})
+            out.append(
+                {
+                    "probability": float(np.mean([p for p, _ in inside])),
+                    "right": k,
+                    "of": len(inside),
+                    "ci95": list(wilson(k, len(inside))),
+                }
+            )
     return out
 
 
@@ -170,25 +234,41 @@ def _over_floor(rows: Iterable[Mapping]) -> dict:
 
 
 def _parameters(rows: Iterable[Mapping]) -> dict:
-    """Error and coverage of the 95 % intervals, by parameter and pooled: the baseline's, the same where nothing at all is concealed (clutter
-    moves parameters, too), the effects'."""
+    """Error and coverage of the 95 % intervals, by parameter and pooled: the baseline's, the same where nothing at all
+    is concealed (clutter moves parameters, too), the effects'."""
     entries = [e for r in rows for e in r["parameters"]]
-    bare = [e for r in rows for e in r["parameters"] if e["owner"] == "baseline" and not r["labels"] and not r["clutter"]]
+    bare = [
+        e for r in rows for e in r["parameters"] if e["owner"] == "baseline" and not r["labels"] and not r["clutter"]
+    ]
     out = {"baseline_alone": {"all": _coverage(bare)}}
     for owner in ("baseline", "effect"):
         mine = [e for e in entries if e["owner"] == owner]
-        out[owner] = {"all": _coverage(mine)} | {name: _coverage([e for e in mine if e["name"] == name]) for name in dict.fromkeys(e["name"] for e in mine)}
+        out[owner] = {"all": _coverage(mine)} | {
+            name: _coverage([e for e in mine if e["name"] == name]) for name in dict.fromkeys(e["name"] for e in mine)
+        }
     return out
 
 
 def _coverage(entries: Sequence[Mapping]) -> dict:
     """Share of intervals that hold the truth, how many there are, and the median relative error."""
     known = [e for e in entries if e["inside"] is not None]
-    k, errors = sum(e["inside"] for e in known), [e["relative_error"] for e in entries if e["relative_error"] is not None]
-    return {"inside": k, "of": len(known), "coverage": k / len(known) if known else None,
-            "ci95": list(wilson(k, len(known))) if known else None, "median_relative_error": float(np.median(errors)) if errors else None}
+    k, errors = (
+        sum(e["inside"] for e in known),
+        [e["relative_error"] for e in entries if e["relative_error"] is not None],
+    )
+    return {
+        "inside": k,
+        "of": len(known),
+        "coverage": k / len(known) if known else None,
+        "ci95": list(wilson(k, len(known))) if known else None,
+        "median_relative_error": float(np.median(errors)) if errors else None,
+    }
 
 
 def _spread(values: Iterable[float | None]) -> dict:
     known = [x for x in values if x is not None]
-    return {"median": float(np.median(known)), "p90": float(np.quantile(known, 0.9)), "max": float(max(known))} if known else {}
+    return (
+        {"median": float(np.median(known)), "p90": float(np.quantile(known, 0.9)), "max": float(max(known))}
+        if known
+        else {}
+    )

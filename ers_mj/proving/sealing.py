@@ -1,9 +1,9 @@
 """The folder of a proof: what is handed out, what is sealed, what was answered; every file whole or not at all.
 
-    settings.json                     seed, number and kind of cases, and the code that made them
-    case-NNN/                         recordings and datasheet: all that the diagnosis is handed
-    sealed/case-NNN.json, truth.json  the truth, each case bound to its files by their hashes; truth.sha256 its own
-    answers/case-NNN.json             what the diagnosis said, bound to the same hashes and to the code that said it
+settings.json                     seed, number and kind of cases, and the code that made them
+case-NNN/                         recordings and datasheet: all that the diagnosis is handed
+sealed/case-NNN.json, truth.json  the truth, each case bound to its files by their hashes; truth.sha256 its own
+answers/case-NNN.json             what the diagnosis said, bound to the same hashes and to the code that said it
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ def _hash_of_sources(wanted: Callable[[tuple[str, ...]], bool]) -> str:
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Hold the folder of a proof, made if need be, so that no other run writes into it meanwhile; let go of however the run ends.
+    """Hold the folder of a proof, made if need be, so that no other run writes into it meanwhile; let go of however the
+    run ends.
 
     Raises:
         InputError: it cannot be made, or another run holds it.
@@ -62,7 +63,9 @@ def held(folder: Path) -> Iterator[None]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            raise InputError(f"{folder}: another `ers prove` is at work in it, wait for it or name another folder") from None
+            raise InputError(
+                f"{folder}: another `ers prove` is at work in it, wait for it or name another folder"
+            ) from None
         yield
     finally:
         os.close(handle)
@@ -79,8 +82,13 @@ def begin(folder: Path, settings: Mapping, force: bool) -> bool:
         (folder / ANSWERS).mkdir(exist_ok=True)  # somebody may have taken the answers away, to have them given again
         return True
     if known is not None and not force:
-        told = " and ".join(f"{key} {known.get(key)}" for key in settings if known.get(key) != settings[key] and key != "made_by")
-        raise InputError(f"{folder}: holds a proof with {told or 'cases that other code made'}, name another folder or give --force to replace it")
+        told = " and ".join(
+            f"{key} {known.get(key)}" for key in settings if known.get(key) != settings[key] and key != "made_by"
+        )
+        raise InputError(
+            f"{folder}: holds a proof with {told or 'cases that other code made'}, name another folder or give --force"
+            " to replace it"
+        )
     if known is None and not force and folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder}: holds files already, give --force to write into it or name another folder")
     if known is not None:

@@ -17,9 +17,15 @@ SCATTER = {"J": 0.12, "B": 0.15, "K_t": 0.08, "K_e": 0.08, "k_s": 0.1, "T_LH": 0
 
 def draw_params(rng):
     """True parameters (SI) about Table 1; n exact, theta_0 off by a few tenths of a degree."""
-    params = {name: float(TABLE_1[name] * np.exp(sd * np.clip(rng.standard_normal(), -2.0, 2.0))) for name, sd in SCATTER.items()}
+    params = {
+        name: float(TABLE_1[name] * np.exp(sd * np.clip(rng.standard_normal(), -2.0, 2.0)))
+        for name, sd in SCATTER.items()
+    }
     params["T_LH"] = max(params["T_LH"], 1.05 * params["F_c"])
-    shares = {"motor_inertia_share": float(rng.uniform(0.45, 0.75)), "motor_damping_share": float(rng.uniform(0.3, 0.7))}
+    shares = {
+        "motor_inertia_share": float(rng.uniform(0.45, 0.75)),
+        "motor_damping_share": float(rng.uniform(0.3, 0.7)),
+    }
     return params | {"theta_0": TABLE_1["theta_0"] + float(rng.normal(0.0, 0.3)) * DEG, "n": TABLE_1["n"]} | shares
 
 
@@ -28,18 +34,32 @@ def draw_sensor(rng, coloured, rates, weights):
     bits = int(rng.choice([0, 0, 12, 13, 14]))
     step = 120.0 * DEG / 2**bits if bits else 0.0
     sigma = float(np.exp(rng.uniform(np.log(0.005), np.log(0.03)))) * DEG
-    return {"noise_sigma_rad": sigma, "noise_sigma_eff_rad": float(np.hypot(sigma, step / np.sqrt(12.0))),
-            "noise_colour_corner_hz": float(rng.uniform(20.0, 200.0)) if rng.random() < coloured else None,
-            "adc_bits": bits, "adc_step_rad": step, "has_current": bool(rng.random() < 0.5),
-            "current_sigma_A": float(rng.uniform(0.01, 0.05)),
-            "sample_rate_hz": int(rng.choice(rates, p=weights))}
+    return {
+        "noise_sigma_rad": sigma,
+        "noise_sigma_eff_rad": float(np.hypot(sigma, step / np.sqrt(12.0))),
+        "noise_colour_corner_hz": float(rng.uniform(20.0, 200.0)) if rng.random() < coloured else None,
+        "adc_bits": bits,
+        "adc_step_rad": step,
+        "has_current": bool(rng.random() < 0.5),
+        "current_sigma_A": float(rng.uniform(0.01, 0.05)),
+        "sample_rate_hz": int(rng.choice(rates, p=weights)),
+    }
 
 
 def draw_controller(rng, umax):
     """PID gains [V/rad ...] and the feed-forward of spring and preload, on in half of the cases."""
-    gains = [rng.uniform(15.0, 30.0), rng.uniform(30.0, 60.0), rng.uniform(0.2, 0.5), rng.uniform(0.003, 0.009), umax,
-             rng.integers(2), rng.uniform(0.7, 0.95) * TABLE_1["R"] / (TABLE_1["n"] * TABLE_1["K_t"]), TABLE_1["T_LH"],
-             TABLE_1["k_s"], 15.0 * DEG]
+    gains = [
+        rng.uniform(15.0, 30.0),
+        rng.uniform(30.0, 60.0),
+        rng.uniform(0.2, 0.5),
+        rng.uniform(0.003, 0.009),
+        umax,
+        rng.integers(2),
+        rng.uniform(0.7, 0.95) * TABLE_1["R"] / (TABLE_1["n"] * TABLE_1["K_t"]),
+        TABLE_1["T_LH"],
+        TABLE_1["k_s"],
+        15.0 * DEG,
+    ]
     return {name: float(value) for name, value in zip(CONTROLLER, gains)}
 
 
@@ -70,8 +90,8 @@ def open_size(params, t, wave, umax, wanted):
 
 
 def closed_size(params, t, wave, controller, wanted):
-    """[rad] amplitude at which the effect-free loop travels at least half of `wanted` [rad], at most 25 deg: a loop without
-    feed-forward breaks away late."""
+    """[rad] amplitude at which the effect-free loop travels at least half of `wanted` [rad], at most 25 deg: a loop
+    without feed-forward breaks away late."""
     size = 0.5 * wanted
     while size < 25.0 * DEG:
         ref = TABLE_1["theta_0"] + size * wave
@@ -93,10 +113,21 @@ def draw_record(rng, kind, params, controller, sensor):
         wave = rng.uniform(-0.2, 0.2) + wave
         ref = np.round(TABLE_1["theta_0"] + closed_size(params, t, wave, controller, wanted) * wave, 5)
     else:
-        u = np.round(np.clip(open_size(params, t, wave, controller["UMAX"], wanted) * wave, -controller["UMAX"],
-                             controller["UMAX"]), 4)
-    return {"kind": kind, "closed_loop": closed, "t": t, "u": u, "ref": ref, "bare": {},
-            "noise": noise_of(rng, t.size, sensor)}
+        u = np.round(
+            np.clip(
+                open_size(params, t, wave, controller["UMAX"], wanted) * wave, -controller["UMAX"], controller["UMAX"]
+            ),
+            4,
+        )
+    return {
+        "kind": kind,
+        "closed_loop": closed,
+        "t": t,
+        "u": u,
+        "ref": ref,
+        "bare": {},
+        "noise": noise_of(rng, t.size, sensor),
+    }
 
 
 def draw_kinds(rng):
@@ -113,8 +144,13 @@ def draw_servo(rng, coloured=0.0, rates=RATES, weights=WEIGHTS):
     servo["records"] = [draw_record(rng, kind, params, controller, sensor) for kind in draw_kinds(rng)]
     runs = [run(servo, record, k, [], COARSE) for k, record in enumerate(servo["records"])]
     angles = np.concatenate([r.true for r in runs]) - params["theta_0"]
-    servo["context"] = {"params": params, "travel": (float(angles.min()), float(angles.max())), "records": len(runs),
-                        "peak_V": float(max(np.abs(r.u).max() for r in runs)), "umax_V": controller["UMAX"],
-                        "peak_A": float(max(np.abs(r.i_A).max() for r in runs)),
-                        "durations": [float(r["t"][-1]) for r in servo["records"]]}
+    servo["context"] = {
+        "params": params,
+        "travel": (float(angles.min()), float(angles.max())),
+        "records": len(runs),
+        "peak_V": float(max(np.abs(r.u).max() for r in runs)),
+        "umax_V": controller["UMAX"],
+        "peak_A": float(max(np.abs(r.i_A).max() for r in runs)),
+        "durations": [float(r["t"][-1]) for r in servo["records"]],
+    }
     return servo

@@ -1,4 +1,6 @@
-"""How large a concealed effect shows, in units of the noise: as it stands, and once the effect-free model has been refitted."""
+"""How large a concealed effect shows, in units of the noise: as it stands, and once the effect-free model has been
+refitted.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +11,14 @@ from ers_mj.proving.quick import COARSE, ROUGH, run, simulate
 TWO_MASS = {"backlash", "shaft_compliance"}
 STIFF = TWO_MASS | {"presliding", "end_stop", "friction_ageing"}
 """What needs the finer of the two steps while sizing."""
-ALIKE = ({"bias_torque", "asymmetric_friction"}, {"inductance", "input_delay", "sensor_lag"},
-         {"voltage_saturation", "current_limit", "supply_sag"}, {"cogging", "transmission_ripple"}, TWO_MASS | {"variable_ratio"},
-         {"sensor_quantisation", "sensor_dropout"})
+ALIKE = (
+    {"bias_torque", "asymmetric_friction"},
+    {"inductance", "input_delay", "sensor_lag"},
+    {"voltage_saturation", "current_limit", "supply_sag"},
+    {"cogging", "transmission_ripple"},
+    TWO_MASS | {"variable_ratio"},
+    {"sensor_quantisation", "sensor_dropout"},
+)
 """Effects that a pair does not combine: counted as one, or two that the simulator cannot join."""
 
 
@@ -46,7 +53,8 @@ def pooled(servo, per_record):
     return float(np.sqrt(np.average(np.square(per_record), weights=weights)))
 
 
-# ---- how much stays visible once the effect-free model is refitted -----------------------------------------------------
+# ---- how much stays visible once the effect-free model is refitted
+# -----------------------------------------------------
 
 FREE = ("J", "B", "K_e", "k_s", "T_LH", "F_c", "theta_0")
 """What angle and voltage can tell of Eq. (1): R, K_t and the ordinary L are held."""
@@ -59,12 +67,16 @@ def moved(params, x):
 
 
 def refit(servo, runs, rounds=5):
-    """[rms over sigma] a record that the effect-free Eq. (1) leaves: Levenberg-Marquardt on log parameters, noise-free angles."""
+    """[rms over sigma] a record that the effect-free Eq. (1) leaves: Levenberg-Marquardt on log parameters, noise-free
+    angles.
+    """
     sigma = servo["sensor"]["noise_sigma_eff_rad"]
 
     def residuals(x):
-        return [(simulate(moved(servo["params"], x), [], r["t"], with_it.u, step=ROUGH).clean - with_it.clean) / sigma
-                for r, with_it in zip(servo["records"], runs)]
+        return [
+            (simulate(moved(servo["params"], x), [], r["t"], with_it.u, step=ROUGH).clean - with_it.clean) / sigma
+            for r, with_it in zip(servo["records"], runs)
+        ]
 
     x, parts, damping = np.zeros(len(FREE)), residuals(np.zeros(len(FREE))), 1e-3
     for _ in range(rounds):
@@ -93,8 +105,10 @@ class Ruler:
         self.runs = [run(servo, record, k, [], ROUGH) for k, record in enumerate(servo["records"])]
         columns = []
         for e in np.eye(len(FREE)):
-            pairs = [[simulate(moved(servo["params"], way * 1e-4 * e), [], r["t"], x.u, step=ROUGH).true for way in (1, -1)]
-                     for r, x in zip(servo["records"], self.runs)]
+            pairs = [
+                [simulate(moved(servo["params"], way * 1e-4 * e), [], r["t"], x.u, step=ROUGH).true for way in (1, -1)]
+                for r, x in zip(servo["records"], self.runs)
+            ]
             columns.append(np.concatenate([up - down for up, down in pairs]))
         self.basis = np.linalg.qr(np.stack(columns, 1) + 0.0)[0]
 
@@ -110,4 +124,7 @@ class Ruler:
     def refitted(self, effects: list[dict]) -> float:
         """[sigma] rms that the refitted effect-free model leaves."""
         step = step_for(effects)
-        return pooled(self.servo, refit(self.servo, [run(self.servo, r, k, effects, step) for k, r in enumerate(self.servo["records"])], 4))
+        return pooled(
+            self.servo,
+            refit(self.servo, [run(self.servo, r, k, effects, step) for k, r in enumerate(self.servo["records"])], 4),
+        )

@@ -14,8 +14,18 @@ LEAST, MOST = 0.5, 50.0  # [sigma] visibility after refit, drawn log-uniform
 FAINT, FAINTEST, BARELY = 0.2, 0.02, 0.3  # [sigma] clutter: drawn between the first two, left out above the third
 NEAR = 0.15  # of the logarithm of the target
 TRIES = 7
-STRUCTURAL = ("backlash", "shaft_compliance", "variable_ratio", "sensor_dropout", "inductance", "end_stop", "presliding")
-"""What is no clutter: it changes the mechanism, shows below the noise, or is, where it is faint, too stiff for the step (bristles)."""
+STRUCTURAL = (
+    "backlash",
+    "shaft_compliance",
+    "variable_ratio",
+    "sensor_dropout",
+    "inductance",
+    "end_stop",
+    "presliding",
+)
+"""What is no clutter: it changes the mechanism, shows below the noise, or is, where it is faint, too stiff for the step
+(bristles).
+"""
 
 
 def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) -> dict:
@@ -27,7 +37,11 @@ def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) ->
     as_list = lambda s: [{"label": name, "strength": float(np.exp(s)), "shape": shape}]  # noqa: E731
     guess, _ = nearest(lambda s: ruler.projected(as_list(s)), target, 0.5 * (low + high), low, high, TRIES)
     found, left = nearest(lambda s: ruler.refitted(as_list(s)), target, guess, low, high, 3)
-    return as_list(found)[0] | {"strength_name": effect.strength_name, "target_sigma": target, "quick_visibility_sigma": left}
+    return as_list(found)[0] | {
+        "strength_name": effect.strength_name,
+        "target_sigma": target,
+        "quick_visibility_sigma": left,
+    }
 
 
 def _lowest(effect: Effect, ruler: Ruler) -> float:
@@ -35,7 +49,9 @@ def _lowest(effect: Effect, ruler: Ruler) -> float:
     return max(effect.low, 2.5 * ruler.servo["params"]["L"]) if effect.name == "inductance" else effect.low
 
 
-def nearest(size: Callable[[float], float], target: float, guess: float, low: float, high: float, tries: int) -> tuple[float, float]:
+def nearest(
+    size: Callable[[float], float], target: float, guess: float, low: float, high: float, tries: int
+) -> tuple[float, float]:
     """(logarithm of the strength, its size) nearest to the target: secants on logarithms within brackets."""
     seen: list[tuple[float, float]] = []
     for _ in range(tries):

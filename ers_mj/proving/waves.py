@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+
 def multisine(rng, t):
     """Sum of sines from 0.15 Hz up to 4-8 Hz, amplitude falling with frequency."""
     f = np.arange(1, int(rng.uniform(4.0, 8.0) * 6.0)) / 6.0
