@@ -15,13 +15,13 @@ import time
 
 import numpy as np
 
-from ers_mj.datasheet import Datasheet, read_datasheet
-from ers_mj.identifying.estimate import identify
-from ers_mj.identifying.finding import Settings
+from ers_mj.data.recording import from_arrays
+from ers_mj.identification.estimate import identify
+from ers_mj.identification.finding import Settings
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped
-from ers_mj.recording import from_arrays
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
 
 NAMES, STEP = ("a_1", "a_2", "b", "c_1", "c_2"), 5e-4
 

@@ -16,7 +16,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import independent_two_mass  # noqa: E402
 
-from ers_mj.datasheet import read_datasheet  # noqa: E402
 from ers_mj.effects import EFFECTS, Scales  # noqa: E402
 from ers_mj.plants.inputs import INPUTS  # noqa: E402
 from ers_mj.plants.mechanical import MechanicalPlant, simulate_many  # noqa: E402
@@ -24,6 +23,7 @@ from ers_mj.plants.mjcf import mjcf_folder  # noqa: E402
 from ers_mj.plants.play import MOTOR_SHARE  # noqa: E402
 from ers_mj.plants.reduced import ReducedModel, lumped  # noqa: E402
 from ers_mj.plants.skeletons import LINKAGES  # noqa: E402
+from ers_mj.servo.datasheet import read_datasheet  # noqa: E402
 
 T = np.arange(0.0, 10.0, 1e-3)
 SHEET = read_datasheet("table1")

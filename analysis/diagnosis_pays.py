@@ -17,13 +17,13 @@ from itertools import product
 
 import numpy as np
 
-from ers_mj.controllers import PidGains
-from ers_mj.datasheet import TABLE_1, Datasheet, read_datasheet
-from ers_mj.diagnosis import diagnose
+from ers_mj.control.controllers import PidGains
+from ers_mj.control.trial import Conditions, try_out
+from ers_mj.data.recording import from_arrays
+from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.recording import from_arrays
-from ers_mj.simulation import simulate_recording
-from ers_mj.trial import Conditions, try_out
+from ers_mj.servo.datasheet import TABLE_1, Datasheet, read_datasheet
+from ers_mj.servo.simulation import simulate_recording
 
 SCATTERED = ("J", "B", "K_t", "K_e", "k_s", "T_LH", "F_c", "R")
 NOISE, TIME = math.radians(0.01), np.arange(5000) / 1000.0
@@ -120,8 +120,8 @@ def main() -> None:
 
 def refitted(measured: list) -> Datasheet:
     """Table 1 refitted to the recordings without any effect, as the diagnosis starts from it."""
-    from ers_mj.baseline import baseline
-    from ers_mj.traces import trace_of
+    from ers_mj.data.prepared import trace_of
+    from ers_mj.estimation.baseline import baseline
 
     sheet = read_datasheet("table1")
     values = baseline([trace_of(r, sheet.parameters["J"]) for r in measured], sheet, True).fit.model.values

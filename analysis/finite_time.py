@@ -18,14 +18,14 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ers_mj.closed_loop import Sensor, close
-from ers_mj.controllers import CONTROLLERS, Gains, Servo
-from ers_mj.datasheet import Datasheet, read_datasheet
-from ers_mj.figures import AFTER, BEFORE, INK, STYLE
-from ers_mj.gains import lyapunov
-from ers_mj.references import Reference
-from ers_mj.simulation import build_plant
-from ers_mj.trial import sampled
+from ers_mj.control.closed_loop import Sensor, close
+from ers_mj.control.controllers import CONTROLLERS, Gains, Servo
+from ers_mj.control.gains import lyapunov
+from ers_mj.control.references import Reference
+from ers_mj.control.trial import sampled
+from ers_mj.report.diagnosis_figures import AFTER, BEFORE, INK, STYLE
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.simulation import build_plant
 
 RATE, SECONDS, EVERY = 10_000.0, 0.6, 40  # [Hz], [s], samples from one value of V_3 to the next
 POWERS = ((Fraction(97, 99), AFTER), (Fraction(5, 7), "#8a6bb8"), (Fraction(1), BEFORE))

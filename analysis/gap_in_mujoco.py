@@ -13,12 +13,12 @@ import time
 
 import numpy as np
 
-from ers_mj.datasheet import TABLE_1, Datasheet, read_datasheet
-from ers_mj.diagnosis import diagnose
+from ers_mj.data.recording import from_arrays
+from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped
-from ers_mj.recording import from_arrays
+from ers_mj.servo.datasheet import TABLE_1, Datasheet, read_datasheet
 
 SCATTERED = ("J", "B", "K_t", "K_e", "k_s", "T_LH", "F_c", "R")
 NOISE = np.radians(0.01)

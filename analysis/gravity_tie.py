@@ -11,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ers_mj.baseline import baseline, sharpened
-from ers_mj.datasheet import read_datasheet
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import read_recording
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.errors import InputError
-from ers_mj.identification import descend, fit
-from ers_mj.model import OBSERVER_RATE
-from ers_mj.recording import read_recording
-from ers_mj.selection import select
-from ers_mj.traces import trace_of
+from ers_mj.estimation.baseline import baseline, sharpened
+from ers_mj.estimation.fit import descend, fit
+from ers_mj.selection.stepwise import select
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.servo.model import OBSERVER_RATE
 
 TIED = ("bias_torque", "asymmetric_friction", "gravity_imbalance")
 

@@ -23,7 +23,13 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-MOST = {"lines of a file": 400, "characters of a line": 120, "lines of a function": 60, "complexity": 15, "parameters": 8}
+MOST = {
+    "lines of a file": 400,
+    "characters of a line": 120,
+    "lines of a function": 60,
+    "complexity": 15,
+    "parameters": 8,
+}
 COMPILING = {"njit", "unit", "law", "memory", "compiled", "kernel", "inline"}
 BRANCHES = (ast.If, ast.IfExp, ast.For, ast.While, ast.ExceptHandler, ast.Assert, ast.match_case, ast.AsyncFor)
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
@@ -99,14 +105,18 @@ def imports(path: Path, tree: ast.Module, package: Path) -> set[str]:
             parts = node.module.split(".")[1:]
             for alias in node.names:
                 for end in ([*parts, alias.name], parts):
-                    if (package.joinpath(*end).with_suffix(".py")).is_file() or (package.joinpath(*end) / "__init__.py").is_file():
+                    if (package.joinpath(*end).with_suffix(".py")).is_file() or (
+                        package.joinpath(*end) / "__init__.py"
+                    ).is_file():
                         found.add("/".join(end))
                         break
     return {f for f in found if f}
 
 
 def is_descent(function: ast.AST) -> bool:
-    changes = [n for n in ast.walk(function) if isinstance(n, (ast.AugAssign, ast.Assign)) and "damping" in ast.unparse(n)]
+    changes = [
+        n for n in ast.walk(function) if isinstance(n, (ast.AugAssign, ast.Assign)) and "damping" in ast.unparse(n)
+    ]
     grown = any("*" in ast.unparse(n) for n in changes)
     return grown and any("/" in ast.unparse(n) for n in changes)
 
@@ -115,8 +125,23 @@ def figures(checkout: Path) -> tuple[dict[str, int], list[str]]:
     """The counts of a checkout, and a line for everything that is over a limit."""
     package = checkout / "ers_mj"
     files = sorted(package.rglob("*.py"))
-    counts = dict.fromkeys(["files", "files at the root", "long files", "long lines", "functions", "long functions", "complex functions",
-                            "wide functions", "capitals", "moves", "moves between rooms", "descents"], 0)
+    counts = dict.fromkeys(
+        [
+            "files",
+            "files at the root",
+            "long files",
+            "long lines",
+            "functions",
+            "long functions",
+            "complex functions",
+            "wide functions",
+            "capitals",
+            "moves",
+            "moves between rooms",
+            "descents",
+        ],
+        0,
+    )
     counts["files"], counts["files at the root"] = len(files), sum(p.parent == package for p in files)
     over = []
     for path in files:

@@ -17,13 +17,13 @@ import time
 
 import numpy as np
 
-from ers_mj.datasheet import Datasheet, read_datasheet
-from ers_mj.identifying.estimate import identify
-from ers_mj.identifying.finding import Settings
-from ers_mj.identifying.misfit import central
+from ers_mj.data.recording import from_arrays
+from ers_mj.identification.estimate import identify
+from ers_mj.identification.finding import Settings
+from ers_mj.identification.misfit import central
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.recording import from_arrays
-from ers_mj.simulation import build_plant, simulate_recording
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.simulation import build_plant, simulate_recording
 
 TABLE_2 = Datasheet(
     parameters={

@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ers_mj.datasheet import read_datasheet
+from ers_mj.data.recording import write_recording
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.recording import write_recording
-from ers_mj.simulation import simulate_recording
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.servo.simulation import simulate_recording
 
 TIMED = """
 import sys, time

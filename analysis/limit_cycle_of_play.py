@@ -17,13 +17,13 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ers_mj.controllers import CONTROLLERS, Aim, PidGains, Servo
-from ers_mj.datasheet import Datasheet, read_datasheet
+from ers_mj.control.controllers import CONTROLLERS, Aim, PidGains, Servo
+from ers_mj.control.frequency.cycle import Cycle, lasting, predicted
 from ers_mj.effects.base import Coefficients
-from ers_mj.figures import AFTER, BEFORE, INK, MEASURED, STYLE
-from ers_mj.frequency.cycle import Cycle, lasting, predicted
 from ers_mj.plants.sampled_reduced import SampledReduced
-from ers_mj.simulation import build_plant
+from ers_mj.report.diagnosis_figures import AFTER, BEFORE, INK, MEASURED, STYLE
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.simulation import build_plant
 
 RATE, SECONDS, GAP = 2000.0, 3.0, math.radians(0.5)
 CONTACTS_HZ, DAMPINGS = (40.0, 120.0, 400.0), (0.1, 0.2, 0.4, 0.7, 1.0)

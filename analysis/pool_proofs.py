@@ -15,8 +15,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ers_mj.errors import InputError
-from ers_mj.proof_report import headline, table_of
 from ers_mj.proving.scoring import class_of, scored
+from ers_mj.report.proof_report import headline, table_of
 
 KINDS = ("null", "single", "several", "outside")
 LIKE_A_SUSPECT = (

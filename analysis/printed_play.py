@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ers_mj.datasheet import TABLE_1, read_datasheet
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.play import stiff_play
 from ers_mj.plants.printed_play import PrintedPlay, printed_threshold
 from ers_mj.plants.reduced import Motion, ReducedModel, lumped
+from ers_mj.servo.datasheet import TABLE_1, read_datasheet
 
 T = np.arange(6000) / 1000.0
 J = TABLE_1["J"]

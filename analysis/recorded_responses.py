@@ -14,12 +14,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import butter, sosfilt
 
-from ers_mj.datasheet import Datasheet, read_datasheet
-from ers_mj.frequency.linear import linearised
+from ers_mj.control.frequency.linear import linearised
+from ers_mj.data.frequency_response import Gap, frequency_response, gap
+from ers_mj.data.recording import from_arrays
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.recording import from_arrays
-from ers_mj.simulation import build_plant, simulate_recording
-from ers_mj.spectra import Gap, frequency_response, gap
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.simulation import build_plant, simulate_recording
 
 RATE, NOISE = 1000.0, np.radians(0.01)
 SCALED = ("J", "B", "K_t", "K_e", "k_s", "R")

@@ -18,8 +18,8 @@ from itertools import repeat
 
 import numpy as np
 
-from ers_mj.datasheet import Datasheet, read_datasheet
-from ers_mj.trial import Conditions, try_out
+from ers_mj.control.trial import Conditions, try_out
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
 
 LAWS, CASES = ("ftrc", "pid-ff", "time-optimal"), ("step", "square", "ramp", "chirp")
 SCATTERED = ("J", "B", "K_t", "K_e", "k_s", "T_LH", "F_c", "R")

@@ -14,17 +14,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from ers_mj.advice import next_recording
-from ers_mj.baseline import baseline
-from ers_mj.datasheet import read_datasheet
-from ers_mj.excitation import signal
-from ers_mj.identification import fit
-from ers_mj.starts import fitted_start
-from ers_mj.isolability import probabilities
+from ers_mj.data.excitation import signal
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.estimation.baseline import baseline
+from ers_mj.estimation.fit import fit
+from ers_mj.estimation.initial_state import fitted_start
+from ers_mj.experiment_design.next_recording import next_recording
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
-from ers_mj.traces import trace_of
+from ers_mj.selection.posterior import probabilities
+from ers_mj.servo.datasheet import read_datasheet
 
 NOISE = 2e-4  # [rad]
 T = np.arange(0.0, 5.0, 1e-3)

@@ -20,16 +20,16 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from ers_mj.datasheet import Datasheet
-from ers_mj.identify_figures import progress_figure
-from ers_mj.minimisers import MINIMISERS, Minimum
-from ers_mj.identifying.misfit import Misfit, Search
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.identification.minimisers import MINIMISERS, Minimum
+from ers_mj.identification.misfit import Misfit, Search
+from ers_mj.identification.structure import Structure
+from ers_mj.identification.unknowns import unknowns_of
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.recording import from_arrays
-from ers_mj.simulation import simulate_recording
-from ers_mj.identifying.structure import Structure
-from ers_mj.traces import trace_of
-from ers_mj.identifying.unknowns import unknowns_of
+from ers_mj.report.identify_figures import progress_figure
+from ers_mj.servo.datasheet import Datasheet
+from ers_mj.servo.simulation import simulate_recording
 
 TABLE_2 = {"L": 0.003, "R": 1.2, "k_s": 0.08, "T_LH": 0.4, "F_c": 0.2, "J": 0.001, "B": 0.006, "K_t": 0.5, "K_e": 0.6}
 PRINTED = {

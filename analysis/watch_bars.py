@@ -18,11 +18,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ers_mj.datasheet import Datasheet, read_datasheet
+from ers_mj.control.monte_carlo import scattered
+from ers_mj.online.moving_horizon import OPENING, Estimate, Tracker, opening
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.robustness import scattered
-from ers_mj.simulation import build_plant
-from ers_mj.tracking import OPENING, Estimate, Tracker, opening
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.simulation import build_plant
 
 RATE = 1000.0  # [Hz]
 NOISE = math.radians(0.01)

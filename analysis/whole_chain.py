@@ -15,18 +15,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ers_mj.controllers import Gains, Servo
-from ers_mj.datasheet import Datasheet, read_datasheet
+from ers_mj.control.controllers import Gains, Servo
+from ers_mj.control.gains import conditions, search
+from ers_mj.control.metrics import settling_time
+from ers_mj.control.references import named
+from ers_mj.control.trial import Conditions, run_once, try_out
+from ers_mj.data.recording import from_arrays
 from ers_mj.errors import InputError
-from ers_mj.identifying.estimate import identify
-from ers_mj.identifying.finding import Settings
-from ers_mj.gains import conditions, search
-from ers_mj.measures import settling_time
+from ers_mj.identification.estimate import identify
+from ers_mj.identification.finding import Settings
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.recording import from_arrays
-from ers_mj.references import named
-from ers_mj.simulation import build_plant, simulate_recording
-from ers_mj.trial import Conditions, run_once, try_out
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.simulation import build_plant, simulate_recording
 
 CASES = ("step", "square", "ramp", "chirp")
 LETTERS = ("a_1", "a_2", "b", "c_1", "c_2")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from servo import recorded, started
 
 

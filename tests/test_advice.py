@@ -6,20 +6,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ers_mj.advice import _said, _widened, next_recording
-from ers_mj.baseline import baseline
 from ers_mj.commands.diagnose import _input_table
-from ers_mj.datasheet import Datasheet
-from ers_mj.design import SETTLED, drawn
-from ers_mj.excitation import SHARES, WAVES, Limits, excitations, signal
-from ers_mj.identification import descend, fit
-from ers_mj.isolability import isolability, probabilities
-from ers_mj.model import OBSERVER_RATE
-from ers_mj.starts import with_starts
+from ers_mj.data.excitation import SHARES, WAVES, Limits, excitations, signal
+from ers_mj.data.prepared import make_trace, trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.estimation.baseline import baseline
+from ers_mj.estimation.fit import descend, fit
+from ers_mj.estimation.initial_state import with_starts
+from ers_mj.experiment_design.discriminating_inputs import SETTLED, drawn
+from ers_mj.experiment_design.next_recording import _said, _widened, next_recording
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
-from ers_mj.traces import make_trace, trace_of
+from ers_mj.selection.posterior import isolability, probabilities
+from ers_mj.servo.datasheet import Datasheet
+from ers_mj.servo.model import OBSERVER_RATE
 
 T = np.arange(0.0, 3.0, 1e-3)
 TRUTH = {

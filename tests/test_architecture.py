@@ -1,148 +1,44 @@
-"""Who may import whom: a step reads the steps on its left."""
+"""The house: which room may read which, and what only some rooms may do."""
 
 import ast
+import tomllib
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
-ORDER = [
-    "errors",
-    "minimisers",
-    "tables",
-    "symptoms",
-    "recording",
-    "datasheet",
-    "effects",
-    "plants",
-    "proving",
-    "simulation",
-    "converter",
-    "traces",
-    "excitation",
-    "replay",
-    "model_file",
-    "rendering",
-    "window",
-    "model",
-    "starts",
-    "identification",
-    "guess",
-    "baseline",
-    "identifying",
-    "isolability",
-    "remainder",
-    "knocks",
-    "screening",
-    "ranking",
-    "restarts",
-    "race",
-    "reviews",
-    "selection",
-    "intervals",
-    "evaluation",
-    "spectra",
-    "mismatch",
-    "evidence",
-    "design",
-    "advice",
-    "localisation",
-    "confirmation",
-    "mimics",
-    "multibody",
-    "case",
-    "document",
-    "diagnosis",
-    "known",
-    "streaming",
-    "tracking",
-    "experiment",
-    "validation",
-    "controllers",
-    "references",
-    "closed_loop",
-    "measures",
-    "trial",
-    "robustness",
-    "gains",
-    "claims",
-    "frequency",
-    "display",
-    "validity",
-    "frames",
-    "figures",
-    "page",
-    "maps",
-    "report",
-    "validation_report",
-    "proof_figures",
-    "proof_report",
-    "trial_figures",
-    "trial_report",
-    "frequency_figures",
-    "frequency_report",
-    "identify_figures",
-    "identify_report",
-    "watch_report",
-    "commands",
-    "cli",
-]
-SILENT = {
-    "minimisers",
-    "identifying",
-    "proving",
-    "advice",
-    "design",
-    "excitation",
-    "isolability",
-    "model",
-    "converter",
-    "starts",
-    "identification",
-    "guess",
-    "baseline",
-    "knocks",
-    "screening",
-    "ranking",
-    "restarts",
-    "race",
-    "reviews",
-    "selection",
-    "intervals",
-    "evaluation",
-    "localisation",
-    "remainder",
-    "confirmation",
-    "mimics",
-    "multibody",
-    "case",
-    "document",
-    "diagnosis",
-    "validation",
-    "validity",
-    "effects",
-    "plants",
-    "replay",
-    "model_file",
-    "rendering",
-    "window",
-    "frames",
-    "controllers",
-    "references",
-    "closed_loop",
-    "measures",
-    "trial",
-    "robustness",
-    "gains",
-    "claims",
-    "spectra",
-    "mismatch",
-    "frequency",
-    "known",
-    "streaming",
-    "tracking",
-    "experiment",
-}
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "ers_mj"
+MAY_READ = {
+    "errors": (),
+    "data": ("errors",),
+    "effects": ("errors",),
+    "plants": ("effects", "errors"),
+    "servo": ("data", "effects", "errors", "plants"),
+    "estimation": ("data", "effects", "errors", "servo"),
+    "identification": ("data", "errors", "estimation", "plants", "servo"),
+    "selection": ("data", "effects", "estimation", "plants", "servo"),
+    "experiment_design": ("data", "effects", "errors", "estimation", "plants", "servo"),
+    "diagnosis": ("data", "effects", "estimation", "experiment_design", "plants", "selection", "servo"),
+    "online": ("data", "estimation", "servo"),
+    "control": ("data", "effects", "errors", "plants", "servo"),
+    "validation": ("plants", "servo"),
+    "view": ("data", "diagnosis", "errors", "plants", "servo"),
+    "proving": ("data", "errors", "plants"),
+    "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
+    "commands": (
+        "control", "data", "diagnosis", "errors", "experiment_design", "identification", "online", "plants", "proving", "report",
+        "selection", "servo", "validation", "view",
+    ),
+    "cli": ("commands", "errors"),
+}  # fmt: skip
+WRITERS = {"commands", "report", "view", "proving", "cli"}  # beside these only the tables of data/ open a file to write
+FAMILIES = {
+    "effects": ("base",),
+    "control/controllers": ("base", "finite_time", "pid"),
+    "identification/minimisers": ("base", "iga"),
+}  # whose members read their base and the named helpers of it, and no other member
+FILES = [p for p in PACKAGE.rglob("*.py") if p.parent != PACKAGE or p.stem not in ("__init__", "__main__")]
 
 
 def room(path: Path) -> str:
@@ -150,25 +46,59 @@ def room(path: Path) -> str:
 
 
 def imports(path: Path) -> set[str]:
-    """Rooms of ers_mj that a file imports when it is loaded or run."""
+    """Modules of ers_mj, dotted and without `ers_mj.`, that a file imports when it is loaded or run."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("ers_mj"):
-            parts = node.module.split(".")
-            found |= {parts[1]} if len(parts) > 1 else {a.name for a in node.names if not a.name.startswith("__")}
-    return found
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "ers_mj":
+            parts = node.module.split(".")[1:]
+            for alias in node.names:
+                whole = [*parts, alias.name]
+                is_file = PACKAGE.joinpath(*whole).with_suffix(".py").is_file() or PACKAGE.joinpath(*whole).is_dir()
+                found.add(".".join(whole if is_file else parts))
+    return found - {""}
 
 
-FILES = [p for p in PACKAGE.rglob("*.py") if room(p) not in ("__init__", "__main__")]
+def named(path: Path) -> str:
+    return str(path.relative_to(PACKAGE))
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_a_step_reads_the_steps_on_its_left(path):
-    here = ORDER.index(room(path))
-    assert all(ORDER.index(other) <= here for other in imports(path))
+def test_the_table_covers_every_room_and_has_no_circle():
+    assert {room(p) for p in FILES} == set(MAY_READ)
+    TopologicalSorter(MAY_READ).prepare()
 
 
-@pytest.mark.parametrize("path", [p for p in FILES if room(p) in SILENT], ids=lambda p: str(p.relative_to(PACKAGE)))
+@pytest.mark.parametrize("path", FILES, ids=named)
+def test_a_room_reads_the_rooms_that_it_may(path):
+    assert {other.split(".")[0] for other in imports(path)} <= {room(path), *MAY_READ[room(path)]}
+
+
+def test_no_room_may_read_what_it_does_not():
+    for name, allowed in MAY_READ.items():
+        read = {other.split(".")[0] for p in FILES if room(p) == name for other in imports(p)}
+        assert set(allowed) <= read, f"{name} no longer reads {set(allowed) - read}"
+
+
+def test_files_read_each_other_without_a_circle():
+    files = {named(p).removesuffix(".py").replace("/", ".").removesuffix(".__init__"): imports(p) for p in FILES}
+    TopologicalSorter({name: others - {name} for name, others in files.items()}).prepare()
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_members_of_a_family_read_their_base_only(family):
+    members = [p for p in (PACKAGE / family).glob("*.py") if p.stem != "__init__"]
+    inside = family.replace("/", ".") + "."
+    for path in members:
+        others = {other.removeprefix(inside).split(".")[0] for other in imports(path) if other.startswith(inside)}
+        assert others <= set(FAMILIES[family]), f"{named(path)} reads {others}"
+
+
+@pytest.mark.parametrize("path", [p for p in FILES if room(p) not in WRITERS], ids=named)
 def test_the_core_neither_prints_nor_plots(path):
     text = path.read_text()
     assert "print(" not in text and "matplotlib" not in text
+
+
+def test_every_package_is_installed():
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    there = {"ers_mj." + str(p.parent.relative_to(PACKAGE)).replace("/", ".") for p in FILES if p.stem == "__init__"}
+    assert set(declared) == {"ers_mj", "ers_mj.mjcf", *there}

@@ -5,15 +5,15 @@ effect sits.
 import numpy as np
 import pytest
 
-from ers_mj.baseline import baseline
-from ers_mj.datasheet import read_datasheet
-from ers_mj.diagnosis import diagnose
-from ers_mj.identification import residuals
-from ers_mj.model import OBSERVER_RATE
+from ers_mj.data.prepared import Blocks, trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.diagnosis.pipeline import diagnose
+from ers_mj.estimation.baseline import baseline
+from ers_mj.estimation.fit import residuals
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
-from ers_mj.traces import Blocks, trace_of
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.servo.model import OBSERVER_RATE
 
 T = np.arange(0.0, 4.0, 1e-3)
 TRUTH = {

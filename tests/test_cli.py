@@ -11,9 +11,9 @@ import pytest
 
 from ers_mj import cli
 from ers_mj.commands import output
-from ers_mj.datasheet import Datasheet, read_datasheet
-from ers_mj.evidence import Evidence
-from ers_mj.recording import read_recording
+from ers_mj.data.recording import read_recording
+from ers_mj.diagnosis.evidence import Evidence
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
 
 N = 200
 T = np.arange(N) * 1e-2
@@ -294,10 +294,10 @@ def stub(monkeypatch, **changes) -> list:
             model=changes.get("model", Datasheet(lumped={"b": 1.0})),
         )
 
-    monkeypatch.setitem(sys.modules, "ers_mj.diagnosis", SimpleNamespace(diagnose=diagnose))
+    monkeypatch.setitem(sys.modules, "ers_mj.diagnosis.pipeline", SimpleNamespace(diagnose=diagnose))
     import ers_mj
 
-    monkeypatch.setattr(ers_mj, "diagnosis", sys.modules["ers_mj.diagnosis"], raising=False)
+    monkeypatch.setattr(ers_mj, "diagnosis", sys.modules["ers_mj.diagnosis.pipeline"], raising=False)
     return calls
 
 

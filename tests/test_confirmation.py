@@ -5,18 +5,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from ers_mj.confirmation import _halved, _is_a_converters, _is_any_wave, _may_be_none, _no_closer, _p_of, _scores
-from ers_mj.effects import BY_NAME
-from ers_mj.evaluation import Fold, Score, folds, halves, refits
-from ers_mj.identification import fit
-from ers_mj.intervals import half_widths, unseen_widths
-from ers_mj.multibody import HELD_SECONDS, LEFT_OUT_SECONDS, run_in_mujoco
-from ers_mj.race import candidates
-from ers_mj.recording import from_arrays
-from ers_mj.starts import without_spikes
-from ers_mj.traces import trace_of
 from servo import NOISE, TRUTH, started, trace
+
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.diagnosis.mujoco_check import HELD_SECONDS, LEFT_OUT_SECONDS, run_in_mujoco
+from ers_mj.effects import BY_NAME
+from ers_mj.estimation.fit import fit
+from ers_mj.estimation.initial_state import without_spikes
+from ers_mj.estimation.intervals import half_widths, unseen_widths
+from ers_mj.selection.candidates import candidates
+from ers_mj.selection.confirmation import (
+    _halved,
+    _is_a_converters,
+    _is_any_wave,
+    _may_be_none,
+    _no_closer,
+    _p_of,
+    _scores,
+)
+from ers_mj.selection.cross_validation import Fold, Score, folds, halves, refits
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj.controllers import CONTROLLERS, Aim, FiniteTime, Gains, Servo, State, parse_gains
-from ers_mj.controllers.finite_time import sig
-from ers_mj.datasheet import Datasheet, read_datasheet
+from ers_mj.control.controllers import CONTROLLERS, Aim, FiniteTime, Gains, Servo, State, parse_gains
+from ers_mj.control.controllers.finite_time import sig
 from ers_mj.errors import InputError
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
 
 SERVO = Servo.of(read_datasheet("table1"))
 HOME = SERVO.theta_0
@@ -109,10 +109,10 @@ def test_a_servo_comes_from_any_model(tmp_path):
 
 
 def test_the_observer_follows_through_stick_and_slip():
-    from ers_mj.closed_loop import Sensor, close
-    from ers_mj.references import named
-    from ers_mj.simulation import build_plant
-    from ers_mj.trial import sampled
+    from ers_mj.control.closed_loop import Sensor, close
+    from ers_mj.control.references import named
+    from ers_mj.control.trial import sampled
+    from ers_mj.servo.simulation import build_plant
 
     plant, aim = build_plant(read_datasheet("table1")), named("ramp", math.radians(10), HOME, 1000.0)
     law = CONTROLLERS["time-optimal"](SERVO, 1000.0)

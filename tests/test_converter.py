@@ -4,22 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from ers_mj import baseline
-from ers_mj.baseline import Start, sharpened
-from ers_mj.converter import Converter
-from ers_mj.identification import fit, residuals, run_of, step_of
-from ers_mj.model import OBSERVER_RATE, Model
-from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.race import _is_within_a_step
-from ers_mj.ranking import Candidate
-from ers_mj.recording import from_arrays
-from ers_mj.selection import _is_rough_and_wrong
-from ers_mj.starts import with_starts
-from ers_mj.traces import counted, trace_of
 from test_observer import TRUTH
 from test_reduced import SCALES
+
+from ers_mj.data.prepared import counted, trace_of
+from ers_mj.data.quantisation import Converter
+from ers_mj.data.recording import from_arrays
+from ers_mj.estimation import baseline
+from ers_mj.estimation.baseline import Start, sharpened
+from ers_mj.estimation.fit import fit, residuals, run_of, step_of
+from ers_mj.estimation.initial_state import with_starts
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.selection.candidates import _is_within_a_step
+from ers_mj.selection.comparison import Candidate
+from ers_mj.selection.stepwise import _is_rough_and_wrong
+from ers_mj.servo.model import OBSERVER_RATE, Model
 
 T = np.arange(0.0, 4.0, 1e-3)
 STEP, NOISE = np.radians(0.5), 1e-4

@@ -6,15 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ers_mj.case import Case
 from ers_mj.commands.output import plain
-from ers_mj.datasheet import Datasheet, read_datasheet, write_model
-from ers_mj.diagnosis import _symptoms, diagnose
-from ers_mj.evaluation import Fold, Score
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.diagnosis.pipeline import _symptoms, diagnose
+from ers_mj.diagnosis.verdict import Case
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
-from ers_mj.traces import trace_of
+from ers_mj.selection.cross_validation import Fold, Score
+from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
 
 T = np.arange(0.0, 4.0, 1e-3)
 TRUTH = {

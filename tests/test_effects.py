@@ -5,17 +5,17 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-
-from ers_mj.baseline import baseline
-from ers_mj.datasheet import Datasheet, read_datasheet
-from ers_mj.effects import BY_NAME, EFFECTS, EQUIVALENT
-from ers_mj.errors import InputError
-from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.restarts import wider
-from ers_mj.simulation import simulate_recording, unit_of
 from servo import TRUTH
 from test_reduced import SCALES, T, table_1
+
+from ers_mj.effects import BY_NAME, EFFECTS, EQUIVALENT
+from ers_mj.errors import InputError
+from ers_mj.estimation.baseline import baseline
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.selection.multistart import wider
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.simulation import simulate_recording, unit_of
 
 ids = {"ids": lambda e: e.name}
 

@@ -6,12 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from ers_mj import cli, experiment
-from ers_mj.datasheet import read_datasheet
+from ers_mj import cli
+from ers_mj.data.recording import read_input
 from ers_mj.errors import InputError
-from ers_mj.experiment import Question, Rig, built, planned, reference
+from ers_mj.experiment_design import optimal_input as experiment
+from ers_mj.experiment_design.optimal_input import Question, Rig, built, planned, reference
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import read_input
+from ers_mj.servo.datasheet import read_datasheet
 
 SHEET = read_datasheet("table1")
 HOME, TRAVEL, U_MAX = SHEET.parameters["theta_0"], math.radians(60), 24.0

@@ -10,15 +10,23 @@ import pytest
 from test_report import read
 
 from ers_mj import cli
-from ers_mj.controllers import CONTROLLERS, PidGains, Servo
-from ers_mj.datasheet import read_datasheet, write_model
+from ers_mj.control.controllers import CONTROLLERS, PidGains, Servo
+from ers_mj.control.frequency.cycle import _passed, balanced, lasting, predicted, simulated
+from ers_mj.control.frequency.describing import (
+    contact,
+    controller_response,
+    coulomb,
+    leaning,
+    preload,
+    rubbing,
+    saturation,
+)
+from ers_mj.control.frequency.linear import at, linearised
+from ers_mj.control.frequency.loop import ask, close_loop, judged
+from ers_mj.control.trial import sampled
 from ers_mj.effects.base import Coefficients
-from ers_mj.frequency.cycle import _passed, balanced, lasting, predicted, simulated
-from ers_mj.frequency.describing import contact, controller_response, coulomb, leaning, preload, rubbing, saturation
-from ers_mj.frequency.linear import at, linearised
-from ers_mj.frequency.loop import ask, close_loop, judged
-from ers_mj.simulation import build_plant, parse_effect
-from ers_mj.trial import sampled
+from ers_mj.servo.datasheet import read_datasheet, write_model
+from ers_mj.servo.simulation import build_plant, parse_effect
 
 SHEET = read_datasheet("table1")
 FREE = replace(SHEET, parameters={**SHEET.parameters, "F_c": 0.0, "T_LH": 0.0})

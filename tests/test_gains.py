@@ -8,9 +8,9 @@ from fractions import Fraction
 import pytest
 
 from ers_mj import cli
-from ers_mj.controllers import Gains
+from ers_mj.control.controllers import Gains
+from ers_mj.control.gains import conditions, freed, lyapunov, search, settling_bound
 from ers_mj.errors import InputError
-from ers_mj.gains import conditions, freed, lyapunov, search, settling_bound
 
 
 def test_97_of_99_gives_the_printed_m():
@@ -33,8 +33,8 @@ def test_the_bound_is_finite_and_useless():
 def test_the_lyapunov_function_is_positive_and_within_its_bound(x):
     gains = Gains()
     q, (x1, x2, _) = float(gains.q), x
-    from ers_mj.controllers import FiniteTime
-    from ers_mj.controllers.finite_time import sig
+    from ers_mj.control.controllers import FiniteTime
+    from ers_mj.control.controllers.finite_time import sig
 
     xi_2 = sig(x2, 1 / q) + gains.k_1 ** (1 / q) * x1
     xi_3 = FiniteTime(gains).xi_3(*x)

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from ers_mj import cli
-from ers_mj.datasheet import Datasheet, read_datasheet
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays, write_recording
 from ers_mj.errors import InputError
-from ers_mj.identifying.estimate import identify
-from ers_mj.identifying.finding import Settings
-from ers_mj.identifying.misfit import forgiven, forgiving
+from ers_mj.identification.estimate import identify
+from ers_mj.identification.finding import Settings
+from ers_mj.identification.misfit import forgiven, forgiving
+from ers_mj.identification.precision import precision_of
+from ers_mj.identification.structure import structure_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped
-from ers_mj.identifying.precision import precision_of
-from ers_mj.recording import from_arrays, write_recording
-from ers_mj.simulation import build_plant, simulate_recording
-from ers_mj.identifying.structure import structure_of
-from ers_mj.traces import trace_of
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.simulation import build_plant, simulate_recording
 
 TRUTH = {
     "L": 0.003,
@@ -180,8 +180,8 @@ def test_resampled_and_fisher_widths_agree_on_white_residuals_and_not_on_coloure
 
 
 def test_many_candidates_in_mujoco_are_what_one_is():
-    from ers_mj.identifying.rollouts import rollouts
-    from ers_mj.identifying.unknowns import unknowns_of
+    from ers_mj.identification.rollouts import rollouts
+    from ers_mj.identification.unknowns import unknowns_of
 
     sheet = read_datasheet("table1")
     u = INPUTS["multisine"](T[:300])

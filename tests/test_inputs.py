@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from ers_mj.datasheet import TABLE_1, Datasheet
 from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.servo.datasheet import TABLE_1, Datasheet
 
 T = np.arange(int(DURATION * RATE_HZ)) / RATE_HZ
 

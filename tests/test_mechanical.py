@@ -8,12 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from ers_mj.datasheet import read_datasheet
 from ers_mj.errors import InputError
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant, simulate_many
 from ers_mj.plants.play import MOTOR_SHARE
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.servo.datasheet import read_datasheet
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 SHEET = read_datasheet("table1")

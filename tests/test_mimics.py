@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from ers_mj import mimics
-from ers_mj.baseline import baseline
-from ers_mj.datasheet import Datasheet
-from ers_mj.identification import fit
-from ers_mj.mimics import unmasked
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.estimation.baseline import baseline
+from ers_mj.estimation.fit import fit
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
-from ers_mj.selection import Selection
-from ers_mj.traces import trace_of
+from ers_mj.selection import confounders as mimics
+from ers_mj.selection.confounders import unmasked
+from ers_mj.selection.stepwise import Selection
+from ers_mj.servo.datasheet import Datasheet
 
 T = np.arange(0.0, 3.0, 1e-3)
 TRUTH = {"a_1": 25.0, "a_2": 50.0, "b": 70.0, "c_1": 135.0, "c_2": 115.0, "theta_0": 0.2625}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ers_mj.errors import InputError
-from ers_mj.minimisers import LS, MINIMISERS
-from ers_mj.minimisers.iga import IGA, ranked, sigmoid
+from ers_mj.identification.minimisers import LS, MINIMISERS
+from ers_mj.identification.minimisers.iga import IGA, ranked, sigmoid
 
 BUDGET = 3000
 

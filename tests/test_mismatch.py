@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, welch
 
-from ers_mj.baseline import baseline
-from ers_mj.datasheet import read_datasheet
-from ers_mj.localisation import LOCAL_RATE, gather, over_frequency, places
-from ers_mj.mismatch import mismatch, observed_noise
+from ers_mj.data.prepared import make_trace, trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.diagnosis.localisation import LOCAL_RATE, gather, over_frequency, places
+from ers_mj.diagnosis.mismatch_spectrum import mismatch, observed_noise
+from ers_mj.estimation.baseline import baseline
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.recording import from_arrays
-from ers_mj.simulation import simulate_recording
-from ers_mj.traces import make_trace, trace_of
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.servo.simulation import simulate_recording
 
 H, SIGMA = 1e-3, 1e-3
 SHEET = read_datasheet("table1")

@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from ers_mj.datasheet import TABLE_1, read_datasheet
 from ers_mj.errors import InputError
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.mjcf import mjcf_folder
 from ers_mj.plants.reduced import lumped
+from ers_mj.servo.datasheet import TABLE_1, read_datasheet
 
 ROOT = Path(__file__).resolve().parents[1]
 SHEET = read_datasheet("table1")

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_reduced import SCALES
 
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
 from ers_mj.effects import BY_NAME, EFFECTS
-from ers_mj.identification import residuals, step_of
-from ers_mj.model import OBSERVER_RATE, Model
+from ers_mj.estimation.fit import residuals, step_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
-from ers_mj.traces import trace_of
-from test_reduced import SCALES
+from ers_mj.servo.model import OBSERVER_RATE, Model
 
 T = np.arange(0.0, 3.0, 1e-3)
 TRUTH = {

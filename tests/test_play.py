@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ers_mj.datasheet import read_datasheet
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.play import MOTOR_SHARE, stiff_play
 from ers_mj.plants.printed_play import PrintedPlay
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.servo.datasheet import read_datasheet
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 SHEET = read_datasheet("table1")

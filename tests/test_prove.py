@@ -12,10 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ers_mj import proof_report
 from ers_mj.cli import main
 from ers_mj.commands.output import plain
-from ers_mj.datasheet import read_datasheet
 from ers_mj.effects import EFFECTS
 from ers_mj.errors import InputError
 from ers_mj.plants.inputs import INPUTS
@@ -28,6 +26,8 @@ from ers_mj.proving.forms import TEXTBOOK, draw_shape
 from ers_mj.proving.laws import TABLE_1
 from ers_mj.proving.parameters import covered
 from ers_mj.proving.strength import nearest
+from ers_mj.report import proof_report
+from ers_mj.servo.datasheet import read_datasheet
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
 T = np.arange(0.0, 2.0, 1e-3)

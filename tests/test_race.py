@@ -5,18 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from servo import NAMES, TRUTH, T, recorded, started
 
-from ers_mj import race, screening
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import fit, residuals, score, tau_of
+from ers_mj.estimation.fit import fit, residuals, score, tau_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
-from ers_mj.race import LEAST_GAIN, candidates
-from ers_mj.recording import from_arrays
-from ers_mj.restarts import more_starts, other_forms, other_waves, wider
-from ers_mj.screening import Begin, screen
-from ers_mj.traces import trace_of
-from servo import NAMES, T, TRUTH, recorded, started
+from ers_mj.selection import candidates as race
+from ers_mj.selection import screening
+from ers_mj.selection.candidates import LEAST_GAIN, candidates
+from ers_mj.selection.multistart import more_starts, other_forms, other_waves, wider
+from ers_mj.selection.screening import Begin, screen
 
 
 def test_a_wider_effect_begins_where_its_limit_ended(pushed):

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from ers_mj import selection
-from ers_mj.effects import BY_NAME
-from ers_mj.isolability import probabilities
-from ers_mj.ranking import CURVED, judged, likeliest, likeliest_first, shows, stands_alone
 from servo import recorded, started
+
+from ers_mj.effects import BY_NAME
+from ers_mj.selection import stepwise as selection
+from ers_mj.selection.comparison import CURVED, judged, likeliest, likeliest_first, shows, stands_alone
+from ers_mj.selection.posterior import probabilities
 
 
 def test_a_shaft_that_twists_by_less_than_the_noise_is_none(pushed):

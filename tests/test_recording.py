@@ -9,10 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet
 import pytest
 
+from ers_mj.data.prepared import start_seen
+from ers_mj.data.recording import converter_step, from_arrays, read_recording, write_recording
+from ers_mj.data.sensor_faults import leapt_spans, unmoved_spans
 from ers_mj.errors import InputError
-from ers_mj.recording import converter_step, from_arrays, read_recording, write_recording
-from ers_mj.symptoms import leapt_spans, unmoved_spans
-from ers_mj.traces import start_seen
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 N = 400

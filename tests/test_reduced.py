@@ -5,12 +5,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete
 
-from ers_mj.datasheet import read_datasheet
 from ers_mj.effects import EFFECTS
 from ers_mj.effects.base import Coefficients, Scales, coupled
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.proving import quick
+from ers_mj.servo.datasheet import read_datasheet
 
 TABLE_1 = read_datasheet("table1")
 T = np.arange(0.0, 4.0, 1e-3)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from servo import NOISE, TRUTH, started, trace
 
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
+from ers_mj.data.sensor_faults import converter_step
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
-from ers_mj.remainder import left_by_sensor, left_elsewhere, remembered
-from ers_mj.symptoms import converter_step
-from ers_mj.traces import trace_of
+from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere, remembered
 
 T = np.arange(0.0, 8.0, 1e-3)
 BLOCK = (T / 0.25).astype(int)

@@ -7,12 +7,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from ers_mj import figures
-from ers_mj.display import figure, interval, pretty, shown, spoken
-from ers_mj.evidence import Evidence, RecordView, ResidualMap, Rung
-from ers_mj.mismatch import mismatch
-from ers_mj.report import VERDICTS, report_page
-from ers_mj.traces import make_trace
+from ers_mj.data.prepared import make_trace
+from ers_mj.diagnosis.evidence import Evidence, RecordView, ResidualMap, Rung
+from ers_mj.diagnosis.mismatch_spectrum import mismatch
+from ers_mj.report import diagnosis_figures as figures
+from ers_mj.report.diagnosis_report import VERDICTS, report_page
+from ers_mj.report.display import figure, interval, pretty, shown, spoken
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
 NASTY = '<script>alert("1 & 2")</script>'

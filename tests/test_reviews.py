@@ -4,14 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from ers_mj import reviews
-from ers_mj.effects import BY_NAME
-from ers_mj.identification import fit
-from ers_mj.plants.reduced import EFFORT
-from ers_mj.ranking import Candidate, judged
-from ers_mj.reviews import _begun_anew, exchanged, of_one_body, other_way_round, paired, reviewed, swept, widened
 from servo import TRUTH, recorded, started
+
+from ers_mj.effects import BY_NAME
+from ers_mj.estimation.fit import fit
+from ers_mj.plants.reduced import EFFORT
+from ers_mj.selection import moves as reviews
+from ers_mj.selection.comparison import Candidate, judged
+from ers_mj.selection.moves import (
+    _begun_anew,
+    exchanged,
+    of_one_body,
+    other_way_round,
+    paired,
+    reviewed,
+    swept,
+    widened,
+)
 
 
 def test_a_play_begins_anew_beside_what_was_found_since(pushed):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from ers_mj import cli
-from ers_mj.datasheet import read_datasheet
-from ers_mj.robustness import Spread, scatter, scattered
-from ers_mj.trial import Conditions, try_out
+from ers_mj.control.monte_carlo import Spread, scatter, scattered
+from ers_mj.control.trial import Conditions, try_out
+from ers_mj.servo.datasheet import read_datasheet
 
 SHEET = read_datasheet("table1")
 CONDITIONS = Conditions(rate_hz=500.0, noise=1e-4, seed=3, effects=(("stribeck", {"dF_s": 0.05, "v_s": 0.3}),))

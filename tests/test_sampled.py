@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from ers_mj.datasheet import read_datasheet
+from ers_mj.control.trial import sampled
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.simulation import build_plant, parse_effect
-from ers_mj.trial import sampled
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.servo.simulation import build_plant, parse_effect
 
 SHEET = read_datasheet("table1")
 RATE, N = 1000.0, 1200

@@ -4,19 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from servo import TRUTH, T, recorded, started
 
-from ers_mj import screening
-from ers_mj.baseline import baseline
-from ers_mj.datasheet import read_datasheet
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import residuals, residuals_in, run_of, score
-from ers_mj.knocks import NEARER, Surroundings, _nearer, between
+from ers_mj.estimation.baseline import baseline
+from ers_mj.estimation.fit import residuals, residuals_in, run_of, score
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.recording import from_arrays
-from ers_mj.screening import Screened, _first_order, _hopeful, _hot, _promise, _sparse, _targets, screen, stands_out
-from ers_mj.traces import trace_of
-from servo import T, TRUTH, recorded, started
+from ers_mj.selection import screening
+from ers_mj.selection.impulse_search import NEARER, Surroundings, _nearer, between
+from ers_mj.selection.screening import (
+    Screened,
+    _first_order,
+    _hopeful,
+    _hot,
+    _promise,
+    _sparse,
+    _targets,
+    screen,
+    stands_out,
+)
+from ers_mj.servo.datasheet import read_datasheet
 
 
 def test_a_place_far_from_the_data_takes_no_candidate_from_one_near_it(pushed):

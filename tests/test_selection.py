@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from servo import TRUTH, recorded, started
 
-from ers_mj import reviews, selection
 from ers_mj.effects import BY_NAME
-from ers_mj.identification import fit, score
-from ers_mj.ranking import Candidate, judged
-from ers_mj.selection import (
+from ers_mj.estimation.fit import fit, score
+from ers_mj.selection import moves as reviews
+from ers_mj.selection import stepwise as selection
+from ers_mj.selection.comparison import Candidate, judged
+from ers_mj.selection.stepwise import (
     GOOD_PART,
     _asked,
     _asked_for,
@@ -20,7 +22,6 @@ from ers_mj.selection import (
     _reconsidered,
     _taken,
 )
-from servo import TRUTH, recorded, started
 
 
 def test_a_round_whose_effect_became_needless_is_given_again_once(pushed):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ers_mj.datasheet import read_datasheet
+from ers_mj.control.frequency.linear import linearised
+from ers_mj.data.frequency_response import find_period, frequency_response, gap
+from ers_mj.data.recording import from_arrays
 from ers_mj.errors import InputError
-from ers_mj.frequency.linear import linearised
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.recording import from_arrays
-from ers_mj.simulation import build_plant, simulate_recording
-from ers_mj.spectra import find_period, frequency_response, gap
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.servo.simulation import build_plant, simulate_recording
 
 SHEET = read_datasheet("table1")
 FREE = replace(SHEET, parameters={**SHEET.parameters, "F_c": 0.0, "T_LH": 0.0})

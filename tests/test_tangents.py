@@ -4,11 +4,11 @@ effect that has them.
 
 import numpy as np
 import pytest
+from test_reduced import SCALES, TABLE_1, T
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from test_reduced import SCALES, T, TABLE_1
 
 VALUES = {**TABLE_1.to_lumped(), "emf_share": 0.9}
 SEEN_BY_EQ_5 = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")

@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 FOUND = """
 import numpy as np
 from test_diagnosis import recordings
-from ers_mj.datasheet import read_datasheet
-from ers_mj.diagnosis import diagnose
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.diagnosis.pipeline import diagnose
 document = diagnose(recordings([("eddy_brake", np.array([30.0, 2.0]))]), read_datasheet("table1")).document
 print(document["missing"][0]["effect"], document["missing"][0]["parameters"]["w_0"]["value"])
 """

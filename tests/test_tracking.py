@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from ers_mj import cli
-from ers_mj.datasheet import Datasheet, read_datasheet
+from ers_mj.data.streaming import Stream
 from ers_mj.errors import InputError
+from ers_mj.online.moving_horizon import EXPLAINED, HOP, OPENING, PATIENCE, SHORTEST, Tracker, opening
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.play import stiff_play
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.streaming import Stream
-from ers_mj.tracking import EXPLAINED, HOP, OPENING, PATIENCE, SHORTEST, Tracker, opening
-from ers_mj.watch_report import events, screen, units
+from ers_mj.report.watch_report import events, screen, units
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
 
 RATE, NOISE = 1000.0, math.radians(0.01)
 TRUTH = {

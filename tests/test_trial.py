@@ -9,15 +9,15 @@ import pytest
 from test_report import read
 
 from ers_mj import cli
-from ers_mj.claims import claims, headline
-from ers_mj.closed_loop import Run, Sensor
-from ers_mj.controllers import CONTROLLERS, Servo
-from ers_mj.datasheet import read_datasheet, write_model
+from ers_mj.control.closed_loop import Run, Sensor
+from ers_mj.control.controllers import CONTROLLERS, Servo
+from ers_mj.control.metrics import energy, measured, overshoot, settling_time
+from ers_mj.control.paper_claims import claims, headline
+from ers_mj.control.references import CASES, Reference, named, read_reference
+from ers_mj.control.trial import Conditions, needed, try_out
 from ers_mj.effects import BY_NAME
-from ers_mj.measures import energy, measured, overshoot, settling_time
-from ers_mj.references import CASES, Reference, named, read_reference
-from ers_mj.simulation import kernel_effects
-from ers_mj.trial import Conditions, needed, try_out
+from ers_mj.servo.datasheet import read_datasheet, write_model
+from ers_mj.servo.simulation import kernel_effects
 
 SHEET = read_datasheet("table1")
 SERVO = Servo.of(SHEET)

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from test_mechanical import EQ_1, EQ_5, SHEET, T, rms_deg
+from test_reduced import SCALES
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.play import rigid_play
 from ers_mj.plants.reduced import ReducedModel
-from test_mechanical import EQ_1, EQ_5, SHEET, T, rms_deg
-from test_reduced import SCALES
 
 TOLERANCE = 0.05  # of the effect's own size
 VISIBLE = 0.2  # [deg] RMS

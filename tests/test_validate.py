@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from test_report import read
 
-from ers_mj import cli, validation
-from ers_mj.datasheet import Datasheet, read_datasheet
+from ers_mj import cli
 from ers_mj.plants.inputs import INPUTS, RATE_HZ
-from ers_mj.validation import Case, Condition, Validation, mapped, possible, rms, validate
-from ers_mj.validation_report import validation_page
-from ers_mj.validity import as_document, called, degrees, departures, headline
+from ers_mj.report.validation_report import validation_page
+from ers_mj.report.validity import as_document, called, degrees, departures, headline
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.validation import cases as validation
+from ers_mj.validation.cases import Case, Condition, Validation, mapped, possible, rms, validate
 
 SHEET, HALF = read_datasheet("table1"), float(np.radians(0.5))
 PLAIN, PLAY, ROD, COIL = (

@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ers_mj import cli, rendering
-from ers_mj.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj import cli
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import from_arrays, write_recording
+from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.errors import InputError
-from ers_mj.evidence import Evidence, RecordView
-from ers_mj.frames import frames_of
-from ers_mj.model_file import read_plant, recorded_file
 from ers_mj.plants.mjcf import mjcf_folder
-from ers_mj.recording import from_arrays, write_recording
-from ers_mj.rendering import Painter
-from ers_mj.replay import moments_of, plant_of, posed, recorded, simulated
-from ers_mj.report import report_page
-from ers_mj.traces import trace_of
+from ers_mj.report.diagnosis_report import report_page
+from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.view import rendering
+from ers_mj.view.frames import frames_of
+from ers_mj.view.model_file import read_plant, recorded_file
+from ers_mj.view.rendering import Painter
+from ers_mj.view.replay import moments_of, plant_of, posed, recorded, simulated
 
 SHEET = read_datasheet("table1")
 PLAY = Datasheet(parameters=SHEET.parameters, effects=(("backlash", {"gap": 0.02}),))

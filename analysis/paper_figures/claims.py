@@ -10,9 +10,9 @@ from fractions import Fraction
 
 from drawing import LAWS, PICTURES, trials
 
-from ers_mj.claims import claims
-from ers_mj.controllers import Gains
-from ers_mj.gains import conditions, settling_bound
+from ers_mj.control.controllers import Gains
+from ers_mj.control.gains import conditions, settling_bound
+from ers_mj.control.paper_claims import claims
 
 VERDICT = {True: "holds", False: "**does not hold**", None: "-"}
 WHERE = (

@@ -15,10 +15,10 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ers_mj.datasheet import read_datasheet
-from ers_mj.figures import INK, MEASURED, STYLE
-from ers_mj.trial import Conditions, Trial, try_out
-from ers_mj.trial_figures import COLOURS, ROOMY
+from ers_mj.control.trial import Conditions, Trial, try_out
+from ers_mj.report.diagnosis_figures import INK, MEASURED, STYLE
+from ers_mj.report.trial_figures import COLOURS, ROOMY
+from ers_mj.servo.datasheet import read_datasheet
 
 LAWS = ("hinf", "pid", "pid-ff", "ftrc")
 SIMULATED = Conditions()

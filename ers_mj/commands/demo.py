@@ -29,8 +29,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """As `ers diagnose` on the shipped recordings."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.recording import read_recording
+    from ers_mj.data.recording import read_recording
+    from ers_mj.servo.datasheet import read_datasheet
 
     with as_file(files("ers_mj") / SHIPPED) as shipped:
         recordings, holdout = _shipped(shipped, "rec*.csv"), _shipped(shipped, "holdout*.csv")

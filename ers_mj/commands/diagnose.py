@@ -12,8 +12,8 @@ from ers_mj.commands.output import Progress, as_json, bold, plain, write_results
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.datasheet import Datasheet
-    from ers_mj.recording import Recording
+    from ers_mj.data.recording import Recording
+    from ers_mj.servo.datasheet import Datasheet
 
 FITS = (("training", "train"), ("held out", "heldout"), ("recalibrated", "recalibrated"))
 
@@ -53,8 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write, tell; 0 whatever the verdict."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
     names = mapping(arguments.map)
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.recording import read_recording
+    from ers_mj.data.recording import read_recording
+    from ers_mj.servo.datasheet import read_datasheet
 
     datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
     recordings = [read_recording(spec, names) for spec in arguments.recordings]
@@ -72,7 +72,7 @@ def diagnose_and_tell(
     """The part that `diagnose` and `demo` share: from recordings to files and words."""
     refuse_twice(recordings, holdout)
     refuse_mixed_units([*recordings, *holdout])
-    from ers_mj import diagnosis
+    from ers_mj.diagnosis import pipeline as diagnosis
 
     with Progress() as progress:
         found = diagnosis.diagnose(
@@ -85,9 +85,9 @@ def diagnose_and_tell(
 
 
 def _write(folder: Path, document: dict, found: object, progress: Progress) -> list[Path]:
-    from ers_mj.datasheet import write_model
-    from ers_mj.frames import frames_of
-    from ers_mj.report import report_page
+    from ers_mj.report.diagnosis_report import report_page
+    from ers_mj.servo.datasheet import write_model
+    from ers_mj.view.frames import frames_of
 
     progress("drawing the report", 1.0)
     page = report_page(document, found.evidence, frames_of(found.plant, found.evidence))
@@ -106,7 +106,7 @@ def _write(folder: Path, document: dict, found: object, progress: Progress) -> l
 
 def _input_table(excitation: dict) -> str:
     """The input to record next, as `ers simulate --input` takes it."""
-    from ers_mj.excitation import signal
+    from ers_mj.data.excitation import signal
 
     column = {"%": "u_duty_pct"}.get(excitation["input_unit"], f"u_{excitation['input_unit']}")
     return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation)))]) + "\n"
@@ -177,7 +177,7 @@ def _section(title: str, sentences: list[str]) -> list[str]:
 
 def _told_fit(document: dict) -> list[str]:
     """The three fit numbers, before and after, as a table."""
-    from ers_mj.display import shown
+    from ers_mj.report.display import shown
 
     fit, unit = document.get("fit") or {}, (document.get("data") or {}).get("output_unit")
     unit = shown(unit, fit.get("heldout_rmse_before_rad"))
@@ -189,7 +189,7 @@ def _told_fit(document: dict) -> list[str]:
 
 
 def _told_effects(document: dict) -> list[str]:
-    from ers_mj.display import shown
+    from ers_mj.report.display import shown
 
     lines = []
     for effect in document.get("missing") or []:
@@ -203,7 +203,7 @@ def _told_effects(document: dict) -> list[str]:
 
 
 def _told_interval(entry: dict, unit: object) -> str:
-    from ers_mj.display import NONE, interval
+    from ers_mj.report.display import NONE, interval
 
     told = interval(entry.get("ci95"), unit)
     return "" if told == NONE else f"   (95 %: {told})"

@@ -7,13 +7,13 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import QUARTER, TURN, add_out, number, one_of, pair, mapping, results_folder, several
+from ers_mj.commands.options import QUARTER, TURN, add_out, mapping, number, one_of, pair, results_folder, several
 from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
 
 if TYPE_CHECKING:
-    from ers_mj.datasheet import Datasheet
-    from ers_mj.frequency.study import Study
-    from ers_mj.trial import Conditions
+    from ers_mj.control.frequency.study import Study
+    from ers_mj.control.trial import Conditions
+    from ers_mj.servo.datasheet import Datasheet
 
 AHEAD = ("gain_margin_db", "phase_margin_deg", "sensitivity_peak", "bandwidth_hz")
 COLUMNS = (
@@ -134,10 +134,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse, write, tell; 0."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
     from ers_mj.commands.trial import refuse_unknown, versions
-    from ers_mj.controllers import CONTROLLERS
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.frequency.study import study
-    from ers_mj.recording import read_recording
+    from ers_mj.control.controllers import CONTROLLERS
+    from ers_mj.control.frequency.study import study
+    from ers_mj.data.recording import read_recording
+    from ers_mj.servo.datasheet import read_datasheet
 
     controllers = arguments.controller or list(CONTROLLERS)
     refuse_unknown("--controller", controllers, CONTROLLERS)
@@ -163,9 +163,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _conditions(arguments: argparse.Namespace, datasheet: Datasheet) -> Conditions:
-    from ers_mj.controllers import parse_gains, parse_pid
-    from ers_mj.simulation import parse_effect
-    from ers_mj.trial import Conditions
+    from ers_mj.control.controllers import parse_gains, parse_pid
+    from ers_mj.control.trial import Conditions
+    from ers_mj.servo.simulation import parse_effect
 
     effects = [parse_effect(text) for text in arguments.effect]
     effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
@@ -187,7 +187,7 @@ def _conditions(arguments: argparse.Namespace, datasheet: Datasheet) -> Conditio
 
 def _document(found: Study, conditions: Conditions) -> dict:
     """What `--json` prints; the contract's four keys are those of the first loop."""
-    from ers_mj.frequency.telling import as_document, headline
+    from ers_mj.control.frequency.telling import as_document, headline
 
     first = found.loops[0].as_document()
     return {
@@ -199,7 +199,7 @@ def _document(found: Study, conditions: Conditions) -> dict:
 
 
 def _write(folder: Path, document: dict, found: Study, progress: Progress) -> list[Path]:
-    from ers_mj.frequency_report import frequency_page
+    from ers_mj.report.frequency_report import frequency_page
 
     progress("drawing the report", 1.0)
     page = frequency_page(document, found)

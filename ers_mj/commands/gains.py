@@ -10,8 +10,8 @@ from ers_mj.commands.options import TURN, number, whole
 from ers_mj.commands.output import Progress, as_json, bold
 
 if TYPE_CHECKING:
-    from ers_mj.controllers import Gains
-    from ers_mj.datasheet import Datasheet
+    from ers_mj.control.controllers import Gains
+    from ers_mj.servo.datasheet import Datasheet
 
 DONE, CHECK_FAILED = 0, 1
 
@@ -72,9 +72,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check or search, and tell; 0, or 1 where the conditions fail."""
-    from ers_mj.controllers import parse_gains
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.gains import REMARK, conditions, search, settling_bound
+    from ers_mj.control.controllers import parse_gains
+    from ers_mj.control.gains import REMARK, conditions, search, settling_bound
+    from ers_mj.servo.datasheet import read_datasheet
 
     datasheet, gains = read_datasheet(arguments.model), parse_gains(arguments.gains)
     settle = _settle(datasheet, arguments)
@@ -101,11 +101,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _settle(datasheet: Datasheet, arguments: argparse.Namespace):
     """gains -> settling time [s] of a step on the reduced model."""
-    from ers_mj.controllers import Servo
-    from ers_mj.measures import settling_time
-    from ers_mj.references import named
-    from ers_mj.simulation import build_plant
-    from ers_mj.trial import Conditions, run_once
+    from ers_mj.control.controllers import Servo
+    from ers_mj.control.metrics import settling_time
+    from ers_mj.control.references import named
+    from ers_mj.control.trial import Conditions, run_once
+    from ers_mj.servo.simulation import build_plant
 
     known, plant = Servo.of(datasheet), build_plant(datasheet)
     amplitude, start = math.radians(arguments.amplitude_deg), math.radians(arguments.start_deg)

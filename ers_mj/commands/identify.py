@@ -12,8 +12,8 @@ from ers_mj.commands.output import Progress, as_json, bold, plain, write_results
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.identifying.answer import Identified
-    from ers_mj.recording import Recording
+    from ers_mj.data.recording import Recording
+    from ers_mj.identification.answer import Identified
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -108,10 +108,10 @@ def run(arguments: argparse.Namespace) -> int:
             f"--within gives {', '.join(f'{x:g}' for x in arguments.within)}, a factor below one and one above it were"
             " expected"
         )
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.identifying.estimate import identify
-    from ers_mj.identifying.finding import Settings
-    from ers_mj.recording import read_recording
+    from ers_mj.data.recording import read_recording
+    from ers_mj.identification.estimate import identify
+    from ers_mj.identification.finding import Settings
+    from ers_mj.servo.datasheet import read_datasheet
 
     settings = Settings(
         arguments.method,
@@ -193,8 +193,8 @@ def _document(found: Identified, recordings: list[Recording]) -> dict:
 
 
 def _write(folder: Path, document: dict, found: Identified, progress: Progress) -> list[Path]:
-    from ers_mj.datasheet import write_model
-    from ers_mj.identify_report import identify_page
+    from ers_mj.report.identify_report import identify_page
+    from ers_mj.servo.datasheet import write_model
 
     progress("drawing the report", 1.0)
     page = identify_page(document, found)

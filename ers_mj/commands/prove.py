@@ -151,7 +151,7 @@ def _versions(proof: Proof) -> dict[str, str]:
 
 
 def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> list[Path]:
-    from ers_mj.proof_report import proof_page
+    from ers_mj.report.proof_report import proof_page
 
     about = {"seed": results["seed"], "truth sealed as sha256": results["truth_sha256"], **results["versions"]}
     page = proof_page(results, rows, about)
@@ -170,7 +170,7 @@ def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> li
 
 def _told(results: dict) -> list[str]:
     """What a terminal shows when all is done."""
-    from ers_mj.proof_report import headline, table_of
+    from ers_mj.report.proof_report import headline, table_of
 
     counts = ", ".join(f"{n} {kind}" for kind, n in results["counts"].items() if n)
     lines = ["", bold(headline(results)), f"{results['cases']} cases ({counts}), seed {results['seed']}", ""]
@@ -212,7 +212,7 @@ def _told_confusion(confusion: dict) -> list[str]:
 
 def _told_real(results: dict) -> list[str]:
     """What was concealed in real records and found again beside what the rigs have of their own."""
-    from ers_mj.proof_report import again
+    from ers_mj.report.proof_report import again
 
     lines = ["", bold("the rigs as they are")]
     lines += [f"  {rig:12} {', '.join(names) or 'nothing'}" for rig, names in results["own"].items()]

@@ -69,9 +69,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write; 0."""
     out = checked_out(arguments)
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.recording import write_recording
-    from ers_mj.simulation import parse_effect, simulate_recording
+    from ers_mj.data.recording import write_recording
+    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.simulation import parse_effect, simulate_recording
 
     datasheet = read_datasheet(arguments.model)
     effects = [parse_effect(text) for text in arguments.effect]
@@ -113,8 +113,8 @@ def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
     """Time and voltage, of a name or of a file."""
     import numpy as np
 
+    from ers_mj.data.recording import read_input
     from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
-    from ers_mj.recording import read_input
 
     if arguments.input not in INPUTS:
         for option, value in (("--rate-hz", arguments.rate_hz), ("--duration", arguments.duration)):

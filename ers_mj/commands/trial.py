@@ -13,9 +13,9 @@ from ers_mj.commands.output import Progress, as_json, bold, plain, write_results
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.datasheet import Datasheet
-    from ers_mj.robustness import Spread
-    from ers_mj.trial import Conditions, Trial
+    from ers_mj.control.monte_carlo import Spread
+    from ers_mj.control.trial import Conditions, Trial
+    from ers_mj.servo.datasheet import Datasheet
 
 LINKAGES = ("constant", "rod")
 COLUMNS = (
@@ -153,10 +153,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run every combination, write, tell; 0."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    from ers_mj.claims import headline
-    from ers_mj.controllers import CONTROLLERS
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.trial import try_out
+    from ers_mj.control.controllers import CONTROLLERS
+    from ers_mj.control.paper_claims import headline
+    from ers_mj.control.trial import try_out
+    from ers_mj.servo.datasheet import read_datasheet
 
     controllers = arguments.controller or list(CONTROLLERS)
     refuse_unknown("--controller", controllers, CONTROLLERS)
@@ -197,7 +197,7 @@ def _spreads(
     progress: Progress,
 ) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
-    from ers_mj.robustness import scatter
+    from ers_mj.control.monte_carlo import scatter
 
     if not arguments.plants:
         return []
@@ -224,8 +224,8 @@ def refuse_unknown(option: str, names: Iterable[str], known: Iterable[str]) -> N
 
 def _refuse_cases(arguments: argparse.Namespace) -> None:
     """Raise InputError for a plant or a case that does not exist, or a rate that no case takes."""
-    from ers_mj.references import CASES
-    from ers_mj.trial import PLANTS
+    from ers_mj.control.references import CASES
+    from ers_mj.control.trial import PLANTS
 
     refuse_unknown("--plant", arguments.plant, PLANTS)
     files = [case for case in arguments.case if case not in CASES]
@@ -240,9 +240,9 @@ def _refuse_cases(arguments: argparse.Namespace) -> None:
 
 
 def _conditions(arguments: argparse.Namespace) -> Conditions:
-    from ers_mj.controllers import parse_gains, parse_pid
-    from ers_mj.simulation import parse_effect
-    from ers_mj.trial import Conditions
+    from ers_mj.control.controllers import parse_gains, parse_pid
+    from ers_mj.control.trial import Conditions
+    from ers_mj.servo.simulation import parse_effect
 
     effects = [parse_effect(text) for text in arguments.effect]
     effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
@@ -266,8 +266,8 @@ def _conditions(arguments: argparse.Namespace) -> Conditions:
 
 def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> list[str]:
     """What a reader should know of the references."""
-    from ers_mj.controllers import Servo
-    from ers_mj.trial import needed
+    from ers_mj.control.controllers import Servo
+    from ers_mj.control.trial import needed
 
     known, notes = Servo.of(design), []
     for aim in {t.case: t.run.reference for t in trials}.values():
@@ -290,7 +290,7 @@ def versions() -> dict[str, str]:
 
 
 def _write(folder: Path, document: dict, trials: list[Trial], spreads: list[Spread], progress: Progress) -> list[Path]:
-    from ers_mj.trial_report import trial_page
+    from ers_mj.report.trial_report import trial_page
 
     progress("drawing the report", 1.0)
     page = trial_page(document, trials, spreads)

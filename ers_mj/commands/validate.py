@@ -11,8 +11,8 @@ from ers_mj.commands.options import add_jobs_and_json, add_out, number, one_of, 
 from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
 
 if TYPE_CHECKING:
-    from ers_mj.datasheet import Datasheet
-    from ers_mj.validation import Validation
+    from ers_mj.servo.datasheet import Datasheet
+    from ers_mj.validation.cases import Validation
 
 LINKAGES, SWITCH = ("constant", "rod"), ("off", "on")
 NAME = 38  # characters of a row's name
@@ -60,9 +60,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate both, compare, write, tell; 0."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.validation import validate
-    from ers_mj.validity import as_document
+    from ers_mj.report.validity import as_document
+    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.validation.cases import validate
 
     datasheet = read_datasheet(arguments.datasheet)
     gaps, linkages, inductances, left_out = _asked(arguments, datasheet)
@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _asked(arguments: argparse.Namespace, datasheet: Datasheet) -> tuple[list, list, list, list[str]]:
     """Gaps [rad], linkages, inductances, and what the default run leaves out because the datasheet cannot make it."""
     if arguments.gap is None and arguments.linkage is None and arguments.inductance is None:
-        from ers_mj.validation import possible
+        from ers_mj.validation.cases import possible
 
         return possible(datasheet)
     return (
@@ -106,7 +106,7 @@ def _versions() -> dict[str, str]:
 
 
 def _write(folder: Path, document: dict, found: Validation, progress: Progress) -> list[Path]:
-    from ers_mj.validation_report import validation_page
+    from ers_mj.report.validation_report import validation_page
 
     progress("drawing the report", 1.0)
     page = validation_page(found, {"datasheet": document["datasheet"], **document["versions"]})
@@ -134,8 +134,8 @@ def _told(found: Validation, document: dict, files: list[Path]) -> list[str]:
 
 def _told_table(found: Validation) -> list[str]:
     """RMS deviations, one condition a line."""
-    from ers_mj.validation import spoken
-    from ers_mj.validity import VALID, degrees
+    from ers_mj.report.validity import VALID, degrees
+    from ers_mj.validation.cases import spoken
 
     inputs = list(dict.fromkeys(case.input for case in found.cases))
     lines = [bold(f"{'RMS deviation; MuJoCo has':{NAME}}" + "".join(f"{name:>11}" for name in inputs))]

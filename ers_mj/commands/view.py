@@ -12,10 +12,8 @@ from ers_mj.commands.output import Progress, as_json, write_whole
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from ers_mj.recording import Recording
-    from ers_mj.replay import Replay
+    from ers_mj.data.recording import Recording
+    from ers_mj.view.replay import Replay
 
 LINKAGES = ("constant", "rod")
 WIDTHS = {".png": 960, ".gif": 480}  # what can be rendered, and how wide [pixels]
@@ -95,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _show(arguments: argparse.Namespace) -> int:
-    from ers_mj.window import open_window, refuse_no_display
+    from ers_mj.view.window import open_window, refuse_no_display
 
     refuse_no_display()
     replay = _replay(arguments, is_film=True)
@@ -144,7 +142,7 @@ def _is_mjcf(model: str) -> bool:
 
 def _replay(arguments: argparse.Namespace, is_film: bool) -> Replay:
     """The moments to show: a film, or the single one of a still."""
-    from ers_mj.recording import read_recording
+    from ers_mj.data.recording import read_recording
 
     if arguments.replay is not None:
         replay = _recorded(arguments, read_recording(arguments.replay, mapping(arguments.map)))
@@ -157,9 +155,9 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
     """The plant under a named input, at rest without one."""
     import numpy as np
 
-    from ers_mj import model_file, replay
-    from ers_mj.datasheet import read_datasheet
     from ers_mj.plants.inputs import INPUTS, RATE_HZ
+    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.view import model_file, replay
 
     t = np.arange(1 if name is None else max(2, round(arguments.duration * RATE_HZ) + 1)) / RATE_HZ
     u = np.zeros(1) if name is None else INPUTS[name](t)
@@ -173,9 +171,9 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
 
 
 def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
-    from ers_mj import model_file, replay
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.traces import trace_of
+    from ers_mj.data.prepared import trace_of
+    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.view import model_file, replay
 
     moments, unit = replay.moments_of(recording.t, FPS, arguments.duration), recording.output_unit
     if _is_mjcf(arguments.model):
@@ -191,7 +189,7 @@ def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
 
 
 def _render(replay: Replay, out: Path, width: int | None) -> dict:
-    from ers_mj.rendering import gif_bytes, png_bytes, replay_frames
+    from ers_mj.view.rendering import gif_bytes, png_bytes, replay_frames
 
     kind = out.suffix.lower()
     width = width or WIDTHS[kind]

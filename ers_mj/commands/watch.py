@@ -20,7 +20,7 @@ from ers_mj.commands.output import plain
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.tracking import Estimate
+    from ers_mj.online.moving_horizon import Estimate
 
 PIECE, POLL = 1 << 16, 0.05  # bytes read at once, and [s] between looks at a file that does not grow
 REDRAW = 0.1  # [s] between screens
@@ -77,8 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.stream != "-" and not Path(arguments.stream).is_file():
         what = "is a folder" if Path(arguments.stream).is_dir() else "there is no such file"
         raise InputError(f"{arguments.stream}: {what}, a CSV file or - for standard input was expected")
-    from ers_mj.datasheet import read_datasheet
-    from ers_mj.streaming import Stream
+    from ers_mj.data.streaming import Stream
+    from ers_mj.servo.datasheet import read_datasheet
 
     datasheet = None if arguments.datasheet is None else read_datasheet(arguments.datasheet)
     stream = Stream("standard input" if arguments.stream == "-" else Path(arguments.stream).name, chosen)
@@ -123,7 +123,7 @@ def _estimates(stream, pieces: Iterator[str], datasheet, show) -> Iterator[Estim
     """Estimates of a stream; the first ones once it has moved for long enough."""
     import numpy as np
 
-    from ers_mj.tracking import OPENING, UNKNOWN_OPENING, Tracker, is_moving, opening
+    from ers_mj.online.moving_horizon import OPENING, UNKNOWN_OPENING, Tracker, is_moving, opening
 
     begun, needed, tracker = (np.zeros(0),) * 3, UNKNOWN_OPENING if datasheet is None else OPENING, None
     for piece in pieces:
@@ -160,12 +160,12 @@ class _Lines:
 
     def begin(self, units, datasheet) -> None:
         """The model is ready."""
-        from ers_mj.watch_report import units as shown
+        from ers_mj.report.watch_report import units as shown
 
         self._shown = shown(units["y"], units["u"])
 
     def __call__(self, now: Estimate) -> None:
-        from ers_mj.watch_report import events, line
+        from ers_mj.report.watch_report import events, line
 
         for event in events(self._last, now, self._shown):
             print(f"{now.t:.1f} s  {event}", flush=True)
@@ -185,7 +185,7 @@ class _Machine(_Lines):
         super().__init__(0.0)
 
     def __call__(self, now: Estimate) -> None:
-        from ers_mj.watch_report import as_document, events
+        from ers_mj.report.watch_report import as_document, events
 
         print(
             json.dumps(
@@ -213,7 +213,7 @@ class _Screen(_Lines):
         )
 
     def __call__(self, now: Estimate) -> None:
-        from ers_mj.watch_report import events, screen
+        from ers_mj.report.watch_report import events, screen
 
         told = events(self._last, now, self._shown)
         self._events.extend(f"{now.t:.1f} s  {event}" for event in told)

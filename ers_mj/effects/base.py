@@ -173,7 +173,7 @@ class Effect:
     subsystem: ClassVar[str] = ""
     mjcf: ClassVar[str] = ""
     named: ClassVar[bool] = (
-        # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see mimics.py)
+        # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see confounders.py)
         True
     )
     parameters: ClassVar[tuple[Parameter, ...]] = ()

@@ -21,7 +21,6 @@ from ers_mj.plants.events import (
     A_EMF,
     A_MINUS,
     A_PLUS,
-    B,
     BETA,
     BIAS,
     C_1,
@@ -52,6 +51,7 @@ from ers_mj.plants.events import (
     THETA_0,
     UPPER,
     VECTOR,
+    B,
     _faster,
     _motor_level,
 )

@@ -14,7 +14,6 @@ from ers_mj.plants import fixed_steps
 from ers_mj.plants.compiled import compiled_cache
 from ers_mj.plants.events import (
     A_EMF,
-    B,
     BRISTLE_CORNER,
     C_1,
     C_PLUS,
@@ -29,6 +28,7 @@ from ers_mj.plants.events import (
     TAU,
     TWO,
     UPPER,
+    B,
     _advance,
     _bounded,
     _cuts,

@@ -17,8 +17,8 @@ from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 
+from ers_mj.data.tables import reason, write_whole
 from ers_mj.errors import InputError
-from ers_mj.tables import reason, write_whole
 
 SETTINGS, SEALED, ANSWERS = "settings.json", "sealed", "answers"
 JUDGES = ("sealing.py", "asking.py", "conduct.py", "scoring.py", "parameters.py")  # of proving/: they make no case

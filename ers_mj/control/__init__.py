@@ -1,0 +1,1 @@
+"""Controllers, loops and what they are worth."""

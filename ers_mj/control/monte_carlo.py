@@ -1,0 +1,154 @@
+"""Trials on many servos: parameters and effects scattered about a datasheet's, the controllers knowing the datasheet
+alone.
+
+datasheet, spread, seed -> servos -> trials of each -> distribution of every measure
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.control.metrics import Measures
+from ers_mj.control.trial import Conditions, try_out
+from ers_mj.effects import BY_NAME
+from ers_mj.servo.datasheet import Datasheet
+from ers_mj.servo.simulation import EffectSettings
+
+SCATTERED = ("J", "B", "K_t", "K_e", "k_s", "T_LH", "F_c", "R", "L")
+LUMPED = ("a_1", "a_2", "b", "c_1", "c_2")
+QUANTILES = (0.05, 0.5, 0.95)
+TOLD = (
+    "settling_time_s",
+    "overshoot_pct",
+    "steady_state_error_rad",
+    "rmse_rad",
+    "peak_u_V",
+    "rms_u_V",
+    "chatter_V",
+    "energy_J",
+)
+Progress = Callable[[str, float], None]
+Key = tuple[str, str, str]  # controller, plant, case
+
+
+@dataclass(frozen=True)
+class Spread:
+    """One controller on one plant over one reference, on all servos: their measures, None among those of loops that
+    were given up.
+    """
+
+    controller: str
+    plant: str
+    case: str
+    measures: tuple[Measures, ...]
+
+    @property
+    def unstable(self) -> int:
+        """Loops given up."""
+        return sum(not m.stable for m in self.measures)
+
+    def values(self, name: str) -> np.ndarray:
+        """A measure (M,) over the servos that have it."""
+        return np.array([x for x in (getattr(m, name) for m in self.measures) if x is not None], float)
+
+    def quantiles(self, name: str) -> tuple[float, float, float, float] | None:
+        """5 %, median, 95 % and the largest of a measure; None where no servo has it."""
+        x = self.values(name)
+        return (*np.quantile(x, QUANTILES).tolist(), float(x.max())) if x.size else None
+
+    def as_document(self) -> dict:
+        """As an entry of `robustness`."""
+        told = {name: self.quantiles(name) for name in TOLD}
+        return {
+            "controller": self.controller,
+            "plant": self.plant,
+            "case": self.case,
+            "plants": len(self.measures),
+            "unstable": self.unstable,
+            "never_settled": len(self.measures) - self.values("settling_time_s").size - self.unstable,
+            "measures": {
+                name: q and dict(zip(("q05", "median", "q95", "largest"), q, strict=True)) for name, q in told.items()
+            },
+        }
+
+
+def scattered(
+    datasheet: Datasheet, effects: EffectSettings, spread: float, random: np.random.Generator
+) -> tuple[Datasheet, EffectSettings]:
+    """A servo like the datasheet's: every parameter, and the size of every effect, times a factor within 1/spread and
+    spread, log-uniform.
+
+    Effects beside the datasheet's are scattered alike. An effect without a size of its own is scattered in its first
+    parameter, within its bounds.
+    """
+    factor = lambda: float(spread ** random.uniform(-1.0, 1.0))  # noqa: E731
+    sheet = replace(
+        datasheet,
+        parameters={k: x * (factor() if k in SCATTERED else 1.0) for k, x in datasheet.parameters.items()},
+        lumped={k: x * (factor() if k in LUMPED else 1.0) for k, x in datasheet.lumped.items()},
+        effects=tuple((name, _resized(name, values, factor())) for name, values in datasheet.effects),
+    )
+    return replace(sheet, name=datasheet.name), tuple(
+        (name, _resized(name, values, factor())) for name, values in effects
+    )
+
+
+def _resized(name: str, values: Mapping[str, float], factor: float) -> dict[str, float]:
+    known = BY_NAME[name].parameters
+    resized = {p.name for p in known[: max(BY_NAME[name].sized, 1)]}
+    return {
+        p.name: float(np.clip(values[p.name] * (factor if p.name in resized else 1.0), p.lower, p.upper))
+        for p in known
+        if p.name in values
+    }
+
+
+def scatter(
+    datasheet: Datasheet,
+    controllers: Sequence[str],
+    plants: Sequence[str],
+    cases: Sequence[str],
+    conditions: Conditions,
+    *,
+    count: int,
+    spread: float,
+    design: Datasheet | None = None,
+    jobs: int = 1,
+    progress: Progress = lambda text, fraction: None,
+) -> list[Spread]:
+    """Try all combinations on ``count`` servos, on ``jobs`` cores, which do not change the result. Servo k has the
+    noise of seed + k.
+
+    Raises:
+        InputError: as :func:`ers_mj.control.trial.try_out`.
+    """
+    tasks = [
+        (datasheet, tuple(controllers), tuple(plants), tuple(cases), conditions, design or datasheet, spread, k)
+        for k in range(count)
+    ]
+    found: list[dict[Key, Measures] | None] = [None] * count
+    if jobs <= 1:
+        for k, task in enumerate(tasks):
+            progress(f"servo {k + 1} of {count}", k / count)
+            found[k] = _one(task)
+    else:
+        with ProcessPoolExecutor(min(jobs, count)) as pool:
+            waiting = {pool.submit(_one, task): k for k, task in enumerate(tasks)}
+            for done, future in enumerate(as_completed(waiting), start=1):
+                found[waiting[future]] = future.result()
+                progress(f"servo {done} of {count}", done / count)
+    return [Spread(*key, tuple(measures[key] for measures in found)) for key in found[0]]
+
+
+def _one(task) -> dict[Key, Measures]:
+    """All trials of one servo: {(controller, plant, case): measures}."""
+    datasheet, controllers, plants, cases, conditions, design, spread, k = task
+    sheet, effects = scattered(datasheet, conditions.effects, spread, np.random.default_rng([conditions.seed, k]))
+    trials = try_out(
+        sheet, controllers, plants, cases, replace(conditions, effects=effects, seed=conditions.seed + k), design=design
+    )
+    return {(t.controller, t.plant, t.case): t.measures for t in trials}

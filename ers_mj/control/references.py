@@ -1,0 +1,153 @@
+"""What a servo is asked to follow: the paper's cases, and a user's own from a file.
+ Each is a function of time from 0 and gives angle, speed and acceleration; where the angle jumps both derivatives are
+those beside the jump, as no drive could follow more.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ers_mj.control.controllers import Servo
+from ers_mj.data.tables import listed, numbers, parse_table, read_content
+from ers_mj.errors import InputError
+
+STEP_S, SQUARE_S, RAMP_S, CHIRP_S = 2.0, 2.0, 2.0, 5.0
+SQUARE_HZ, RAMP_HZ = 1.0, 0.5
+CHIRP_FROM_HZ, CHIRP_TO_HZ = 1.0, 20.0
+ANGLES = {"theta_ref_rad": 1.0, "theta_ref_deg": math.radians(1.0)}
+MOST_SAMPLES = 2_000_000
+FASTEST_HZ, FURTHEST = 1e6, 1000.0  # sample rate and angle [rad] up to which a file is taken for a reference
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A reference, each (N,): time [s], angle [rad], speed [rad/s], acceleration [rad/s^2]; ``jumps`` are the samples
+    at which the angle jumps.
+    """
+
+    name: str
+    t: np.ndarray
+    theta: np.ndarray
+    omega: np.ndarray
+    alpha: np.ndarray
+    jumps: tuple[int, ...] = ()
+
+    @property
+    def rate_hz(self) -> float:
+        """Of its samples."""
+        return (self.t.size - 1) / float(self.t[-1] - self.t[0])
+
+
+def _still(t: np.ndarray) -> np.ndarray:
+    return np.zeros(t.size)
+
+
+def step(t):
+    """1 from the first sample on."""
+    return np.ones(t.size), _still(t), _still(t)
+
+
+def square(t):
+    """+1 and -1 in turn, half a second each (the paper's Case 1)."""
+    return 1.0 - 2.0 * (np.floor(2.0 * SQUARE_HZ * t + 1e-9) % 2), _still(t), _still(t)
+
+
+def ramp(t):
+    """A triangle that begins at 0 and rises: constant speed, reversed at +1 and -1 (Case 2)."""
+    turns = RAMP_HZ * t
+    falling = np.floor(2.0 * turns + 0.5 + 1e-9) % 2
+    return 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * turns)), 4.0 * RAMP_HZ * (1.0 - 2.0 * falling), _still(t)
+
+
+def chirp(t):
+    """A sine from 1 to 20 Hz, linear in time (Case 3)."""
+    sweep = 2.0 * np.pi * (CHIRP_TO_HZ - CHIRP_FROM_HZ) / CHIRP_S
+    phase = 2.0 * np.pi * CHIRP_FROM_HZ * t + 0.5 * sweep * t**2
+    rate = 2.0 * np.pi * CHIRP_FROM_HZ + sweep * t
+    return np.sin(phase), rate * np.cos(phase), sweep * np.cos(phase) - rate**2 * np.sin(phase)
+
+
+CASES: Mapping[str, tuple[Callable, float]] = {
+    "step": (step, STEP_S),
+    "square": (square, SQUARE_S),
+    "ramp": (ramp, RAMP_S),
+    "chirp": (chirp, CHIRP_S),
+}
+
+
+def named(name: str, amplitude: float, start: float, rate_hz: float) -> Reference:
+    """One of the cases, of this amplitude [rad] about this start [rad].
+
+    Raises:
+        InputError: the rate makes too few or too many samples of it.
+    """
+    shape, duration = CASES[name]
+    n = round(duration * rate_hz)
+    if not 100 <= n <= MOST_SAMPLES:
+        raise InputError(f"{duration:g} s at {rate_hz:g} Hz are {n} samples, 100 to {MOST_SAMPLES} were expected")
+    t = np.arange(n) / rate_hz
+    theta, omega, alpha = (amplitude * x for x in shape(t))
+    jumps = (0, *np.flatnonzero(np.diff(theta)) + 1) if name in ("step", "square") else ()
+    return Reference(name, t, start + theta, omega, alpha, tuple(int(k) for k in jumps))
+
+
+def read_reference(path: str | os.PathLike, servo: Servo, u_max: float) -> Reference:
+    """A reference of a file with the columns t_s and theta_ref_rad or theta_ref_deg, sampled as the loop shall run.
+
+    Speed and acceleration are backward differences, so that nothing of the future is in them; a difference that no
+    motion of this servo could make is a jump and has none.
+
+    Raises:
+        InputError: the file is no such thing.
+    """
+    file = Path(path)
+    table = parse_table(read_content(file), file.suffix.lower(), file.name)
+    names = [name for name in ANGLES if name in table.column_names]
+    if "t_s" not in table.column_names or len(names) != 1:
+        raise InputError(
+            f"{file.name}: a reference has the column t_s and one of {listed(ANGLES)}, the columns are"
+            f" {listed(table.column_names)}"
+        )
+    t, theta = numbers(table["t_s"], "t_s", file.name), numbers(table[names[0]], names[0], file.name) * ANGLES[names[0]]
+    _refuse_holes(t, theta, file.name)
+    t, h = t - t[0], float(t[-1] - t[0]) / (t.size - 1)
+    fastest = servo_speed(servo, u_max)
+    omega = np.diff(theta, prepend=theta[0]) / h
+    jump = np.abs(omega) > fastest
+    omega[jump] = 0.0
+    alpha = np.diff(omega, prepend=omega[0]) / h
+    alpha[np.abs(alpha) > abs(servo.b) * u_max] = 0.0
+    alpha[jump | np.roll(jump, 1)] = 0.0
+    alpha[:2] = 0.0  # the first speed is not known before the second sample
+    return Reference(file.stem, t, theta, omega, alpha, tuple(int(k) for k in np.flatnonzero(jump)))
+
+
+def servo_speed(servo: Servo, u_max: float) -> float:
+    """The speed [rad/s] that the servo would reach at full voltage, or in a second where nothing brakes it."""
+    return abs(servo.b) * u_max / max(servo.a_2, 1.0)
+
+
+def _refuse_holes(t: np.ndarray, theta: np.ndarray, name: str) -> None:
+    if not 100 <= t.size <= MOST_SAMPLES:
+        raise InputError(f"{name}: has {t.size} samples, 100 to {MOST_SAMPLES} were expected")
+    for label, x in (("t_s", t), ("the reference", theta)):
+        if not np.isfinite(x).all():
+            raise InputError(
+                f"{name}: {label} is missing or infinite in data row {1 + int(np.argmax(~np.isfinite(x)))}, a reference"
+                " has no holes"
+            )
+    h = np.diff(t)
+    if h.min() <= 0 or np.ptp(h) > 0.01 * h.mean():
+        raise InputError(f"{name}: its times are not evenly spaced, a loop runs at one sample rate")
+    if h.mean() < 1.0 / FASTEST_HZ:
+        raise InputError(f"{name}: its samples are {h.mean():.3g} s apart, {1.0 / FASTEST_HZ:g} s or more was expected")
+    if np.abs(theta).max() > FURTHEST:
+        raise InputError(
+            f"{name}: its reference reaches {np.abs(theta).max():.3g} rad, {FURTHEST:g} rad at most was expected"
+        )

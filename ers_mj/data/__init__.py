@@ -1,0 +1,1 @@
+"""Recordings: read, checked, locked, and prepared for a fit."""

@@ -1,0 +1,368 @@
+"""Recordings as a fit sees them: noise level, time blocks, initial state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ers_mj.data.quantisation import COARSE, Converter
+from ers_mj.data.recording import Recording
+from ers_mj.data.sensor_faults import at_extreme, converter_step, frozen_spans, leapt_spans, spikes, unmoved_spans
+
+BLOCK = 0.25  # [s]
+START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
+START_SAMPLES = 10
+FEWEST_SEEN = 6  # samples that a start is told from
+KNOWN = 0.8  # share of the samples that a further sensor must have seen
+LEAST_SAG = 0.005  # of the supply, from which it varies
+MOST = 0.5  # of the noise's power, from which a converter makes most of it
+FIRST = 2  # changes by which a speed at the start must show
+SURE_SPEED = 3.0  # standard deviations within which a speed at the start may lie
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What another sensor saw, (N,) on the output's side of the gear: "current" [A], "speed" or "motor" angle; NaN
+    where missing.
+    """
+
+    kind: str
+    values: np.ndarray
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One recording as the fit sees it: arrays (N,), noise sigma, blocks, the (reading, speed) it starts with, and the
+    spans that its sensor lost.
+
+    ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output.
+    ``supply`` is the measured one [V] (N,), None where none was measured or it does not vary; ``converter`` the one
+    whose steps are coarse for the travel, where there is one.
+    """
+
+    name: str
+    t: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+    valid: np.ndarray
+    enable: np.ndarray | None
+    load: np.ndarray | None
+    sigma: float
+    quantum: float
+    start: tuple[float, float]
+    block: np.ndarray
+    counts: np.ndarray
+    lost: tuple[slice, ...] = ()
+    channels: tuple[Channel, ...] = ()
+    supply: np.ndarray | None = None
+    converter: Converter | None = None
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether the converter makes most of the noise."""
+        return self.quantum**2 / 12 > MOST * self.sigma**2
+
+    @cached_property
+    def sample_time(self) -> float:
+        """Median step [s]."""
+        return float(np.median(np.diff(self.t)))
+
+    @cached_property
+    def is_uniform(self) -> bool:
+        """Whether all steps are alike."""
+        return self.t.size > 1 and bool(np.ptp(np.diff(self.t)) < 1e-5 * self.sample_time)
+
+    def part(self, begin: int, end: int) -> Trace:
+        """Samples begin..end as a trace of their own."""
+        cut = slice(begin, end)
+        pick = lambda a: None if a is None else a[cut]  # noqa: E731
+        made = make_trace(
+            self.name,
+            self.t[cut],
+            self.u[cut],
+            self.y[cut],
+            self.valid[cut],
+            pick(self.enable),
+            pick(self.load),
+            self.sigma,
+            self.quantum,
+        )
+        return replace(
+            made,
+            channels=tuple(replace(c, values=c.values[cut]) for c in self.channels),
+            supply=pick(self.supply),
+            converter=self.converter,
+        )
+
+    def sparse(self, stride: int) -> Trace:
+        """Every so many samples of a uniform trace, under the mean of what was put in between."""
+        if stride <= 1:
+            return self
+        some, begins = slice(None, None, stride), np.arange(0, self.t.size, stride)
+        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])  # noqa: E731
+        mean = np.add.reduceat(self.u, begins) / np.diff(np.append(begins, self.t.size))
+        block = self.block[some]
+        return replace(
+            self,
+            t=pick(self.t),
+            u=mean,
+            y=pick(self.y),
+            valid=pick(self.valid),
+            enable=pick(self.enable),
+            load=pick(self.load),
+            block=block,
+            counts=np.bincount(block[self.valid[some]], minlength=block[-1] + 1).astype(float),
+            supply=pick(self.supply),
+            channels=tuple(replace(c, values=pick(c.values)) for c in self.channels),
+        )
+
+    def without(self, spans: Sequence[slice]) -> Trace:
+        """The trace with further spans lost."""
+        if not spans:
+            return self
+        valid = self.valid.copy()
+        for span in spans:
+            valid[span] = False
+        made = make_trace(
+            self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum, self.start
+        )
+        return replace(
+            made, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans)
+        )
+
+    @cached_property
+    def seen(self) -> np.ndarray:
+        """Which of its residuals (rows,) a sensor saw."""
+        return np.concatenate([self.valid, *(np.isfinite(c.values) for c in self.channels)])
+
+    @cached_property
+    def unseen(self) -> np.ndarray:
+        """The places of the others among them."""
+        return np.flatnonzero(~self.seen)
+
+    @cached_property
+    def followed(self) -> np.ndarray:
+        """What an observer may follow (N,), NaN where nothing."""
+        return self.y if self.converter is None else self.converter.path(self.t, self.y)
+
+    @property
+    def sure_noise(self) -> float:
+        """The noise in what a reading surely tells (see evaluation.Score)."""
+        return self.sigma if self.converter is None else self.converter.sure_noise
+
+    def weighed(self, theta: np.ndarray) -> np.ndarray:
+        """The output less a simulated one (N,), in sigmas."""
+        return (self.y - theta) / self.sigma if self.converter is None else self.converter.weighed(self.y - theta)
+
+    def plain(self, e: np.ndarray) -> np.ndarray:
+        """Residuals (rows,) in sigmas as they would be without what a coarse converter's thresholds tell."""
+        return (
+            e if self.converter is None else np.concatenate([self.converter.plain(e[: self.t.size]), e[self.t.size :]])
+        )
+
+    @property
+    def rows(self) -> int:
+        """Residuals that the recording gives: samples times (1 + channels)."""
+        return self.t.size * (1 + len(self.channels))
+
+
+def trace_of(recording: Recording, inertia: float | None) -> Trace:
+    """A recording as a trace; its known load torque becomes an acceleration where the inertia [kg m^2] is known, else
+    nothing.
+
+    Spans in which the sensor shows a spike, or hangs, are no measurement of the output.
+    """
+    load = -recording.load / inertia if recording.load is not None and inertia else None
+    y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
+    stuck: list[slice] = []
+    for found in (frozen_spans(y, recording.quantum), unmoved_spans(y, recording.quantum, sigma)):
+        stuck += [s for s in found if not at_extreme(y, s) and not _meets(s, stuck)]
+    stuck += [s for s in leapt_spans(y, recording.quantum, sigma) if not _meets(s, stuck)]
+    lost = (*spikes(np.where(recording.valid, y, np.nan), sigma), *stuck)
+    trace = make_trace(
+        recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum
+    )
+    trace = trace.without(lost)
+    return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid), supply=_supply(recording))
+
+
+def _meets(span: slice, others: Sequence[slice]) -> bool:
+    return any(span.start < other.stop and other.start < span.stop for other in others)
+
+
+def counted(traces: Sequence[Trace], travel: float) -> list[Trace]:
+    """The traces with their converters, where these are coarse for the travel [output unit]."""
+    return [replace(t, converter=Converter(t.quantum, t.sigma)) if t.quantum > COARSE * travel else t for t in traces]
+
+
+def _supply(recording: Recording) -> np.ndarray | None:
+    """The measured supply [V] (N,), a missing sample between its neighbours; None where hardly any is known or it does
+    not vary.
+    """
+    if recording.vin is None or (known := np.isfinite(recording.vin)).mean() < KNOWN:
+        return None
+    supply = np.interp(recording.t, recording.t[known], recording.vin[known])
+    low, level, high = np.quantile(supply, (0.02, 0.5, 0.98))
+    return supply if low > 0.0 and high - low > LEAST_SAG * level else None
+
+
+def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
+    """The current, the speed and the motor's angle where a recording holds them and they vary.
+
+    The motor's angle is brought to the output's side of the gear by a straight line through both, so that ratio and
+    zero are not judged.
+    """
+    found = []
+    for kind, values in (("current", recording.current), ("speed", recording.omega), ("motor", recording.theta_m)):
+        if values is None or recording.output_unit != "rad" and kind != "current":
+            continue
+        known = np.isfinite(values)
+        if known.mean() < KNOWN or np.ptp(values[known]) == 0:
+            continue
+        if kind == "speed" and not _integrates(recording, values):
+            continue
+        if kind == "motor":
+            both = known & valid
+            slope, zero = np.polyfit(recording.y[both], values[both], 1)
+            values = (values - zero) / slope
+        found.append(
+            Channel(kind, np.ascontiguousarray(values), noise_sigma(values[known], converter_step(values[known])))
+        )
+    return tuple(found)
+
+
+def _integrates(recording: Recording, omega: np.ndarray) -> bool:
+    """Whether a speed is that of the output at the same time: its integral over 0.1 s is the way made, within three
+    times the noise.
+
+    What a drive reports as speed is often an older, filtered difference of the angle, which tells nothing new and that
+    late.
+    """
+    t, n = recording.t, max(1, round(0.1 / recording.sample_time))
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
+    miss = (way[n:] - way[:-n] - recording.y[n:] + recording.y[:-n])[::n]
+    miss, known = miss[np.isfinite(miss)], np.isfinite(omega)
+    noise = math.hypot(
+        noise_sigma(recording.y[recording.valid], recording.quantum) * math.sqrt(2.0),
+        noise_sigma(omega[known], converter_step(omega[known])) * math.sqrt(n) * recording.sample_time,
+    )
+    return bool(miss.size) and float(np.sqrt(np.mean(miss**2))) < 3.0 * noise
+
+
+def make_trace(name, t, u, y, valid, enable, load, sigma, quantum, start: tuple[float, float] | None = None) -> Trace:
+    """A trace with its blocks of BLOCK seconds and its initial state, where that is not known as the samples show
+    it.
+    """
+    block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
+    counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
+    trace = Trace(
+        name, t, u, np.where(valid, y, np.nan), valid, enable, load, sigma, quantum, start or (0.0, 0.0), block, counts
+    )
+    return trace if start else replace(trace, start=_started(trace))
+
+
+def _started(trace: Trace) -> tuple[float, float]:
+    n = start_samples(trace.t)
+    low, high = start_seen(trace.t[:n], trace.y[:n], trace.sigma)
+    y = trace.y[:n][trace.valid[:n]]
+    still = y[: int(np.argmax(np.append(np.abs(y - y[0]) > 3.0 * trace.sigma, True)))] if y.size else np.zeros(1)
+    return float(np.mean(still)) if low == high else float(y[0]), 0.5 * (low + high)
+
+
+def start_samples(t: np.ndarray) -> int:
+    """Number of samples that an initial state is taken from: 50 ms or 10 samples, whichever is longer."""
+    return min(max(START_SAMPLES, int(np.searchsorted(t, t[0] + START))), t.size)
+
+
+def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float]:
+    """The least and the largest speed at the first of the samples (N,) that they allow, without a model: both 0 where
+    rest is allowed.
+
+    Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no
+    more than their noise; the best one where none does. A speed against which the very first samples go, or the whole
+    head without one sample that goes along, is none: it is how a polynomial meets a rudder that is thrown from rest.
+    """
+    known = np.isfinite(y)
+    t, y = t[known] - t[0], y[known]
+    if t.size < FEWEST_SEEN:
+        return 0.0, 0.0
+    found = []
+    for n in {max(t.size // part, FEWEST_SEEN) for part in (1, 2, 4, 8)}:
+        for degree in range(1, min(n - 3, 6)):
+            design = np.vander(t[:n] / t[n - 1], degree + 1, increasing=True)
+            coefficient, *_ = np.linalg.lstsq(design, y[:n], rcond=None)
+            missed = math.sqrt(float(np.sum((y[:n] - design @ coefficient) ** 2)) / (n - degree - 1)) / sigma
+            reach = SURE_SPEED * max(missed, 1.0) * sigma * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+            found.append(
+                (missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1])
+            )
+    enough = max(1.0, min(missed for missed, *_ in found))
+    low, high = (
+        pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:])
+    )
+    along, seen = np.sign(low) * (y - y[0]), SURE_SPEED * math.sqrt(2.0) * sigma
+    thrown = -np.min(along[1 : 1 + FIRST]) > seen or -along[-1] > seen >= np.max(along)
+    return (0.0, 0.0) if low <= 0.0 <= high or thrown else (float(low), float(high))
+
+
+def noise_sigma(y: np.ndarray, quantum: float) -> float:
+    """Noise of a record (N,): third differences over sqrt(20), their median (or trimmed rms on a lattice), at least q /
+    sqrt(12).
+    """
+    d = np.abs(np.diff(y, 3))
+    d = d[np.isfinite(d)]
+    if d.size == 0:
+        return 1e-9 * float(np.nanstd(y)) + 1e-300
+    spread = 1.4826 * float(np.median(d)) / math.sqrt(20.0)
+    if quantum > 0:  # the median of a few counts is itself a count
+        spread = max(spread, math.sqrt(float(np.mean(d[d <= 4 * (spread * math.sqrt(20.0) + quantum)] ** 2)) / 20.0))
+    return max(spread, quantum / math.sqrt(12.0), 1e-9 * float(np.nanstd(y)) + 1e-300)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Block bookkeeping over several traces: index of each sample (N,), which rises, samples in each block (B,)."""
+
+    index: np.ndarray
+    counts: np.ndarray
+
+    @staticmethod
+    def of(traces: Sequence[Trace]) -> Blocks:
+        index, counts, base = [], [], 0
+        for trace in traces:
+            every = [
+                trace.counts,
+                *(np.bincount(trace.block[np.isfinite(c.values)], minlength=trace.counts.size) for c in trace.channels),
+            ]
+            for count in every:
+                index.append(trace.block + base)
+                counts.append(count)
+                base += count.size
+        return Blocks(np.concatenate(index), np.maximum(np.concatenate(counts), 1.0).astype(float))
+
+    def misfit(self, e: np.ndarray) -> np.ndarray:
+        """Mean squared residual (in sigmas) of each block; infinite where a run has all but run away."""
+        begins, empty = self._begins
+        with np.errstate(over="ignore"):
+            sums = np.add.reduceat(e * e, begins)
+        sums[empty] = 0.0
+        return sums / self.counts
+
+    @cached_property
+    def _begins(self) -> tuple[np.ndarray, np.ndarray]:
+        """(B,) the first sample of each block, and whether it has none."""
+        begins = np.searchsorted(self.index, np.arange(self.counts.size + 1))
+        return np.minimum(begins[:-1], self.index.size - 1), begins[:-1] == begins[1:]
+
+
+def smooth_speed(trace: Trace) -> np.ndarray:
+    """Speed (N,) [output unit / s] by differences over about 20 ms."""
+    k = max(1, round(0.01 / trace.sample_time))
+    y = np.interp(trace.t, trace.t[trace.valid], trace.y[trace.valid])
+    padded_y, padded_t = np.pad(y, k, mode="edge"), np.pad(trace.t, k, mode="edge")
+    return (padded_y[2 * k :] - padded_y[: -2 * k]) / np.maximum(padded_t[2 * k :] - padded_t[: -2 * k], 1e-12)

@@ -1,0 +1,470 @@
+"""What a diagnosis tells: diagnosis.json (version 1), the evidence that the report draws, and the improved model."""
+
+from __future__ import annotations
+
+import math
+import platform
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj import __version__
+from ers_mj.data.prepared import Trace
+from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
+from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map, shaded
+from ers_mj.diagnosis.verdict import HALF, TIED, Case
+from ers_mj.effects import BY_NAME, Parameter
+from ers_mj.estimation.fit import score
+from ers_mj.experiment_design.next_recording import next_recording
+from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.selection.confirmation import delta_bic
+from ers_mj.selection.cross_validation import free_run, pooled, recalibrated
+from ers_mj.selection.posterior import isolability
+from ers_mj.servo.datasheet import Datasheet
+from ers_mj.servo.model import BASE, STATES
+from ers_mj.servo.simulation import PER_INERTIA, unit_of
+
+LEAST_FACTOR, LEAST_OFFSET = (
+    0.02,
+    0.01,
+)  # of a gain or friction level, and of half the travel: a smaller drift is not worth a line
+SHEET_UNITS = {
+    "J": "kg m^2",
+    "B": "N m s/rad",
+    "K_t": "N m/A",
+    "K_e": "V s/rad",
+    "k_s": "N m/rad",
+    "T_LH": "N m",
+    "F_c": "N m",
+    "R": "ohm",
+    "L": "H",
+    "n": "-",
+}
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The document (diagnosis.json, version 1), what the report draws, the improved model, and the same in MuJoCo
+    (plant.xml).
+    """
+
+    document: dict
+    evidence: Evidence
+    model: Datasheet
+    plant: MechanicalPlant
+
+
+def told(case: Case, held: list[Trace]) -> Diagnosis:
+    """The document, the evidence and the model."""
+    base, model, traces = case.start.fit.model, case.model, case.start.traces
+    samples = gather(base, model, traces)
+    verdict, missing, record_state = case.verdict, _missing(case), _record_state(case, held)
+    spectrum = over_frequency(samples, traces)
+    found = places(
+        samples,
+        traces,
+        case.selection.rounds,
+        case.start.fit.cost,
+        [m["effect"] for m in missing],
+        case.output_unit,
+        case.input_unit,
+        spectrum,
+    )
+    document = {
+        "version": 1,
+        "verdict": verdict,
+        "sentence": _sentence(case, missing, found),
+        "where": [] if verdict == "consistent" else [_place(p) for p in found],
+        "missing": missing,
+        "remainder": _remainder(case),
+        "record_state": record_state,
+        "fit": case.fits,
+        "parameters": _parameters(case),
+        "next_recording": next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit),
+        "data": _data(case),
+        "seed": case.seed,
+        "versions": _versions(),
+    }
+    if verdict == "unexplained" or case.suspects:
+        document["suspects"] = _suspects(case)
+    views = _views(case, samples)
+    evidence = Evidence(
+        tuple(views),
+        tuple(_ladder(case)),
+        residual_map(samples),
+        case.noise,
+        case.output_unit,
+        case.recordings[0].input_unit,
+        spectrum,
+    )
+    return Diagnosis(document, evidence, _improved(case), case.rig.plant(model if case.told_effects else base))
+
+
+def _missing(case: Case) -> list[dict]:
+    sensors = [_symptom(case, name, values) for name, values in case.sensors.items()]
+    effects = [_effect(case, name) for name in case.told_effects]
+    effects.sort(key=lambda e: -float(np.sum(score(case.confirmed.without[e["effect"]].misfit, 1.0))))
+    return effects + sensors
+
+
+def _suspects(case: Case) -> list[dict]:
+    """The laws without a name that act here, then what else the first round found."""
+    first = case.selection.rounds[0] if case.selection.rounds else ()
+    others = [c for c in first[:3] if c.name in BY_NAME] if case.verdict == "unexplained" else []
+    return [
+        {"effect": c.name, "sentence": f"{BY_NAME[c.name].sentence}: buys {c.gain:.1f} of the misfit"}
+        for c in case.suspects
+    ] + [
+        {"effect": c.name, "sentence": f"buys {c.gain:.1f} of {case.start.fit.cost:.1f} of the misfit"} for c in others
+    ]
+
+
+def _effect(case: Case, name: str) -> dict:
+    effect, c = BY_NAME[name], case.confirmed
+    parameters = {p["name"]: p["entry"] for p in _effect_parameters(case, name)}
+    without = c.without[name]
+    with_and_without = (None, None) if effect.local else (pooled(c.after).rmse, without.rmse)
+    shown = {k: _shown(e["value"], e["unit"]) for k, e in parameters.items()}
+    return {
+        "effect": name,
+        "sentence": effect.describe(shown),
+        "subsystem": effect.subsystem,
+        "parameters": parameters,
+        "evidence": {
+            "heldout_rmse_without_rad": with_and_without[1],
+            "heldout_rmse_with_rad": with_and_without[0],
+            "delta_bic": delta_bic(name, case.model, pooled(c.after), without),
+            "p_value": c.p[name],
+        },
+        "probability": case.found(name)[1].get(name),
+        "alternatives": _alternatives(case, name),
+    }
+
+
+def _effect_parameters(case: Case, name: str):
+    values, errors = dict(case.model.effects_of())[name], case.errors
+    for parameter, value in zip(BY_NAME[name].parameters, values):
+        factor = case.inertia if case.inertia and parameter.kind in PER_INERTIA else 1.0
+        finite = bool(np.isfinite(value))
+        low_high = errors.get((name, parameter.name))
+        yield {
+            "name": parameter.name,
+            "entry": (
+                _per_recording(case, name, parameter, factor)
+                | {
+                    "value": float(value) * factor if finite else None,
+                    "unit": unit_of(parameter.kind, case.output_unit, case.input_unit, bool(case.inertia)),
+                    "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
+                    "meaning": parameter.meaning,
+                }
+            ),
+        }
+
+
+def _per_recording(case: Case, name: str, parameter: Parameter, factor: float) -> dict:
+    """The values in every training recording of a parameter that has one of its own in each; null where the effect is
+    absent.
+    """
+    if not parameter.per_record:
+        return {}
+    columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
+    values = case.model.local[name][:, columns.index(parameter.name)]
+    return {"per_recording": [float(v) * factor if np.isfinite(v) else None for v in values]}
+
+
+def _symptom(case: Case, name: str, values: np.ndarray) -> dict:
+    """A sensor effect that was found in the data itself."""
+    effect = BY_NAME[name]
+    entries = {
+        p.name: {
+            "value": float(v),
+            "unit": unit_of(p.kind, case.output_unit, case.input_unit),
+            "ci95": [None, None],
+            "meaning": p.meaning,
+        }
+        for p, v in zip(effect.parameters, values)
+    }
+    return {
+        "effect": name,
+        "sentence": effect.describe({k: _shown(e["value"], e["unit"]) for k, e in entries.items()}),
+        "subsystem": effect.subsystem,
+        "parameters": entries,
+        "evidence": {
+            "heldout_rmse_without_rad": None,
+            "heldout_rmse_with_rad": None,
+            "delta_bic": None,
+            "p_value": None,
+        },
+        "alternatives": [],
+    }
+
+
+def _alternatives(case: Case, name: str) -> list[dict]:
+    """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer
+    on them.
+    """
+    ranked, weights = case.found(name)
+    others = [c for c in ranked[1:] if weights[c.name] > TIED]
+    apart = isolability(ranked[0].fit, [c.fit for c in others], case.start.traces) if others else []
+    return [
+        {
+            "effect": c.name,
+            "probability": weights[c.name],
+            "why_not_excluded": (
+                f"costs {abs(d.cost):.2f} {'more' if d.cost >= 0 else 'less'} than {name}, which explains"
+                f" {ranked[0].gain:.1f}; the two simulations differ by {d.sigmas:.2g} times the noise on these"
+                " recordings"
+            ),
+            "difference_sigma": d.sigmas,
+            "cost_difference": d.cost,
+        }
+        for c, d in zip(others, apart)
+    ]
+
+
+def _parameters(case: Case) -> dict:
+    known = case.datasheet.to_lumped() if case.datasheet is not None else {}
+    y, u = case.output_unit, case.input_unit
+    units = {
+        "a_1": "1/s^2",
+        "a_2": "1/s",
+        "b": f"{y}/s^2/{u}",
+        "c_1": f"{y}/s^2",
+        "c_2": f"{y}/s^2",
+        "theta_0": y,
+        "tau_e": "s",
+        "emf_share": "-",
+        "ampere": f"{y}/s^2/A",
+    }
+    rows, errors = {}, case.errors
+    for name in BASE:
+        fitted = ("base", name) in errors
+        if not fitted and name in ("tau_e", "emf_share", "ampere"):
+            continue
+        absent = name in ("a_1", "c_1") and case.model.values[name] == 0
+        value = float(case.model.values[name]) if fitted or absent else None
+        rows[name] = {
+            "value": value,
+            "unit": units[name],
+            "ci95": list(errors[("base", name)]) if fitted else [None, None],
+            "datasheet": known.get(name),
+            "identifiable": fitted or absent,
+        }
+    for name, value in (case.datasheet.parameters if case.datasheet is not None else {}).items():
+        if name != "theta_0":
+            rows[name] = {
+                "value": None,
+                "unit": SHEET_UNITS[name],
+                "ci95": [None, None],
+                "datasheet": value,
+                "identifiable": False,
+            }
+    rows |= _combinations(case, rows)
+    return rows
+
+
+def _combinations(case: Case, rows: dict) -> dict:
+    """The combinations of Table 1's letters that position and voltage can tell (notes in the README)."""
+    if case.datasheet is None or not case.datasheet.parameters:
+        return {}
+    named = {"k_s/J": "a_1", "n K_t/(J R)": "b", "T_LH/J": "c_1", "F_c/J": "c_2", "L/R": "tau_e", "n K_t/J": "ampere"}
+    return {combination: rows[name] for combination, name in named.items() if name in rows}
+
+
+def _record_state(case: Case, held: list[Trace]) -> list[dict]:
+    """What differs between recordings beyond chance: training ones as fitted, held-out ones as recalibrated."""
+    out, unknown = [], (None, None)
+    states, errors = dict(case.model.states or {}), case.state_errors()
+    later = [recalibrated(model, h)[1] for model, h in zip(case.confirmed.models, held)]
+    count = len(case.start.traces)
+    for name in STATES:
+        rest = 0.0 if name == "offset" else 1.0
+        values = [*(states[name] if name in states else [rest] * count), *(s.get(name, (rest,))[0] for s in later)]
+        ci95 = [
+            *(errors.get((name, k), unknown) for k in range(count)),
+            *(s[name][1:] if name in s else unknown for s in later),
+        ]
+        least = LEAST_OFFSET * case.start.fit.model.scales.position if name == "offset" else LEAST_FACTOR
+        if any(
+            abs(v - rest) > least and not low <= rest <= high for v, (low, high) in zip(values, ci95) if low is not None
+        ):
+            unit = case.output_unit if name == "offset" else "-"
+            spread = _shown(max(values), unit), _shown(min(values), unit)
+            out.append(
+                {
+                    "name": name,
+                    "unit": unit,
+                    "values": [float(v) for v in values],
+                    "ci95": [list(ends) for ends in ci95],
+                    "sentence": (
+                        f"{name.replace('_', ' ')} differs between the recordings: from {spread[1]} to {spread[0]}"
+                    ),
+                }
+            )
+    return out
+
+
+def _sentence(case: Case, missing: list, found: list[Place]) -> str:
+    fits, verdict = case.fits, case.verdict
+    before, after = (_shown(fits[f"heldout_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
+    if verdict == "consistent":
+        return "The datasheet's model explains these recordings within their noise: nothing is missing."
+    if verdict == "parameters_only":
+        return (
+            "Only the numbers were off: with refitted parameters the model explains these recordings within their"
+            " noise."
+        )
+    if verdict == "missing_physics":
+        names = "; ".join(m["sentence"] for m in missing)
+        if not case.told_effects:
+            return (
+                f"The sensor shows: {names}. Beside it a mismatch is left that no effect of the library accounts for."
+                if case.more_is_left
+                else f"Only the sensor shows: {names}."
+            )
+        told = "held-out error"
+        if fits["heldout_rmse_after_rad"] > math.sqrt(HALF) * fits["heldout_rmse_before_rad"] and case.holdout:
+            told = "held-out error, once gain, offset and friction level of that day are known,"
+            before, after = (_shown(fits[f"recalibrated_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
+        return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
+    place = next((p.sentence for p in found if p.axis != "subsystem"), "")
+    much = (
+        f"; it acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}"
+        if case.suspects
+        else f" (the best explains {case.explained:.0%} of the held-out error)"
+    )
+    return (
+        f"Something acts here that no effect of the library accounts for{much};"
+        f" {place or 'it is spread over the whole record'}."
+    )
+
+
+def _remainder(case: Case) -> dict:
+    words = (
+        "a mismatch is left that nothing named accounts for"
+        if case.more_is_left
+        else "nothing beyond the noise is left"
+    )
+    left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
+    return {
+        "explained_share": case.explained,
+        "significant": case.more_is_left,
+        "left_sigma": left_sigma,
+        "sentence": f"{case.explained:.0%} of the squared held-out error above the noise is explained; {words}.",
+    }
+
+
+def _place(p: Place) -> dict:
+    return {
+        "axis": p.axis,
+        "region": list(p.region) if p.region else None,
+        "unit": p.unit,
+        "label": p.label,
+        "share_of_error": p.share_of_error,
+        "share_of_time": p.share_of_time,
+        "sentence": p.sentence,
+    }
+
+
+def _data(case: Case) -> dict:
+    every = [*case.recordings, *case.holdout]
+    problems = [f"{r.name}: {p}" for r in every for p in r.problems] + _degrees(case)
+    return {
+        "files": [r.name for r in every],
+        "sha256": [r.sha256 for r in every],
+        "output_unit": case.output_unit,
+        "input_unit": case.input_unit,
+        "problems": problems,
+    }
+
+
+def _degrees(case: Case) -> list[str]:
+    """A travel far beyond the datasheet's rest angle looks like degrees that are named radians."""
+    y = np.concatenate([t.y[t.valid] for t in case.start.traces])
+    if case.output_unit == "rad" and case.datasheet is not None and float(np.max(np.abs(y))) > 2 * math.pi:
+        return [f"the output reaches {np.max(np.abs(y)):.3g} rad, more than a turn of a rudder: are these degrees?"]
+    return []
+
+
+def _views(case: Case, samples) -> list[RecordView]:
+    out = []
+    for model, base, fold in zip(case.confirmed.models, case.confirmed.base_models, case.confirmed.parts):
+        t = fold.held_out
+        out.append(RecordView(t.name, True, t.t, t.u, t.y, free_run(base, t), free_run(model, t), ()))
+    held_names = {v.name for v in out}
+    for k, t in enumerate(case.start.traces):
+        spans = shaded(t, k, samples) if case.verdict in ("missing_physics", "unexplained") else ()
+        if t.name in held_names and case.confirmed.parts[0].training is not None and len(case.start.traces) > 1:
+            i = [v.name for v in out].index(t.name)
+            out[i] = replace(out[i], shaded=spans)
+        else:
+            out.append(
+                RecordView(
+                    t.name,
+                    False,
+                    t.t,
+                    t.u,
+                    t.y,
+                    free_run(case.start.fit.model, t, k),
+                    free_run(case.model, t, k),
+                    spans,
+                )
+            )
+    return out
+
+
+def _ladder(case: Case):
+    c = case.confirmed
+    yield Rung((), 0.0, 0.0, pooled(c.before).rmse, not case.model.names, "refitted baseline", case.start.fit.size)
+    for ranked in case.selection.rounds:
+        for candidate in ranked:
+            names = candidate.fit.model.names
+            chosen = names == case.model.names
+            yield Rung(
+                names or (candidate.name,),
+                candidate.gain,
+                candidate.z,
+                pooled(c.after).rmse if chosen else None,
+                chosen,
+                "" if candidate.name in BY_NAME else "differs between recordings",
+                candidate.fit.size,
+            )
+
+
+def _improved(case: Case) -> Datasheet:
+    """The improved model: refitted lumped values in [lumped], effects in a reader's units."""
+    model = case.model if case.told_effects or not case.model.names else case.start.fit.model
+    lumped = {k: float(model.values[k]) for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")}
+    extra = {k: float(model.values[k]) for k in ("tau_e", "emf_share")}
+    effects = []
+    for name in case.told_effects:
+        entries = {p["name"]: p["entry"]["value"] for p in _effect_parameters(case, name)}
+        effects.append((name, {k: v for k, v in entries.items() if v is not None}))
+    effects += [
+        (name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)})
+        for name, values in case.sensors.items()
+    ]
+    parameters = dict(case.datasheet.parameters) if case.datasheet is not None else {}
+    return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
+
+
+def _shown(value: float | None, unit: str) -> str:
+    """A number for a sentence: radians as degrees."""
+    if value is None:
+        return "none"
+    if unit.startswith("rad") and not unit.startswith("rad/s^2"):
+        return f"{math.degrees(value):.3g} deg{unit[3:]}"
+    return f"{value:.3g}" if unit == "-" else f"{value:.3g} {unit}"
+
+
+def _versions() -> dict:
+    import numba
+    import scipy
+
+    return {
+        "ers-mj": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+    }

@@ -1,0 +1,66 @@
+"""What a diagnosis hands to its report beside the document: curves, candidates and the map of residuals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ers_mj.diagnosis.mismatch_spectrum import Mismatch
+
+
+@dataclass(frozen=True, eq=False)
+class RecordView:
+    """One recording beside its free runs, each (N,): t [s], u, and outputs in output units, NaN where missing.
+
+    ``shaded`` are the spans of time [s] in which the located mismatch lives.
+    """
+
+    name: str
+    held_out: bool
+    t: np.ndarray
+    u: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    shaded: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One candidate: what it gains in block cost over the baseline, how surely, and what it scores on held-out data."""
+
+    effects: tuple[str, ...]
+    gain: float
+    z: float
+    heldout_rmse: float | None
+    chosen: bool
+    note: str
+    parameters: int
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualMap:
+    """Rms residual (A, S) over angle and speed bins of edges (A+1,) and (S+1,), in output units; NaN where no data
+    is.
+    """
+
+    angle_edges: np.ndarray
+    speed_edges: np.ndarray
+    rms_before: np.ndarray
+    rms_after: np.ndarray
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Everything a report draws. ``noise`` is the noise floor in output units, ``spectrum`` what the model before
+    leaves over frequency.
+    """
+
+    records: tuple[RecordView, ...]
+    ladder: tuple[Rung, ...]
+    residual_map: ResidualMap | None
+    noise: float
+    output_unit: str
+    input_unit: str
+    spectrum: Mismatch | None = None

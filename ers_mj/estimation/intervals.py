@@ -1,0 +1,98 @@
+"""Intervals that survive model error: a jackknife over recordings and a sandwich over blocks.
+ What is too small to be found moves the parameters as well, further than the noise does: ``unseen_widths`` tells how
+far.
+ (J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what
+differs between recordings, but a refit may rest in the dent of the cost where it begins, and then says nothing; the
+sandwich only sees the scatter within them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import stdtrit
+
+from ers_mj.data.prepared import Blocks, Trace
+from ers_mj.effects import BY_NAME
+from ers_mj.estimation.fit import central_jacobian, residuals
+from ers_mj.servo.model import OBSERVER_RATE, Model
+
+UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (race.LEAST_GAIN is what it must)
+UNSEEN = 1.0  # effects of that size that act, on average
+FEWEST_RECORDS = 3
+LOST = 1e6  # sigmas that a run leaves where it ran away
+RUN = 4  # neighbouring blocks that are resampled together
+
+
+def slopes_of(model: Model, traces: Sequence[Trace]) -> np.ndarray:
+    """The Jacobian (N, k) from which intervals follow."""
+    layout = model.layout()
+    return central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
+
+
+def half_widths(
+    model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float, jacobian: np.ndarray | None = None
+) -> np.ndarray:
+    """95 % half-widths (k,) of the model's transformed numbers: those of jackknife and sandwich, squared and added.
+
+    ``left_out`` holds the model refitted without each recording in turn; with fewer than three, or where some numbers
+    belong to one recording only, the sandwich serves alone. The ``jacobian`` is ``slopes_of`` the model, where it is
+    known.
+    """
+    layout = model.layout()
+    widths = _sandwich(model, traces, tau, slopes_of(model, traces) if jacobian is None else jacobian)
+    if len(left_out) >= FEWEST_RECORDS and not any(f.local for f in layout):
+        z = np.array([m.vector(layout) for m in left_out])
+        n = len(left_out)
+        widths = np.hypot(
+            widths, stdtrit(n - 1, 0.975) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0))
+        )
+    return widths
+
+
+def _sandwich(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray) -> np.ndarray:
+    """95 % half-widths (k,) by H^-1 (sum of outer products of the slopes of runs of blocks) H^-1."""
+    layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
+    weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
+    weighted = jacobian * weight[:, None]
+    hessian = weighted.T @ jacobian
+    run = blocks.index // RUN
+    slopes = np.array([np.bincount(run, weighted[:, k] * e, run.max() + 1) for k in range(len(layout))]).T
+    inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
+    n = slopes.shape[0]
+    covariance = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
+    return stdtrit(max(n - len(layout), 1), 0.975) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def _left(model: Model, traces: Sequence[Trace]) -> np.ndarray:
+    """What the run leaves (N,); where it ran away so much that the blocks weigh nothing."""
+    return np.nan_to_num(residuals(model, traces, OBSERVER_RATE), nan=LOST)
+
+
+def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
+    """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move
+    to make up for them.
+
+    Each effect's secant, at a size that would gain UNSEEN_GAIN beside the model and never larger than its start, shifts
+    the numbers by what a fit makes of it; any effect is as likely as the next, UNSEEN of them act. The ``jacobian`` is
+    as in ``half_widths``.
+    """
+    layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
+    jacobian = slopes_of(model, traces) if jacobian is None else jacobian
+    weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
+    hessian = jacobian.T @ (weight[:, None] * jacobian)
+    inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
+    known = (*model.names, *(("inductance",) if model.values["tau_e"] > 0 else ()))
+    shifts = []
+    for effect in (effect for name, effect in BY_NAME.items() if name not in known and not effect.once):
+        found = []
+        for start in (starts := effect.starts(model.scales))[:1] + starts[1:][-1:]:
+            secant = residuals(model.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
+            if np.all(np.isfinite(secant)):
+                pull = jacobian.T @ (weight * secant)
+                apart = float(secant @ (weight * secant) - pull @ inverse @ pull)
+                found.append(inverse @ pull * min(1.0, np.sqrt(2.0 * UNSEEN_GAIN / max(apart, 1e-12))))
+        if found:
+            shifts.append(np.mean(np.square(found), axis=0))
+    return 1.96 * np.sqrt(UNSEEN * np.mean(shifts, axis=0)) if shifts else np.zeros(len(layout))

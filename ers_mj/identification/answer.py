@@ -1,0 +1,376 @@
+"""The answer: every letter with its interval or why it cannot be told, the combinations that can, the model, and a
+sentence.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.data.prepared import Blocks, Trace
+from ers_mj.data.recording import Recording
+from ers_mj.identification.finding import FOLLOWED, Settings
+from ers_mj.identification.minimisers import Minimum
+from ers_mj.identification.misfit import IN_PROPORTION, STEP, Misfit, Search, Simulator, central
+from ers_mj.identification.precision import WEAK, Precision, Profile, precision_of, profile
+from ers_mj.identification.structure import Structure
+from ers_mj.identification.unknowns import LETTERS, Unknowns, unit_of_letter
+from ers_mj.servo.datasheet import LUMPED, Datasheet
+
+WIDEST = 3.0  # relative half-width beyond which a profile says no more
+TELLING = 1.0  # relative 95 % half-width from which a number is not told
+WRONG = 1.5  # mean squared residual in sigmas from which the model is said to be wrong
+NEAR_BOUND = 1e-3  # of a coordinate's range
+PRINTED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the answer: a letter, a combination, or a letter of Eq. (6); None for what is not told."""
+
+    name: str
+    value: float | None
+    unit: str
+    ci95: tuple[float | None, float | None]
+    datasheet: float | None
+    identifiable: bool
+    fixed: bool = False
+    why: str = ""
+
+    def as_document(self) -> dict:
+        """As diagnosis.json has it, with what was fixed and why a number is not told."""
+        return {
+            "value": self.value,
+            "unit": self.unit,
+            "ci95": list(self.ci95),
+            "datasheet": self.datasheet,
+            "identifiable": self.identifiable,
+            "fixed": self.fixed,
+        } | ({"why": self.why} if self.why else {})
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What an identification found.
+
+    Attributes:
+        settings: how it was asked.
+        rows: the answer.
+        fitness: Eq. (13) [output unit^2 s].
+        misfit: mean squared residual in sigmas; in MuJoCo the median block's, as an observer (see FOLLOWED): its step
+            decides when a lever is met, and a free run carries each such chance on.
+        minimum: what the minimiser found, with its trace; ``evaluations`` counts the polish too.
+        structure: what the data can tell.
+        profiles: of the weak combinations.
+        traces, predicted: recordings with their fitted starts, and the model's free runs (N,) beside them.
+        model: the identified model.
+        sentence: what came out.
+        warnings: what to be careful about.
+        wall_s: time it took.
+    """
+
+    settings: Settings
+    rows: tuple[Row, ...]
+    fitness: float
+    misfit: float
+    minimum: Minimum
+    evaluations: int
+    structure: Structure
+    profiles: tuple[Profile, ...]
+    traces: tuple[Trace, ...]
+    predicted: tuple[np.ndarray, ...]
+    model: Datasheet
+    sentence: str
+    warnings: tuple[str, ...]
+    wall_s: float
+
+    @property
+    def explains(self) -> bool:
+        """Whether the model explains the recordings within their noise."""
+        return self.misfit <= WRONG
+
+
+def answer(
+    recordings: Sequence[Recording],
+    datasheet: Datasheet | None,
+    settings: Settings,
+    search: Search,
+    x: np.ndarray,
+    simulate: Simulator | None,
+    minimum: Minimum,
+    used: int,
+) -> Identified:
+    """What was found at the coordinates x (r,) of a search after ``used`` evaluations, judged by what is simulated;
+    ``wall_s`` is left at 0.
+    """
+    unknowns, letters = search.unknowns, search.letters(x)
+    open_ended = replace(search, with_starts=True)
+    x = np.concatenate([x, np.zeros(open_ended.bounds[0].size - x.size)])
+    reduced = Misfit(open_ended, FOLLOWED[-1] if simulate else 0.0)
+    e, weight = replace(reduced, simulate=simulate).residuals(x), reduced.weight
+    free = replace(reduced, simulate=simulate, rate=0.0).residuals(x) if simulate else e
+    slopes = np.nan_to_num(central(reduced.residuals, x, STEP) / weight[:, None])
+    precision = precision_of(slopes, e / weight, search.traces, settings.seed)
+    seen = np.concatenate([t.seen for t in search.traces])
+    misfit = (
+        float(np.median(Blocks.of(search.traces).misfit(e / weight)))
+        if simulate
+        else float(np.sum((e / weight) ** 2)) / int(seen.sum())
+    )
+    profiles = () if simulate or misfit > WRONG else _profiles(reduced, open_ended, slopes, x, precision)
+    y, u = recordings[0].output_unit, {"pct": "%"}.get(recordings[0].input_unit, recordings[0].input_unit)
+    rows = _rows(search, letters, precision, profiles, datasheet, y, u)
+    predicted = _predicted(search, letters, free / weight)
+    return Identified(
+        settings,
+        tuple(rows),
+        float(free @ free),
+        misfit,
+        minimum,
+        used,
+        search.structure,
+        profiles,
+        search.traces,
+        predicted,
+        _model(unknowns, letters),
+        _sentence(search, misfit, settings),
+        tuple(_warnings(search, x, misfit)),
+        0.0,
+    )
+
+
+def _profiles(
+    objective: Misfit, search: Search, slopes: np.ndarray, x: np.ndarray, precision: Precision
+) -> tuple[Profile, ...]:
+    """Of those coordinates whose interval is wide enough to be bent; in sigmas, so that a rise of one is one of
+    chi^2.
+    """
+    out = []
+    for k, name in enumerate(search.names):
+        half = 1.96 * math.sqrt(precision.fisher[k, k])
+        if name != "theta_0" and WEAK < half < WIDEST:
+            unit = np.eye(x.size)[k]
+            out.append(
+                profile(InSigmas(objective), slopes, x, k, name, half, precision.half_width(unit) / half, search.bounds)
+            )
+    return tuple(out)
+
+
+class InSigmas:
+    """A misfit whose squares sum to chi^2."""
+
+    def __init__(self, misfit: Misfit):
+        self._misfit, self._weight = misfit, misfit.weight
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        """Residuals (N,) in sigmas."""
+        return self._misfit.residuals(x) / self._weight
+
+
+def _rows(
+    search: Search,
+    letters: np.ndarray,
+    precision: Precision,
+    profiles: Sequence[Profile],
+    datasheet: Datasheet | None,
+    y: str,
+    u: str,
+) -> list[Row]:
+    """Eq. (6)'s letters, then Eq. (1)'s, then the combinations that stand for those which cannot be told."""
+    unknowns, structure = search.unknowns, search.structure
+    sheet = {**datasheet.to_lumped(), **datasheet.parameters} if datasheet is not None else {}
+    ends = {
+        p.name: tuple(None if end is None else _from_coordinate(search, p.name, end) for end in p.ends)
+        for p in profiles
+    }
+
+    def row(name, function, unit, known, own=None):
+        return _row(name, function, unit, known, search, letters, precision, ends.get(own))
+
+    rows = [
+        row(name, lambda v, name=name: unknowns.values(v)[name], unit_of_letter(name, y, u), sheet.get(name))
+        for name in PRINTED
+    ]
+    rows += [
+        row(name, lambda v, name=name: unknowns.values(v)[name], unit_of_letter(name, y, u), sheet.get(name))
+        for name in ("tau_e", "emf_share", "ampere")
+        if unknowns.is_lumped and name in unknowns.names
+    ]
+    if unknowns.is_lumped:
+        return rows
+    for name in (n for n in LETTERS if n != "theta_0" and n in (*unknowns.names, *unknowns.known)):
+        unit = unit_of_letter(name, y, u)
+        if name in unknowns.names:
+            k = unknowns.names.index(name)
+            own = name if structure.told(np.eye(len(letters))[k]) else None
+            rows.append(row(name, lambda v, k=k: v[k], unit, sheet.get(name), own))
+        else:
+            value = unknowns.known[name]
+            rows.append(
+                Row(
+                    name,
+                    value,
+                    unit,
+                    (value, value) if name in unknowns.fixed else (None, None),
+                    sheet.get(name),
+                    True,
+                    True,
+                    "held",
+                )
+            )
+    for k in structure.kept:
+        powers, label = structure.exponents(k), structure.combination(k)
+        if powers is not None and np.count_nonzero(powers) > 1:
+            known = [sheet.get(name) for name in unknowns.names]
+            told = (
+                float(np.prod([p**q for p, q in zip(known, powers) if q]))
+                if all(p for p, q in zip(known, powers) if q)
+                else None
+            )
+            product = lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0]))  # noqa: E731
+            rows.append(row(label, product, _unit(unknowns.names, powers, y, u), told, unknowns.names[k]))
+    return rows
+
+
+def _from_coordinate(search: Search, name: str, z: float) -> float:
+    """The factor to the reference that a coordinate means."""
+    return z if name in IN_PROPORTION else math.exp(z)
+
+
+def _row(name, function, unit, known, search, letters, precision, profiled) -> Row:
+    """One line: the value of a function of the letters (k,), its interval, or null where the null space or the noise
+    moves it.
+    """
+    value, by_letter, by_coordinate = float(function(letters)), _gradient(search, letters, function), None
+    if value == 0.0 and not np.any(by_letter):
+        return Row(name, 0.0, unit, (None, None), known, True, True, "absent")
+    if not search.structure.told(by_letter / (abs(value) or 1.0)):
+        return Row(
+            name, None, unit, (None, None), known, False, why="these recordings tell it in combination with others only"
+        )
+    by_coordinate = _by_coordinate(search, letters, by_letter)
+    half = precision.half_width(
+        np.concatenate([by_coordinate, np.zeros(precision.fisher.shape[0] - by_coordinate.size)])
+    )
+    relative = half / abs(value) if name != "theta_0" else half / search.scale
+    if not relative < TELLING:
+        return Row(
+            name,
+            None,
+            unit,
+            (None, None),
+            known,
+            False,
+            why=f"too weak in these recordings: its 95 % half-width would be {relative:.0%} of it",
+        )
+    low, high = value - half, value + half
+    if profiled is not None:
+        k = search.names.index(name.partition("/")[0]) if name.partition("/")[0] in search.names else None
+        here = search.coordinates(letters)[k] if k is not None else None
+        if here is not None:
+            scale = value / _from_coordinate(search, search.names[k], here)
+            low, high = (x * scale if x is not None else other for x, other in zip(profiled, (low, high)))
+    return Row(name, value, unit, (low, high), known, True)
+
+
+def _gradient(search: Search, letters: np.ndarray, function: Callable[[np.ndarray], float]) -> np.ndarray:
+    """Slopes (k,) of a function of the letters by their logarithms (theta_0: by half travels)."""
+    angle = np.array([name == "theta_0" for name in search.unknowns.names])
+    return central(
+        lambda z: np.array([function(np.where(angle, letters + search.scale * z, letters * np.exp(z)))]),
+        np.zeros(letters.size),
+        STEP,
+    )[0]
+
+
+def _by_coordinate(search: Search, letters: np.ndarray, by_letter: np.ndarray) -> np.ndarray:
+    """The same by the search's coordinates (r,)."""
+    here = search.coordinates(letters)
+    return np.array(
+        [
+            by_letter[k] / here[i] if name in IN_PROPORTION else by_letter[k]
+            for i, (k, name) in enumerate(zip(search.structure.kept, search.names))
+        ]
+    )
+
+
+def _unit(names: Sequence[str], powers: np.ndarray, y: str, u: str) -> str:
+    """The unit of a product of powers, as the letters' units stand."""
+    above = [unit_of_letter(n, y, u) for n, q in zip(names, powers) if q > 0]
+    below = [unit_of_letter(n, y, u) for n, q in zip(names, powers) if q < 0 for _ in range(round(-q))]
+    return "/".join([" ".join(above), *(f"({unit})" if " " in unit else unit for unit in below)])
+
+
+def _predicted(search: Search, letters: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, ...]:
+    """What the plant shows (N,) in each recording: the measured output less its residual, by the reduced model where
+    none was measured.
+    """
+    out, at = [], 0
+    for k, trace in enumerate(search.traces):
+        own = search.unknowns.model(letters).predict(trace, k)
+        out.append(np.where(trace.valid, trace.y - trace.sigma * e[at : at + trace.t.size], own))
+        at += trace.rows
+    return tuple(out)
+
+
+def _model(unknowns: Unknowns, letters: np.ndarray) -> Datasheet:
+    """The identified model: what cannot be told stands as it was known, the rest beside it as the recordings have
+    it.
+    """
+    values = unknowns.values(letters)
+    lumped = {name: float(values[name]) for name in LUMPED}
+    parameters = {} if unknowns.is_lumped else unknowns.everything(letters)
+    return Datasheet(
+        parameters=parameters,
+        lumped=lumped,
+        baseline={name: float(values[name]) for name in ("tau_e", "emf_share")},
+        name="model.toml",
+    )
+
+
+def _sentence(search: Search, misfit: float, settings: Settings) -> str:
+    structure, count = search.structure, len(search.traces)
+    what = (
+        f"{structure.rank} of {len(structure.names)} parameters can be told"
+        if structure.pivots
+        else f"all {structure.rank} parameters can be told"
+    )
+    said = (
+        f"From {'this recording' if count == 1 else f'these {count} recordings'}"
+        f" {what}{' as combinations' if structure.pivots else ''}"
+    )
+    if misfit > WRONG and settings.method != "ls" and not settings.polish:
+        return (
+            f"{said}, but {settings.method} left {math.sqrt(misfit):.2g} times the noise: it stopped short of the best"
+            " fit, or the model is wrong (--polish tells)."
+        )
+    if misfit > WRONG:
+        return (
+            f"{said}, but the model is wrong: what it leaves is {math.sqrt(misfit):.2g} times the noise. `ers diagnose`"
+            " looks for what is missing."
+        )
+    return f"{said}; the model explains what was recorded within its noise."
+
+
+def _warnings(search: Search, x: np.ndarray, misfit: float) -> list[str]:
+    lower, upper = search.bounds
+    out = [
+        f"{name} was left out: these recordings ask for less of it than its bounds allow (--bounds {name}=LOW:HIGH"
+        " forces it in)"
+        for name in search.unknowns.absent
+    ]
+    for name, z, low, high in zip(search.names, x, lower, upper):
+        if min(z - low, high - z) < NEAR_BOUND * (high - low):
+            end, wanted = ("lower", "less") if z - low < high - z else ("upper", "more")
+            out.append(
+                f"{name} rests at the {end} end of its bounds: these recordings ask for {wanted} of it; widen them"
+                " (--bounds) or doubt the model"
+            )
+    return (
+        out
+        + (["the intervals hold for a model that is right, which this one is not"] if misfit > WRONG else [])
+        + search.structure.trades()
+    )

@@ -1,0 +1,237 @@
+"""What an identification searches: Eq. (1)'s letters where a datasheet gives them all, else Eq. (6)'s, each within
+bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.data.prepared import Trace
+from ers_mj.errors import InputError
+from ers_mj.estimation.baseline import opening
+from ers_mj.servo.datasheet import LUMPED, Datasheet, refuse_impossible
+from ers_mj.servo.model import BASE, Model
+
+LETTERS = ("L", "R", "k_s", "T_LH", "F_c", "J", "B", "K_t", "K_e", "theta_0")  # Eq. (1), in the paper's order
+NEEDED = ("J", "B", "K_t", "K_e", "R")  # without them Eq. (1) cannot run
+FACTORS = (0.2, 3.0)  # of what is known beforehand, between which a positive one is searched
+# of the sample time: a winding that is quicker moves no sample, and takes a simulation that many times as long
+QUICKEST = 0.03
+REST = {"a_1": 0.0, "a_2": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0}
+UNITS = {
+    "J": "kg m^2",
+    "B": "N m s/rad",
+    "K_t": "N m/A",
+    "K_e": "V s/rad",
+    "k_s": "N m/rad",
+    "T_LH": "N m",
+    "F_c": "N m",
+    "R": "ohm",
+    "L": "H",
+    "n": "-",
+}
+
+
+def unit_of_letter(name: str, y: str, u: str) -> str:
+    """The unit of a letter of Eq. (1) or (6) for outputs in y and inputs in u."""
+    lumped = {
+        "a_1": "1/s^2",
+        "a_2": "1/s",
+        "b": f"{y}/s^2/{u}",
+        "c_1": f"{y}/s^2",
+        "c_2": f"{y}/s^2",
+        "theta_0": y,
+        "tau_e": "s",
+        "emf_share": "-",
+        "ampere": f"{y}/s^2/A",
+    }
+    return UNITS.get(name) or lumped[name]
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """The letters that are searched.
+
+    Attributes:
+        names: (k,) letters, of Eq. (1) or, where ``is_lumped``, of Eq. (6).
+        reference: (k,) what is known beforehand, where a search begins.
+        lower, upper: (k,) bounds.
+        known: the letters that are held, n among them.
+        fixed: which of these the user fixed.
+        is_lumped: whose letters they are.
+        guessed: which letters nothing but the recordings told beforehand, so that no bounds of theirs are known.
+        factors: those of the bounds that were made of the reference.
+        absent: letters that were left out since the recordings ask for none of them.
+    """
+
+    names: tuple[str, ...]
+    reference: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    known: Mapping[str, float]
+    fixed: tuple[str, ...]
+    is_lumped: bool
+    guessed: tuple[str, ...] = ()
+    factors: tuple[float, float] = FACTORS
+    absent: tuple[str, ...] = ()
+
+    @property
+    def winding(self) -> str:
+        """The letter that makes the current lag."""
+        return "tau_e" if self.is_lumped else "L"
+
+    def without(self, name: str, letters: np.ndarray) -> Unknowns:
+        """The same without a letter, the reference at the others of these letters (k,)."""
+        kept = np.array([other != name for other in self.names])
+        return replace(
+            self,
+            names=tuple(other for other in self.names if other != name),
+            reference=letters[kept],
+            lower=self.lower[kept],
+            upper=self.upper[kept],
+            absent=(*self.absent, name),
+        )
+
+    def around(self, letters: np.ndarray) -> Unknowns:
+        """The same with the bounds of guessed letters moved as far as these letters (k,) allow."""
+        guessed = np.array([name in self.guessed for name in self.names])
+        ends = np.sort(np.outer(self.factors, letters), axis=0)
+        return replace(
+            self,
+            lower=np.where(guessed, np.minimum(self.lower, ends[0]), self.lower),
+            upper=np.where(guessed, np.maximum(self.upper, ends[1]), self.upper),
+        )
+
+    def drawn(self, random: np.random.Generator) -> np.ndarray:
+        """Letters (k,) drawn from the bounds, evenly by their logarithm where they are positive."""
+        positive = self.lower > 0
+        low, high = (np.log(np.where(positive, x, 1.0)) for x in (self.lower, self.upper))
+        share = random.random(self.lower.size)
+        return np.where(positive, np.exp(low + share * (high - low)), self.lower + share * (self.upper - self.lower))
+
+    def everything(self, letters: np.ndarray) -> dict[str, float]:
+        """All letters by name, of the searched ones (k,) and those held."""
+        return {**self.known, **dict(zip(self.names, letters.tolist()))}
+
+    def values(self, letters: np.ndarray) -> dict[str, float]:
+        """Eq. (6)'s letters as Model takes them."""
+        every = self.everything(letters)
+        lumped = every if self.is_lumped else Datasheet(parameters=every).to_lumped()
+        return {**REST, "ampere": lumped["b"], **{name: x for name, x in lumped.items() if name in BASE}}
+
+    def model(self, letters: np.ndarray) -> Model:
+        """The model that the searched letters (k,) make."""
+        return Model(self.values(letters), ())
+
+
+def unknowns_of(
+    traces: Sequence[Trace],
+    datasheet: Datasheet | None,
+    fixed: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    factors: tuple[float, float] = FACTORS,
+    is_angle: bool = True,
+) -> Unknowns:
+    """What to search in these recordings.
+
+    Args:
+        traces: the recordings.
+        datasheet: what is known, or None: Eq. (6) is then first fitted from scratch.
+        fixed: letters to hold, by name.
+        bounds: (lower, upper) by name; a letter that no datasheet gives begins in their middle.
+        factors: bounds of the others, as factors to what is known.
+
+    Raises:
+        InputError: a name that cannot be searched here, or bounds without what is fixed or known.
+    """
+    _refuse_unknown({**fixed, **bounds})
+    for name, x in fixed.items():
+        refuse_impossible(name, x, "--fix")
+    both = fixed.keys() & bounds.keys()
+    if both:
+        raise InputError(f"{sorted(both)[0]} is fixed and has bounds, one of both was expected")
+    sheet = dict(datasheet.parameters) if datasheet is not None else {}
+    middle = {name: _middle(name, ends) for name, ends in bounds.items()}
+    known = {"n": 1.0, **middle, **sheet, **fixed}
+    if all(name in known for name in NEEDED) and not (datasheet is not None and datasheet.lumped and not sheet):
+        is_lumped, known = False, {name: x for name, x in known.items() if name in (*LETTERS, "n")}
+    else:
+        is_lumped, known = True, {**_lumped(traces, datasheet, is_angle), **fixed}
+    allowed = LUMPED if is_lumped else LETTERS
+    for name in (*fixed, *bounds):
+        if name not in allowed:
+            why = (
+                f"without {', '.join(x for x in NEEDED if x not in sheet)} of a datasheet"
+                if is_lumped
+                else "where a datasheet gives those of Eq. (1)"
+            )
+            raise InputError(f"{name} cannot be fixed or bounded {why}: these are identified, {', '.join(allowed)}")
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    names, ends, guessed = [], [], []
+    order = [name for name in (BASE if is_lumped else LETTERS) if name in known and name not in fixed]
+    springs = known.get("a_1" if is_lumped else "k_s", 0.0) or known.get("c_1" if is_lumped else "T_LH", 0.0)
+    for name in order:
+        if name in bounds:
+            names.append(name)
+            least = (
+                QUICKEST * min(t.sample_time for t in traces) * (known["R"] if name == "L" else 1.0)
+                if name in ("L", "tau_e")
+                else -math.inf
+            )
+            ends.append((max(bounds[name][0], least), max(bounds[name][1], 2.0 * least)))
+        elif name == "theta_0":
+            if springs:
+                names.append(name)
+                known[name] = min(max(known[name], float(y.min())), float(y.max()))
+                ends.append((float(y.min()), float(y.max())))
+        elif known[name] != 0.0 and _matters(name, traces, known, is_lumped):
+            names.append(name)
+            ends.append(tuple(sorted((factors[0] * known[name], factors[1] * known[name]))))
+            if datasheet is None:
+                guessed.append(name)
+    lower, upper = np.array(ends, float).reshape(-1, 2).T.copy()
+    reference = np.clip([known[name] for name in names], lower, upper)
+    if not names:
+        raise InputError("every letter is fixed, there is nothing to identify")
+    held = {name: x for name, x in known.items() if name not in names}
+    return Unknowns(
+        tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped, tuple(guessed), tuple(factors)
+    )
+
+
+def _matters(name: str, traces: Sequence[Trace], known: Mapping[str, float], is_lumped: bool) -> bool:
+    """Whether a letter of Eq. (6) can show at all: share and ampere only where a current does, or a time constant."""
+    seen = any(c.kind == "current" for t in traces for c in t.channels)
+    if not is_lumped or name not in ("ampere", "emf_share"):
+        return True
+    return seen or name == "emf_share" and known.get("tau_e", 0.0) > 0
+
+
+def _refuse_unknown(given: Mapping) -> None:
+    for name in given:
+        if name not in (*LETTERS, *LUMPED, "n"):
+            raise InputError(
+                f"there is no parameter {name[:40]!r}; there are {', '.join(dict.fromkeys((*LETTERS, 'n', *LUMPED)))}"
+            )
+
+
+def _middle(name: str, ends: tuple[float, float]) -> float:
+    lower, upper = ends
+    if not lower < upper or lower < 0 and name not in ("theta_0", "b"):
+        raise InputError(
+            f"the bounds of {name} are {lower:g} and {upper:g}, a lower one of at least zero and an upper one above it"
+            " were expected"
+        )
+    return math.sqrt(lower * upper) if lower > 0 else 0.5 * (lower + upper)
+
+
+def _lumped(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool) -> dict[str, float]:
+    """Eq. (6)'s letters as known, or as a first search finds them."""
+    known = datasheet.to_lumped() if datasheet is not None else {}
+    if not {"a_2", "b"} <= known.keys():
+        known = opening(traces, is_angle)
+    return {**REST, "ampere": known["b"], **known}

@@ -1,0 +1,1 @@
+"""Pages and pictures: what a reader sees."""

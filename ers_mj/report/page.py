@@ -1,0 +1,112 @@
+"""The parts of a page that stands alone: frame, tiles, sections, tables, figures, places and their bars."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from importlib.resources import files
+
+from ers_mj.report.display import NONE, interval, missing, shown
+from ers_mj.report.display import figure as digits
+
+Row = tuple[Sequence[str], str]  # cells as html, class
+
+
+def frame(title: str, kind: str, body: str) -> str:
+    """The whole page as HTML: no script, no font, no address outside it."""
+    style = files("ers_mj.report").joinpath("report.css").read_text(encoding="utf-8")
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{text(title)}</title>\n<style>\n{style}</style>\n</head>\n"
+        f'<body>\n<main class="{text(kind)}">\n{body}\n</main>\n</body>\n</html>\n'
+    )
+
+
+def header(kind: str, verdict: str, small: str, sentence: object, tiles: Iterable[tuple[str, str]]) -> str:
+    """What a page begins with: a verdict, a sentence, and tiles of (label, value) as html."""
+    cells = "".join(f'<div class="tile"><span>{label}</span><b>{value}</b></div>' for label, value in tiles)
+    return (
+        f'<header class="{text(kind)}">\n<p class="verdict">{text(verdict)}<small>{text(small)}</small></p>\n'
+        f'<h1>{text(sentence)}</h1>\n<div class="tiles">{cells}</div>\n</header>'
+    )
+
+
+def text(x: object) -> str:
+    """x escaped, nothing for None."""
+    return escape("" if x is None else str(x), quote=True)
+
+
+def named(name: object) -> str:
+    """A name of the document as words."""
+    return text(str(name or "").replace("_", " "))
+
+
+def section(title: str, lead: str, content: str, kind: str = "") -> str:
+    """A section, nothing where it has no content."""
+    if not content:
+        return ""
+    lead = f'<p class="lead">{lead}</p>' if lead else ""
+    return f'<section class="{kind}">\n<h2>{title}</h2>\n{lead}\n{content}\n</section>'
+
+
+def table(heads: Sequence[str], rows: Iterable[Row]) -> str:
+    """A table in its own scrolling box; heads that begin with > stand on the right, as their cells do."""
+    right = [head.startswith(">") for head in heads]
+    mark = [' class="n"' if side else "" for side in right]
+    head = "".join(f"<th{m}>{h.lstrip('>')}</th>" for h, m in zip(heads, mark, strict=True))
+    lines = [
+        f'<tr class="{kind}">' + "".join(f"<td{m}>{cell}</td>" for cell, m in zip(cells, mark, strict=True)) + "</tr>"
+        for cells, kind in rows
+    ]
+    body = "\n".join(lines)
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+        if lines
+        else ""
+    )
+
+
+def figure(svg: str | None, caption: str = "") -> str:
+    """A figure with its caption, nothing where there is none."""
+    caption = f"<figcaption>{caption}</figcaption>" if caption else ""
+    return f"<figure>{svg}{caption}</figure>" if svg else ""
+
+
+def listed(sentences: Iterable[object]) -> str:
+    """Sentences as a list."""
+    items = "\n".join(f"<li>{text(sentence)}</li>" for sentence in sentences if sentence)
+    return f"<ul>\n{items}\n</ul>" if items else ""
+
+
+def share(x: float | None) -> str:
+    """A share in per cent."""
+    return NONE if missing(x) else f"{digits(100 * x, 2) if 0 < abs(x) < 0.1 else f'{100 * x:.0f}'} %"
+
+
+def place(found: Mapping) -> str:
+    """Where an error lives: axis, sentence, and its shares of error and time as bars."""
+    sentence = text(found.get("sentence") or _region(found))
+    against = "of motion" if found.get("axis") == "frequency" else "of time"
+    bars = _bar("of error", found.get("share_of_error"), "error") + _bar(against, found.get("share_of_time"), "")
+    return (
+        f'<div class="place"><span class="axis">{text(found.get("axis"))}</span><p>{sentence}</p>'
+        f'<div class="bars">{bars}</div></div>'
+    )
+
+
+def _region(found: Mapping) -> str:
+    if found.get("label") or not found.get("region"):
+        return str(found.get("label") or "")
+    unit = shown(found.get("unit"))
+    return f"{interval(found['region'], unit)} {unit.label}"
+
+
+def _bar(label: str, x: float | None, kind: str) -> str:
+    if missing(x):
+        return ""
+    width = 100 * min(max(x, 0.0), 1.0)
+    return (
+        f'<div class="bar {kind}"><span>{label}</span><div><i'
+        f' style="width:{width:.1f}%"></i></div><em>{share(x)}</em></div>'
+    )

@@ -1,0 +1,190 @@
+"""The report of a proof: shares with intervals, pictures, every case with what was concealed and what was answered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ers_mj.proving.scoring import NOTHING, first
+from ers_mj.report import diagnosis_figures as figures
+from ers_mj.report import page
+from ers_mj.report.display import NONE, missing
+from ers_mj.report.display import figure as digits
+from ers_mj.report.proof_figures import drawn
+
+TOLD = {
+    "top1": "single effects named right, by name",
+    "top1_class": "single effects named right, by class",
+    "top1_class_visible": "of these visible from 1 sigma on",
+    "false_alarm_rate": "null cases with a named effect",
+    "pair_recall": "effects found, of several at once",
+    "pair_recall_visible": "of these visible from 1 sigma on by themselves",
+    "pair_spurious": "names too many, for an effect of several",
+    "unexplained_recall": "effects outside the library flagged",
+    "false_flag_rate": "all others flagged",
+    "subsystem_recall": "single effects with the right subsystem first",
+}
+
+OF_THE_FIRST = (
+    "top1",
+    "top1_class",
+    "top1_class_visible",
+    "subsystem_recall",
+)  # in real records the rig's own effects come first
+
+
+def headline(results: Mapping) -> str:
+    """One sentence."""
+    if told := results.get("concealed_in_real"):
+        fresh = [x for x in told if not x["was_its_own"]]
+        return (
+            f"{sum(x['found'] for x in fresh)} of {len(fresh)} effects concealed in real recordings are found again,"
+            " those that the rig has of its own not counted."
+        )
+    k, n = results["of"].get("top1_class", (0, 0))
+    null, nulls = results["of"].get("false_alarm_rate", (0, 0))
+    parts = [f"{k} of {n} concealed single effects are named right by class"] if n else []
+    parts += [f"{null} of {nulls} null cases raise a false alarm"] if nulls else []
+    return ("; ".join(parts) or f"{results['cases']} cases were diagnosed") + "."
+
+
+def table_of(results: Mapping) -> list[tuple[str, str, str]]:
+    """(what, counts, share with interval) a line."""
+    out = []
+    for name, told in TOLD.items():
+        if name in OF_THE_FIRST and "concealed_in_real" in results:
+            continue
+        k, n = results["of"].get(name, (0, 0))
+        if n:
+            ends = results["ci95"].get(name)
+            out.append((told, f"{k} of {n}", f"{k / n:.2f}" + (f" [{ends[0]:.2f}, {ends[1]:.2f}]" if ends else "")))
+    for owner, told in (
+        ("baseline", "95 % intervals of the baseline's parameters hold the truth"),
+        ("baseline_alone", "the same, neither effect nor clutter"),
+        ("effect", "95 % intervals of effects' parameters hold it"),
+    ):
+        c = results["parameters"][owner]["all"]
+        if c["of"]:
+            out.append(
+                (told, f"{c['inside']} of {c['of']}", f"{c['coverage']:.2f} [{c['ci95'][0]:.2f}, {c['ci95'][1]:.2f}]")
+            )
+    return out
+
+
+def proof_page(results: Mapping, rows: Sequence[Mapping], about: Mapping[str, str]) -> str:
+    """The page as HTML."""
+    figures.restart_ids()
+    shares = page.table(
+        ["share", ">cases", ">with 95 % interval"], [((page.text(a), b, c), "") for a, b, c in table_of(results)]
+    )
+    pictures = "".join(page.figure(svg, page.text(caption)) for caption, svg in drawn(results, rows).items())
+    told = " · ".join(f"{page.text(name)} {page.text(value)}" for name, value in about.items())
+    body = "\n".join(
+        [
+            page.header("consistent", "What the diagnosis can do", "ers prove", headline(results), _tiles(results)),
+            page.section(
+                "Shares", "Wilson's intervals. An answer that failed or ran out of time counts as wrong.", shares
+            ),
+            page.section("Beside what the rigs have of their own", REAL, _real(results)),
+            page.section("Pictures", "", pictures),
+            page.section("Parameters", PARAMETERS, _parameters(results)),
+            page.section(
+                "Every case",
+                "What was concealed, how much of it a refitted model leaves, what was answered.",
+                _cases(rows),
+            ),
+            f"<footer><p>{told}</p></footer>",
+        ]
+    )
+    return page.frame("What the diagnosis can do", "consistent", body)
+
+
+PARAMETERS = (
+    "Where a parameter means one thing whatever the form of the law. Torques are compared per inertia; the baseline's"
+    " only on the constant linkage."
+)
+
+
+def _tiles(results: Mapping) -> list[tuple[str, str]]:
+    tiles = []
+    for name, label in (
+        ("top1_class", "named right"),
+        ("false_alarm_rate", "false alarms"),
+        ("unexplained_recall", "unknown effects flagged"),
+    ):
+        k, n = results["of"].get(name, (0, 0))
+        tiles += [(label, f"{100 * k / n:.0f} %")] if n else []
+    over, time = results["error_over_floor"].get("median"), results["cpu_s"].get("median")
+    tiles += [("held-out error / noise floor", digits(over))] if over else []
+    return tiles + ([("median time", f"{digits(time)} s")] if time else [])
+
+
+def _parameters(results: Mapping) -> str:
+    rows = []
+    for owner in ("baseline", "effect"):
+        for name, c in results["parameters"][owner].items():
+            if c["of"] or c["median_relative_error"] is not None:
+                error = NONE if c["median_relative_error"] is None else f"{100 * c['median_relative_error']:.2g} %"
+                rows.append(
+                    ((page.named(f"{owner}: {name}"), f"{c['inside']} of {c['of']}" if c["of"] else NONE, error), "")
+                )
+    return page.table(["parameter", ">95 % interval holds the truth", ">median relative error"], rows)
+
+
+REAL = (
+    "Effects concealed in real recordings. What is named in the untouched records is the rig's own; a concealed effect"
+    " counts as found where its class is named at all."
+)
+
+
+def again(x: Mapping) -> str:
+    """Whether what was concealed in a real record is found again: its class says nothing where the rig has it of its
+    own.
+    """
+    return "its own" if x["was_its_own"] else "found" if x["found"] else NONE
+
+
+def _real(results: Mapping) -> str:
+    rows = [
+        (
+            (
+                page.text(x["rig"]),
+                page.named(x["concealed"]),
+                digits(x["strength"]),
+                again(x),
+                page.named(" + ".join(x["named"]) or NOTHING),
+            ),
+            "",
+        )
+        for x in results.get("concealed_in_real", [])
+    ]
+    own = "; ".join(f"{rig}: {', '.join(names) or NOTHING}" for rig, names in results.get("own", {}).items())
+    return (
+        f"<p>{page.named(own)}</p>" + page.table(["rig", "concealed", ">strength (SI)", "found", "named"], rows)
+        if rows or own
+        else ""
+    )
+
+
+def _cases(rows: Sequence[Mapping]) -> str:
+    lines = []
+    for r in rows:
+        truth = " + ".join(r["labels"]) or NOTHING
+        answer = " + ".join(r["named"]) or first(r)
+        over = digits(r["after"] / r["floor"]) if r["after"] is not None and r["floor"] else NONE
+        lines.append(
+            (
+                (
+                    r["case"],
+                    r["kind"],
+                    page.named(truth) + (" (rod)" if r["linkage"] == "rod" else ""),
+                    NONE if missing(r["visibility"]) else digits(r["visibility"]),
+                    page.named(answer) + (" (flagged)" if r["significant"] else ""),
+                    over,
+                    NONE if r["cpu_s"] is None else digits(r["cpu_s"]),
+                ),
+                "",
+            )
+        )
+    return page.table(
+        ["case", "kind", "concealed", ">left [sigma]", "answered", ">error / floor", ">processor [s]"], lines
+    )

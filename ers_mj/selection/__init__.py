@@ -1,0 +1,1 @@
+"""Which effects do the recordings ask for?"""

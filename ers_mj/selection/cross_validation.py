@@ -1,0 +1,256 @@
+"""The three fit numbers: free runs on the training data, on held-out data, and on held-out data after recalibration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.data.prepared import Blocks, Trace
+from ers_mj.effects import BY_NAME
+from ers_mj.estimation.fit import columns_of, fit, residuals, residuals_in, score, tau_of
+from ers_mj.estimation.initial_state import fitted_start
+from ers_mj.estimation.intervals import half_widths
+from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
+
+TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
+LEAST_LOSS = 0.02  # of the score, which one block's noise makes of two equal models
+NULL_GAIN, NULL_GAIN_ONCE = (
+    0.8,
+    1.5,
+)  # of C: decay of the tails of the largest gains that effect-free servos offer to laws, and to what acts once
+NULL_ALONE = (
+    0.2  # share of effect-free servos whose best law stands alone: 2 of 12 nulls of seed 4141, one by its own clutter
+)
+NULL_PEAK, PEAK_TAIL = (
+    0.63,
+    1.2,
+)  # the worst block's (1 + misfit) / 2 of effect-free servos exceeds x in a share (x / NULL_PEAK)^-PEAK_TAIL of them
+RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
+REFIT_STEPS, REFIT_END = 12, 1e-3  # steps at most of a fold's refit, and gain in C of one at which it ends
+LAST_PART = 0.7  # where the only recording is cut into training and held out
+
+
+@dataclass(frozen=True)
+class Score:
+    """Squared free-run error summed over samples, their number, and block misfits (B,) of the observer form, of all
+    channels.
+
+    ``sure_squares`` are those of the error that no coarse converter has made (None: there is none).
+    """
+
+    squares: float
+    samples: int
+    misfit: np.ndarray
+    sure_squares: float | None = None
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the free-run error [output unit]."""
+        return math.sqrt(self.squares / self.samples) if self.samples else math.nan
+
+    @property
+    def sure(self) -> float:
+        """The same of the error that no coarse converter has made."""
+        return (
+            self.rmse
+            if self.sure_squares is None or not self.samples
+            else max(math.sqrt(self.sure_squares / self.samples), 1e-300)
+        )
+
+
+def pooled(scores: Sequence[Score]) -> Score:
+    """One score of several recordings."""
+    sure = sum(s.squares if s.sure_squares is None else s.sure_squares for s in scores)
+    return Score(
+        sum(s.squares for s in scores), sum(s.samples for s in scores), np.concatenate([s.misfit for s in scores]), sure
+    )
+
+
+def free_run(model: Model, trace: Trace, record: int = 0) -> np.ndarray:
+    """Simulated output (N,) of a recording from its fitted initial state, nothing corrected on the way."""
+    return model.predict(trace, record, start=fitted_start(model, trace, record))
+
+
+def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0) -> Score:
+    """Score of a recording from sample ``begin`` on."""
+    e = np.where(trace.valid, trace.y - free_run(model, trace, record), 0.0)[begin:]
+    e = np.nan_to_num(e, nan=10 * float(np.nanstd(trace.y)))
+    local = residuals_in(model, trace, record, OBSERVER_RATE)
+    sure = None if trace.converter is None else float(np.sum(trace.converter.beyond(e) ** 2))
+    return Score(
+        float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)), sure
+    )
+
+
+def settled(model: Model, trace: Trace, tau: float) -> Model:
+    """The model for one recording that it was not fitted to.
+
+    What only that recording can tell of an effect is fitted in it, from the first values of ``local``: the phase of a
+    gust on its first 30 %, as a record state is, and the time of a knock on all of it. An effect whose values there are
+    NaN stays away.
+    """
+    if all(BY_NAME[name].wave for name in model.local or {}):
+        trace = trace.part(0, int(RECALIBRATED * trace.t.size))
+    one = replace(model.of_records([0]), free=(), frozen=model.names)
+    layout = one.layout()
+    if not layout:
+        return replace(one, free=model.free, frozen=model.frozen)
+    z = one.vector(layout)
+    turns = np.array([f.name == "phase" for f in layout], float)
+    starts = [one.at(layout, z + turn * turns) for turn in (TURNS if turns.any() else TURNS[:1])]
+    best = min((fit(start, [trace], tau=tau, steps=8) for start in starts), key=lambda f: f.cost)
+    return replace(best.model, free=model.free, frozen=model.frozen)
+
+
+def _strange(model: Model) -> Model:
+    """The model as a recording of another day gets it: what happened once does not happen again."""
+    once = [name for name in model.local or {} if BY_NAME[name].once]
+    for name in once:
+        model = model.without_effect(name)
+    return model
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A held-out recording, and the training ones where the model must be refitted without it (None: it never saw it).
+
+    ``record`` is the held-out one's place among all training recordings where it is one of them, or where, ``halved``,
+    its other part is.
+    """
+
+    held_out: Trace
+    training: tuple[Trace, ...] | None
+    record: int = 0
+    halved: bool = False
+
+    @property
+    def known(self) -> list[int]:
+        """The places of the training ones among all recordings."""
+        return [k for k in range(len(self.training) + (not self.halved)) if self.halved or k != self.record]
+
+
+def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold], str]:
+    """What is held out, and the sentence that says so."""
+    if holdout:
+        return [Fold(h, None) for h in holdout], "held-out recordings were opened after selection had ended"
+    if len(traces) > 1:
+        return (
+            [Fold(out, tuple(t for t in traces if t is not out), k) for k, out in enumerate(traces)],
+            (
+                "each recording was held out in turn while the parameters were refitted to the others; the structure"
+                " was chosen on all"
+            ),
+        )
+    cut = int(LAST_PART * traces[0].t.size)
+    return (
+        [Fold(traces[0].part(cut, traces[0].t.size), (traces[0].part(0, cut),), halved=True)],
+        (
+            "the last 30 % of the only recording was held out while the parameters were refitted; the structure was"
+            " chosen on all of it"
+        ),
+    )
+
+
+def halves(traces: Sequence[Trace], record: int) -> list[Fold]:
+    """Either half of one recording held out, the other half and the other recordings left to fit to."""
+    cut = traces[record].t.size // 2
+    both = traces[record].part(0, cut), traces[record].part(cut, traces[record].t.size)
+    return [
+        Fold(out, (*traces[:record], left, *traces[record + 1 :]), record, halved=True)
+        for out, left in (both, both[::-1])
+    ]
+
+
+def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[Model]:
+    """The model of each fold, refitted to its training recordings where it has some.
+
+    A refit goes along one Jacobian by finite differences and its updates, so that with and without an effect the same
+    kind of slope leads there; where whole recordings are held out along that of all of them, since no fold's optimum is
+    far, unless it leads nowhere. It ends late: along a valley that the training recordings hardly see, what is held out
+    would otherwise be judged by where the refit began.
+    """
+    whole = [fold.held_out for fold in parts if fold.training is not None and not fold.halved]
+    slopes = columns_of(model, whole, OBSERVER_RATE, by_tangents=False) if whole else {}
+
+    def along(begun: Model, fold: Fold, known: Columns) -> Model:
+        return fit(begun, fold.training, tau=tau, steps=REFIT_STEPS, known=known, renewals=0, tolerance=REFIT_END).model
+
+    def one(fold: Fold) -> Model:
+        if fold.training is None:
+            return settled(_strange(model), fold.held_out, tau)
+        begun = model.of_records(fold.known)
+        found = along(begun, fold, _beside(slopes, begun, fold, whole)) if slopes else begun
+        if np.array_equal(found.vector(begun.layout()), begun.vector(begun.layout())):
+            found = along(begun, fold, columns_of(begun, fold.training, OBSERVER_RATE, by_tangents=False))
+        mine = {name: rows[[fold.record]] for name, rows in (model.local or {}).items()}
+        return settled(replace(found, local=mine or None), fold.held_out, tau)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        return list(pool.map(one, parts))
+
+
+def _beside(slopes: Columns, begun: Model, fold: Fold, traces: Sequence[Trace]) -> Columns:
+    """The columns for a fold's own recordings."""
+    rows = np.repeat(np.arange(len(traces)) != fold.record, [trace.rows for trace in traces])
+    keys = {f.key: (f.owner, f.name, fold.known[f.key[-1]]) if f.local else f.key for f in begun.layout()}
+    return {key: slopes[whole][rows] for key, whole in keys.items()}
+
+
+def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[float, float, float]]]:
+    """Gain, friction level and (where the plant feels position) offset fitted on the first 30 % of a recording; the
+    score is taken on the rest. They stay neutral unless they buy their price there. Each is (value, lower, upper end of
+    95 %).
+    """
+    cut = int(RECALIBRATED * trace.t.size)
+    head = trace.part(0, cut)
+    known = {name: rows[[0, 0]] for name, rows in (model.local or {}).items()}
+    held = (*model.names, *(f"{name}, local" for name in known))
+    pair = (
+        replace(model, states=None, local=known or None, free=(), frozen=held)
+        .with_state("gain", 2)
+        .with_state("friction_level", 2)
+    )
+    if model.values["a_1"] > 0 or model.values["c_1"] > 0:
+        pair = pair.with_state("offset", 2)
+    blank = replace(head, valid=np.zeros(head.t.size, bool), counts=np.zeros_like(head.counts), channels=())
+    misfit = Blocks.of([blank, head]).misfit(residuals(pair, [blank, head], OBSERVER_RATE))
+    tau = tau_of(misfit[blank.counts.size :])
+    found = fit(pair, [blank, head], tau=tau, steps=10)
+    if float(score(misfit, tau).sum() - score(found.misfit, tau).sum()) < 0.5 * found.size:
+        found = replace(found, model=pair)
+    layout = found.model.layout()
+    widths = half_widths(found.model, [blank, head], (), tau)
+    ends = {f.name: f.ends(q, w) for f, q, w in zip(layout, found.model.vector(layout), widths)}
+    return scored(found.model, trace, 1, cut), {
+        name: (float(v[1]), *ends[name]) for name, v in found.model.states.items()
+    }
+
+
+def paired_p(better: np.ndarray, worse: np.ndarray, once: bool = False, alone: bool = False) -> float:
+    """One-sided p-value that ``better`` predicts held-out blocks no better than ``worse``: wins against losses over
+    blocks.
+
+    If neither is better the differences d of the scores lie alike on both sides of zero, so that the losses alone tell
+    their scatter: sum(d) / sqrt(2 sum of the squared losses) is near normal. An effect that acts in a few blocks and
+    harms nowhere is not punished for being rare, as it is by the scatter of all. A loss of LEAST_LOSS a block is taken
+    for granted.
+
+    Blocks are not independent, and the best of many effects was taken: the p-value is never below the share of servos
+    without missing physics in which as large a gain is offered, by an exponential tail (analysis/null_gains.py: of 48
+    the largest gain of a law is 1.8; stick and slip that fork offer what acts ``once`` 2.2 to 3.6 in four of them). A
+    knock is also known by the block that it serves best: the worst one of 61 such servos is off by 3.7 to 5.8 sigma in
+    three, by more than 2 in twelve. A law whose round offers no other nearly as much, ``alone`` (ranking.stands_alone),
+    has what chance offers to one only, in a share NULL_ALONE of them.
+    """
+    d = score(worse, 1.0) - score(better, 1.0)
+    losses = float(np.sum(np.minimum(d, 0.0) ** 2)) + d.size * LEAST_LOSS**2
+    chance = (NULL_ALONE if alone else 1.0) * math.exp(
+        -max(float(np.sum(d)), 0.0) / (NULL_GAIN_ONCE if once else NULL_GAIN)
+    )
+    if once:
+        chance = min(chance, math.exp(-PEAK_TAIL * max(float(np.max(d)) - math.log(NULL_PEAK), 0.0)))
+    return max(chance, 0.5 * math.erfc(float(np.sum(d)) / math.sqrt(2.0 * losses) / math.sqrt(2.0)))

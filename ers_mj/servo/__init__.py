@@ -1,0 +1,1 @@
+"""What is known of a servo: its datasheet, its model, and recordings simulated with known truth."""

@@ -1,0 +1,256 @@
+"""A datasheet: what is known of a servo beforehand, and what a diagnosis hands back (`model.toml`).
+
+    Eq. (1)   J theta'' + B theta' + k_s (theta - theta_0) + T_LH sgn(theta - theta_0) + F_c sgn(theta') = n K_t i
+              L i' + R i = u - n K_e theta'
+    Eq. (6)   theta'' = -a_1 (theta - theta_0) - a_2 theta' - c_1 sgn(theta - theta_0) - c_2 sgn(theta') + b u
+
+The second is the first without L, divided by J.
+"""
+
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from types import MappingProxyType
+
+from ers_mj.data.tables import write_whole
+from ers_mj.errors import InputError
+
+# Table 1 of the paper (Energies 2020): the values of its joint simulation model, as printed but for the units
+# of L and theta_0. K_t and K_e differ (ratio 1.69) although they are one constant in SI: both are kept. The
+# sides of the gear are those that Eq. (5) needs.
+TABLE_1: Mapping[str, float] = MappingProxyType(
+    {
+        "J": 0.0031,  # kg m^2, rudder side
+        "B": 0.0098,  # N m s/rad, rudder side
+        "K_t": 0.0175,  # N m/A, motor side
+        "K_e": 0.0295,  # V s/rad, motor side
+        "k_s": 0.0877,  # N m/rad, spring of the load
+        "T_LH": 0.46,  # N m, preload of the spring
+        "F_c": 0.34,  # N m, Coulomb friction, rudder side
+        "R": 1.55,  # ohm
+        "L": 0.0016,  # H, printed 1.6 mH
+        "theta_0": math.radians(15),  # rad, printed 15 deg
+        "n": 22.26,  # motor turns a rudder turn
+    }
+)
+LUMPED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
+SIGNED = ("theta_0", "b")  # may be negative: where the spring rests, and the sense of the input
+NEVER_ZERO = ("J", "R", "n", "K_t", "b", "sample_rate_hz")
+SECTIONS = ("parameters", "lumped", "recording", "baseline", "effect")
+
+
+@dataclass(frozen=True)
+class Datasheet:
+    """What is known of one servo. Mappings are read-only; two datasheets are equal by content.
+
+    Attributes:
+        parameters: Table 1's letters, SI, any subset.
+        lumped: Eq. (6)'s, in output unit/s^2 per input unit.
+        sample_rate_hz: of the recordings it comes with [Hz], or None.
+        effects: the physics that a diagnosis added, each a name and its parameters.
+        baseline: what a diagnosis refitted, by free names.
+        name: where it comes from.
+    """
+
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    lumped: Mapping[str, float] = field(default_factory=dict)
+    sample_rate_hz: float | None = None
+    effects: tuple[tuple[str, Mapping[str, float]], ...] = ()
+    baseline: Mapping[str, float] = field(default_factory=dict)
+    name: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        for attribute in ("parameters", "lumped", "baseline"):
+            object.__setattr__(self, attribute, MappingProxyType(dict(getattr(self, attribute))))
+        effects = tuple((name, MappingProxyType(dict(values))) for name, values in self.effects)
+        object.__setattr__(self, "effects", effects)
+
+    def __reduce__(self) -> tuple:
+        """Travel to another process as plain dictionaries."""
+        effects = tuple((name, dict(values)) for name, values in self.effects)
+        plain = dict(self.parameters), dict(self.lumped), self.sample_rate_hz, effects, dict(self.baseline)
+        return type(self), (*plain, self.name)
+
+    def to_lumped(self) -> dict[str, float]:
+        """Those of Eq. (6)'s parameters, of tau_e, emf_share and ampere that follow from what is given.
+
+            a_1 = k_s/J,  a_2 = (B R + n^2 K_t K_e)/(J R),  b = n K_t/(J R),  c_1 = T_LH/J,  c_2 = F_c/J,
+            tau_e = L/R [s],  emf_share = n^2 K_t K_e/(J R)/a_2,  ampere = n K_t/J [rad/s^2 per A],
+
+        n is 1 where it is not given; what is given lumped stands as it is.
+        """
+        known = {"n": 1.0, **self.parameters}
+        lumped = {name: rule(known) for name, (needs, rule) in FOLLOWS.items() if known.keys() >= set(needs.split())}
+        return {name: x for name, x in lumped.items() if math.isfinite(x)} | dict(self.lumped)
+
+
+def _emf_damping(p: Mapping[str, float]) -> float:
+    """What the back-EMF damps, n^2 K_t K_e/(J R) [1/s]."""
+    return p["n"] ** 2 * p["K_t"] * p["K_e"] / (p["J"] * p["R"])
+
+
+def _damping(p: Mapping[str, float]) -> float:
+    return p["B"] / p["J"] + _emf_damping(p)
+
+
+FOLLOWS = {
+    "a_1": ("k_s J", lambda p: p["k_s"] / p["J"]),
+    "a_2": ("B J K_t K_e R", _damping),
+    "b": ("K_t J R", lambda p: p["n"] * p["K_t"] / (p["J"] * p["R"])),
+    "c_1": ("T_LH J", lambda p: p["T_LH"] / p["J"]),
+    "c_2": ("F_c J", lambda p: p["F_c"] / p["J"]),
+    "theta_0": ("theta_0", lambda p: p["theta_0"]),
+    "tau_e": ("L R", lambda p: p["L"] / p["R"]),
+    "ampere": ("K_t J", lambda p: p["n"] * p["K_t"] / p["J"]),
+    "emf_share": ("B J K_t K_e R", lambda p: _emf_damping(p) / _damping(p) if _damping(p) else math.nan),
+}
+
+
+# -- reading -----------------------------------------------------------------------------------------------
+
+
+def read_datasheet(path: str | os.PathLike) -> Datasheet:
+    """Read a datasheet or a `model.toml`; "table1" is the paper's.
+
+    Raises:
+        InputError: whatever in the file cannot be meant, in one sentence that names it.
+    """
+    if os.fspath(path) == "table1":
+        return Datasheet(parameters=TABLE_1, name="table1")
+    path = Path(path)
+    document = _document(path)
+    _refuse_unknown(document, SECTIONS, "section", str(path))
+    sheet = Datasheet(
+        parameters=_section(document, "parameters", TABLE_1, path),
+        lumped=_section(document, "lumped", LUMPED, path),
+        sample_rate_hz=_section(document, "recording", ["sample_rate_hz"], path).get("sample_rate_hz"),
+        effects=tuple(_effect(entry, path) for entry in _entries(document, path)),
+        baseline=_numbers(document.get("baseline", {}), f"{path}: [baseline]"),
+        name=path.name,
+    )
+    _refuse_none_or_both(sheet, "baseline" in document, path)
+    return sheet
+
+
+def _document(path: Path) -> dict:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file (the paper's datasheet is called table1)") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: is not valid TOML ({str(error)[:120]})") from None
+
+
+def _section(document: dict, section: str, known: Iterable[str], path: Path) -> dict[str, float]:
+    """One section's numbers: its keys known, no value negative or zero where that makes no sense."""
+    where = f"{path}: [{section}]"
+    numbers = _numbers(document.get(section, {}), where, known)
+    for key, x in numbers.items():
+        refuse_impossible(key, x, where)
+    return numbers
+
+
+def refuse_impossible(key: str, x: float, where: str) -> None:
+    """Raise InputError where no servo has this value of a key."""
+    if x < 0 and key not in SIGNED:
+        raise InputError(f"{where} has the negative {key} = {x:g}, zero or more was expected")
+    if x == 0 and key in NEVER_ZERO:
+        raise InputError(f"{where} has {key} = 0, which no servo has")
+
+
+def _entries(document: dict, path: Path) -> list:
+    entries = document.get("effect", [])
+    if not isinstance(entries, list):
+        raise InputError(f"{path}: effect is {_kind(entries)}, a list of [[effect]] was expected")
+    return entries
+
+
+def _effect(entry: object, path: Path) -> tuple[str, dict[str, float]]:
+    where = f"{path}: [[effect]]"
+    if not isinstance(entry, dict):
+        raise InputError(f"{where} holds {_kind(entry)}, a table with name and parameters was expected")
+    _refuse_unknown(entry, ("name", "parameters"), "key", where)
+    name = entry.get("name")
+    if not isinstance(name, str) or not name:
+        raise InputError(f"{where} has no name in text")
+    return name, _numbers(entry.get("parameters", {}), f"{where} {name}")
+
+
+def _numbers(table: object, where: str, known: Iterable[str] | None = None) -> dict[str, float]:
+    """The finite numbers of a table, under known keys where any are given."""
+    if not isinstance(table, dict):
+        raise InputError(f"{where} is {_kind(table)}, a table was expected")
+    if known is not None:
+        _refuse_unknown(table, known, "key", where)
+    return {key: _number(x, f"{where} {key}") for key, x in table.items()}
+
+
+def _number(x: object, where: str) -> float:
+    if isinstance(x, bool) or not isinstance(x, int | float):
+        raise InputError(f"{where} is {_kind(x)}, a number was expected")
+    try:
+        number = float(x)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{where} is {number}, a finite number was expected")
+    return number
+
+
+def _refuse_unknown(table: Mapping, known: Iterable[str], noun: str, where: str) -> None:
+    known = list(known)
+    for key in table:
+        if key not in known:
+            near = get_close_matches(key, known, n=1, cutoff=0.4)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise InputError(f"{where}: there is no {noun} {key[:40]!r}; {hint}known are {', '.join(known)}")
+
+
+def _refuse_none_or_both(sheet: Datasheet, is_model: bool, path: Path) -> None:
+    if not sheet.parameters and not sheet.lumped:
+        raise InputError(f"{path}: gives nothing of the servo, [parameters] or [lumped] was expected")
+    if sheet.parameters and sheet.lumped and not is_model:
+        raise InputError(f"{path}: has both [parameters] and [lumped], only a model with a [baseline] may; drop one")
+
+
+def _kind(x: object) -> str:
+    kinds = {bool: "true or false", str: "text", dict: "a table", list: "a list", int: "a number", float: "a number"}
+    return kinds.get(type(x), "a date or a time")
+
+
+# -- writing -----------------------------------------------------------------------------------------------
+
+
+def write_model(path: str | os.PathLike, datasheet: Datasheet) -> None:
+    """Write a model as TOML that `read_datasheet` reads back exactly; whole or not at all.
+
+    Raises:
+        InputError: the path cannot be written.
+    """
+    rate = {} if datasheet.sample_rate_hz is None else {"sample_rate_hz": datasheet.sample_rate_hz}
+    sections = {"parameters": datasheet.parameters, "lumped": datasheet.lumped, "recording": rate}
+    lines = [line for title, table in sections.items() if table for line in _lines(f"[{title}]", table)]
+    lines += _lines("[baseline]", datasheet.baseline)
+    for name, values in datasheet.effects:
+        lines += ["[[effect]]", f"name = {_quoted(name)}", *_lines("[effect.parameters]", values)]
+    write_whole(Path(path), "\n".join(lines))
+
+
+def _lines(title: str, table: Mapping[str, float]) -> list[str]:
+    return [title, *(f"{_key(key)} = {float(x)!r}" for key, x in table.items()), ""]
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _quoted(key)
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

@@ -1,0 +1,399 @@
+"""A structure with values: what is fitted of it, how that is bounded, and what it predicts of a recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ers_mj.data.prepared import Channel, Trace
+from ers_mj.effects import BY_NAME
+from ers_mj.effects.base import Parameter, Scales
+from ers_mj.plants.reduced import ReducedModel, lumped
+
+OBSERVER_RATE = 5.0  # [1/s]
+OBSERVER_STEP = 0.005  # [s] between corrections of the observer
+BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share", "ampere")
+SIGNED = ("b", "ampere")  # fitted by size, their sign kept
+STATES = ("gain", "offset", "friction_level")
+STATE_PRIOR = (
+    0.2  # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
+)
+NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
+SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
+NEAR_BOUND = 1e-3  # of a bound, within which a fitted number rests at it
+LEAST_TAU, MOST_TAU = (
+    0.1,
+    2.0,
+)  # of a datasheet's electrical time constant, between which the baseline's is an ordinary one
+FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
+CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
+
+
+def observer_gain(rate: float, sample_time: float) -> tuple[float, int]:
+    """(gain, every) of the observer that follows a measurement at this rate [1/s]: one sample in ``every`` is followed
+    by the share ``gain``.
+    """
+    every = max(1, round(OBSERVER_STEP / sample_time))
+    return 1.0 - math.exp(-rate * every * sample_time), every
+
+
+@dataclass(frozen=True)
+class Free:
+    """One fitted number: where it lives, how it is transformed and bounded."""
+
+    owner: str
+    name: str
+    index: int
+    positive: bool
+    scale: float
+    lower: float
+    upper: float
+    prior: tuple[float, float] | None = None
+    local: bool = False
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """What tells this number from every other one, whatever else is fitted."""
+        return self.owner, self.name, self.index // 16 if self.local else self.index if self.owner in STATES else 0
+
+    def ends(self, z: float, half: float) -> tuple[float, float]:
+        """The interval z -+ half of the transformed number, in the number's own unit."""
+        if self.positive:
+            return math.exp(min(z - half, 700)), math.exp(min(z + half, 700))
+        return (z - half) * self.scale, (z + half) * self.scale
+
+
+Columns = Mapping[tuple[str, str, int], np.ndarray]  # of a Jacobian, by the key of what is fitted
+
+
+@dataclass(frozen=True)
+class Model:
+    """A structure with values: the baseline, the effects on top, and what differs from recording to recording.
+
+    ``values`` holds all of BASE; ``free`` names those that are fitted. ``effects`` are (name, parameters (k,));
+    infinite parameters are absent, not fitted. ``states`` maps a record state to its value in each recording, ``local``
+    an effect to its parameters that are ``per_record`` (recordings, k), in rows of NaN where the effect is absent from
+    a recording. ``frozen`` names effects that are not fitted, and with ", local" those whose ``local`` is not.
+    """
+
+    values: Mapping[str, float]
+    free: tuple[str, ...]
+    effects: tuple[tuple[str, np.ndarray], ...] = ()
+    states: Mapping[str, np.ndarray] | None = None
+    scales: Scales | None = None
+    priors: Mapping[str, tuple[float, float]] | None = None
+    frozen: tuple[str, ...] = ()
+    local: Mapping[str, np.ndarray] | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects' names in the order of their addition."""
+        return tuple(name for name, _ in self.effects)
+
+    def layout(self) -> list[Free]:
+        """Every fitted number."""
+        out = []
+        held = {name for effect, _ in self.effects for name in BY_NAME[effect].absorbs}
+        for name in (n for n in self.free if n not in held):
+            positive = name != "theta_0"
+            lower, upper = (1e-9, np.inf)
+            if name == "theta_0":
+                positive, (lower, upper) = False, self._near_travel()
+            if name == "emf_share":
+                lower, upper = 0.02, 0.999
+            if name == "tau_e":
+                lower, upper = self._tau_bounds()
+            prior = (self.priors or {}).get(name)
+            out.append(Free("base", name, 0, positive, self.scales.position, lower, upper, prior))
+        for row, (effect_name, values) in enumerate(self.effects):
+            if effect_name in self.frozen:
+                continue
+            for k, parameter in enumerate(BY_NAME[effect_name].parameters):
+                if (
+                    np.isfinite(values[k])
+                    and parameter.fitted
+                    and not (parameter.per_record and effect_name in (self.local or {}))
+                ):
+                    out.append(self._of_effect(effect_name, parameter, row * 16 + k, values[k]))
+        for effect_name, rows in (self.local or {}).items():
+            if f"{effect_name}, local" in self.frozen:
+                continue
+            for k, parameter in enumerate(p for p in BY_NAME[effect_name].parameters if p.per_record):
+                out += [
+                    self._of_effect(effect_name, parameter, r * 16 + k, v, True)
+                    for r, v in enumerate(rows[:, k])
+                    if np.isfinite(v)
+                ]
+        for state, per_record in (self.states or {}).items():
+            for k in range(1, len(per_record)):
+                multiplies = state != "offset"
+                prior = (0.0, STATE_PRIOR) if multiplies else (0.0, 0.1 * STATE_PRIOR)
+                out.append(
+                    Free(
+                        state,
+                        state,
+                        k,
+                        multiplies,
+                        self.scales.position,
+                        0.2 if multiplies else -np.inf,
+                        5.0 if multiplies else np.inf,
+                        prior,
+                    )
+                )
+        return out
+
+    def _of_effect(self, name: str, parameter: Parameter, index: int, value: float, local: bool = False) -> Free:
+        scale = 1.0 if parameter.positive else CLOCKED.get(parameter.kind, max(abs(value), 1e-12))
+        most = {
+            "frequency": 1.0 / self.scales.sample_time,
+            "period": 2.0 * self.scales.position / BY_NAME[name].fewest_turns,
+        }
+        most = most.get(parameter.name if parameter.kind == "position" else parameter.kind, np.inf)
+        least = {"position": SMALLEST * self.scales.noise, "frequency": FEWEST_CYCLES / self.scales.duration}.get(
+            parameter.kind, 1e-12
+        )
+        lower = least if parameter.positive and parameter.lower <= 0.0 else parameter.lower
+        ends = self._near_travel() if parameter.on_travel else (lower, min(parameter.upper, most))
+        return Free(name, parameter.name, index, parameter.positive, scale, *ends, local=local)
+
+    def _near_travel(self) -> tuple[float, float]:
+        near = NEAR * self.scales.position
+        return self.scales.low - near, self.scales.high + near
+
+    def _tau_bounds(self) -> tuple[float, float]:
+        known = self.scales.tau_e_datasheet
+        return (LEAST_TAU * known, MOST_TAU * known) if known else (1e-6, 1.0)
+
+    def vector(self, layout: Sequence[Free]) -> np.ndarray:
+        """The fitted numbers, transformed (logarithm of positive ones, others over their scale)."""
+        z = np.empty(len(layout))
+        for i, f in enumerate(layout):
+            v = self._get(f)
+            z[i] = math.log(max(abs(v), 1e-300)) if f.positive else v / f.scale
+        return z
+
+    def _get(self, f: Free) -> float:
+        if f.owner == "base":
+            return self.values[f.name]
+        if f.owner in STATES:
+            return self.states[f.owner][f.index]
+        if f.local:
+            return self.local[f.owner][f.index // 16, f.index % 16]
+        return self.effects[f.index // 16][1][f.index % 16]
+
+    def at_bound(self, f: Free) -> bool:
+        """Whether a fitted number rests at one of its bounds."""
+        return any(
+            math.isclose(abs(self._get(f)) if f.positive else self._get(f), bound, rel_tol=NEAR_BOUND)
+            for bound in (f.lower, f.upper)
+        )
+
+    def at(self, layout: Sequence[Free], z: np.ndarray) -> Model:
+        """The model with the fitted numbers of z, held within their bounds."""
+        values, effects = dict(self.values), [(n, v.copy()) for n, v in self.effects]
+        states, local = ({k: v.copy() for k, v in (some or {}).items()} for some in (self.states, self.local))
+        for f, q in zip(layout, z):
+            v = math.exp(min(q, 60.0)) if f.positive else q * f.scale
+            v = min(max(v, f.lower), f.upper)
+            if f.owner == "base":
+                values[f.name] = math.copysign(v, self.values[f.name]) if f.name in SIGNED else v
+            elif f.owner in STATES:
+                states[f.owner][f.index] = v
+            elif f.local:
+                local[f.owner][f.index // 16, f.index % 16] = v
+            else:
+                effects[f.index // 16][1][f.index % 16] = v
+        return replace(self, values=values, effects=tuple(effects), states=states or None, local=local or None)
+
+    def with_effect(self, name: str, start: np.ndarray) -> Model:
+        """The model with one more effect at ``start``, its per-record parameters alike in every recording that it acts
+        in.
+        """
+        effect, start = BY_NAME[name], np.array(start, float)
+        local = dict(self.local or {})
+        if effect.local:
+            rows = np.tile(start[effect.local_columns], (self.scales.recordings, 1))
+            if "record" in (names := [p.name for p in effect.parameters]):
+                rows[np.arange(len(rows)) != start[names.index("record")]] = np.nan
+            local[name] = rows
+        return replace(self, effects=(*self.effects, (name, start)), local=local or None)
+
+    def with_form(self, name: str, start: np.ndarray) -> Model:
+        """The model with one of its effects at ``start``, another form of it; what a wave's phase is in each recording
+        stays.
+        """
+        model = self.without_effect(name).with_effect(name, start)
+        if BY_NAME[name].wave is None or not BY_NAME[name].local:
+            return model
+        return replace(model, local={**model.local, name: self.local[name].copy()})
+
+    def without_effect(self, name: str) -> Model:
+        """The model with one effect less."""
+        local = {k: v for k, v in (self.local or {}).items() if k != name}
+        return replace(self, effects=tuple(e for e in self.effects if e[0] != name), local=local or None)
+
+    def with_state(self, state: str, records: int) -> Model:
+        """The model with a record state free in every recording but the first."""
+        neutral = np.zeros(records) if state == "offset" else np.ones(records)
+        return replace(self, states={**(self.states or {}), state: neutral})
+
+    @property
+    def dead_time(self) -> float:
+        """By how much the command reaches the motor late [s]."""
+        return float(dict(self.effects)["input_delay"][0]) if "input_delay" in self.names else 0.0
+
+    def plant(self, record: int = 0, supply: np.ndarray | None = None) -> ReducedModel:
+        """The reduced model of one recording (its record state applied), with the supply (N,) that was measured
+        there.
+        """
+        if supply is None and not self.states and not self.local:
+            return self._anywhere
+        c = lumped(self.values)
+        if self.states:
+            gain = self.states["gain"][record] if "gain" in self.states else 1.0
+            level = self.states["friction_level"][record] if "friction_level" in self.states else 1.0
+            c = c._replace(b=c.b * gain, c_2_plus=c.c_2_plus * level, c_2_minus=c.c_2_minus * level)
+        return ReducedModel(c, self.effects_of(record), supply)
+
+    @cached_property
+    def _anywhere(self) -> ReducedModel:
+        """The plant without what differs between recordings; made once, since a fit asks for it in each of them."""
+        return ReducedModel(lumped(self.values), self.effects)
+
+    def effects_of(self, record: int | None = None) -> tuple[tuple[str, np.ndarray], ...]:
+        """The effects that act in one recording (None: in any), with their values there (in the first where they
+        act).
+        """
+        if not self.local:
+            return self.effects
+        out = []
+        for name, values in self.effects:
+            if name in self.local:
+                values, columns = values.copy(), BY_NAME[name].local_columns
+                rows = self.local[name]
+                values[columns] = rows[np.argmin(np.isnan(rows).any(axis=1)) if record is None else record]
+                if np.isnan(values[columns]).any():
+                    continue
+            out.append((name, values))
+        return tuple(out)
+
+    def of_records(self, records: Sequence[int]) -> Model:
+        """The model for some of its recordings only, without what differs between them (``states``)."""
+        local = {name: rows[list(records)] for name, rows in (self.local or {}).items()}
+        return replace(self, states=None, local=local or None, scales=replace(self.scales, recordings=len(records)))
+
+    def offset(self, record: int) -> float:
+        """Output offset of one recording."""
+        return float(self.states["offset"][record]) if self.states and "offset" in self.states else 0.0
+
+    def predict(self, trace: Trace, record: int = 0, rate: float = 0.0, start=None) -> np.ndarray:
+        """Simulated output (N,) of a recording: free run, or observer form where ``rate`` [1/s] > 0."""
+        plant, run = self.staged(trace, record, rate, start)
+        return plant.theta(trace.t, trace.u, **run) + self.offset(record)
+
+    def observed(self, trace: Trace, record: int, rate: float) -> tuple[list[np.ndarray], np.ndarray]:
+        """What ``predict`` gives, and behind it what each further channel of the recording would show, (N,) each; the
+        motion (N, 4).
+        """
+        plant, run = self.staged(trace, record, rate, None)
+        theta, motion = plant.outputs(trace.t, trace.u, **run)
+        return [theta + self.offset(record), *self.shown(trace, plant, motion)], motion
+
+    def shown(self, trace: Trace, plant: ReducedModel, motion: np.ndarray) -> list[np.ndarray]:
+        """What each further channel of a recording would show (N,) along a motion (N, 4)."""
+        reading = {
+            "speed": lambda: motion[:, 1],
+            "motor": lambda: motion[:, 3],
+            "current": lambda: plant.current(trace.t, motion) / self.values["ampere"],
+        }
+        return [reading[channel.kind]() for channel in trace.channels]
+
+    @property
+    def has_tangents(self) -> bool:
+        """Whether ``changes`` can tell the first-order changes of this model's outputs."""
+        return self._anywhere.has_tangents
+
+    def changes(
+        self, traces: Sequence[Trace], rate: float, others: Sequence[Model], scale: float, motions: Sequence[np.ndarray]
+    ) -> np.ndarray:
+        """First-order changes (rows of all traces, others) of the predicted outputs, in sigmas, 0 where a sample is
+        missing.
+
+        They point from this model towards each other one, times ``scale`` (see ReducedModel.tangents), along the
+        ``motions`` (N, 4) that ``observed`` made of it.
+        """
+        changes, ends = (
+            np.empty((len(others), sum(trace.rows for trace in traces))),
+            np.cumsum([0, *(trace.rows for trace in traces)]),
+        )
+        for k, trace in enumerate(traces):
+            plant, run = self.staged(trace, k, rate, None)
+            path, clock = motions[k], {key: v for key, v in run.items() if key != "start"}
+            plants = [other.plant(k, trace.supply) for other in others]
+            moved = plant.tangents(trace.t, trace.u, path, plants, scale, **clock)
+            here = self.shown(trace, plant, path)
+            slope = trace.converter and trace.converter.slope(
+                trace.y - plant.read(trace.t, path[:, 0]) - self.offset(k)
+            )
+            for other, its, move, row in zip(others, plants, moved, changes[:, ends[k] : ends[k + 1]]):
+                read, *beside = row.reshape(-1, trace.t.size)
+                np.divide(move[:, 3] + (other.offset(k) - self.offset(k)) * scale, trace.sigma, out=read)
+                if slope is not None:
+                    read *= slope
+                for channel, shown, out in zip(trace.channels, here, beside):
+                    np.divide(
+                        self._shown_change(channel, trace, plant, other, its, path, move, shown, scale),
+                        channel.sigma,
+                        out=out,
+                    )
+                row[trace.unseen] = 0.0
+        return changes.T
+
+    def _shown_change(
+        self,
+        channel: Channel,
+        trace: Trace,
+        plant: ReducedModel,
+        other: Model,
+        its: ReducedModel,
+        path: np.ndarray,
+        move: np.ndarray,
+        shown: np.ndarray,
+        scale: float,
+    ) -> np.ndarray:
+        """First-order change (N,) of what a further channel shows of one body towards another model, times ``scale``;
+        ``shown`` is what it shows here.
+        """
+        if channel.kind != "current":
+            return move[:, 1 if channel.kind == "speed" else 0]
+        if plant.draws_drive and its.draws_drive:
+            here, there = self.values["ampere"], other.values["ampere"]
+            return (
+                move[:, 2] / there + path[:, 2] * (scale / there - scale / here) if here != there else move[:, 2] / here
+            )
+        beside = np.column_stack([path[:, :3] + move[:, :3] / scale, path[:, 3] + move[:, 0] / scale])
+        return (its.current(trace.t, beside) / other.values["ampere"] - shown) * scale
+
+    def staged(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
+        """The plant of a recording, and how it is run along it; ``start`` is the (reading, speed) it begins with, the
+        trace's own if None.
+        """
+        (gain, every), shift, plant = (
+            observer_gain(rate, trace.sample_time),
+            self.offset(record),
+            self.plant(record, trace.supply),
+        )
+        theta, omega = trace.start if start is None else start
+        drive = 0.0 if omega == 0 else plant.coefficients.b * trace.u[0] - plant.coefficients.a_emf * omega
+        return plant, {
+            "start": (plant.behind(theta - shift), omega, drive),
+            "enable": trace.enable,
+            "load": trace.load,
+            "y": trace.followed - shift if gain > 0 else None,
+            "gain": gain,
+            "every": every,
+        }

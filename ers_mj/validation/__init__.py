@@ -1,0 +1,1 @@
+"""The reduced model against the mechanical plant."""

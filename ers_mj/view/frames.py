@@ -1,0 +1,94 @@
+"""Frames for the report: moments of a recording on the plant in three dimensions, measured and simulated, before and
+after.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ers_mj.diagnosis.evidence import Evidence, RecordView
+from ers_mj.errors import InputError
+from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.view.rendering import Painter, jpeg_bytes
+from ers_mj.view.replay import posed
+
+MOMENTS = 3
+APART = 0.1  # of a recording, least distance of two moments
+WIDTH, HEIGHT = 480, 360  # [pixels]
+VISIBLE = math.radians(6)  # what the largest difference is enlarged to, at least
+ENLARGED = (1, 2, 5, 10, 20, 50)
+WORTHWHILE = 4.0  # a mismatch is shown from so many times the noise
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One moment: time [s], outputs [rad], and the pictures as JPEG."""
+
+    t: float
+    measured: float
+    before: float
+    after: float
+    picture_before: bytes
+    picture_after: bytes
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The moments of a recording; differences from what was measured are drawn `enlarged` times. Empty where `why_not`
+    says why.
+    """
+
+    name: str
+    moments: tuple[Frame, ...]
+    enlarged: int = 1
+    why_not: str = ""
+
+
+def frames_of(plant: MechanicalPlant, evidence: Evidence) -> Frames | None:
+    """Where the model before does worst, on a held-out recording if there is one.
+
+    None where no picture would help: the output is no angle, or before and after do not differ beyond noise.
+    """
+    if evidence.output_unit != "rad" or not evidence.records:
+        return None
+    view = min(evidence.records, key=lambda view: not view.held_out)
+    chosen = worst_moments(view)
+    error = np.abs(view.before - view.measured)[chosen]
+    gained = np.nan_to_num(np.abs(view.before - view.after)[chosen])
+    if not chosen.size or max(gained) <= WORTHWHILE * np.nan_to_num(evidence.noise):
+        return None
+    enlarged = next((times for times in ENLARGED if times * error.max() >= VISIBLE), ENLARGED[-1])
+    try:
+        return Frames(view.name, _drawn(plant, view, chosen, enlarged), enlarged)
+    except InputError as error:
+        return Frames(view.name, (), why_not=str(error))
+
+
+def worst_moments(view: RecordView) -> np.ndarray:
+    """Samples (at most MOMENTS,), in their order, of the largest differences before, each APART from the others."""
+    left = np.abs(view.measured - view.before) + 0.0 * view.after
+    chosen = []
+    while len(chosen) < MOMENTS and np.isfinite(left).any():
+        k = int(np.nanargmax(left))
+        chosen.append(k)
+        left[np.abs(view.t - view.t[k]) < APART * (view.t[-1] - view.t[0])] = np.nan
+    return np.array(sorted(chosen), int)
+
+
+def _drawn(plant: MechanicalPlant, view: RecordView, chosen: np.ndarray, enlarged: int) -> tuple[Frame, ...]:
+    t, measured, before, after = (x[chosen] for x in (view.t, view.measured, view.before, view.after))
+    shown = np.concatenate([measured + enlarged * (x - measured) for x in (before, after)])
+    film = posed(plant, np.concatenate([t, t]), shown)
+    with Painter(film.model, WIDTH, HEIGHT) as painter:
+        pictures = [
+            jpeg_bytes(painter.draw(qpos, y))
+            for qpos, y in zip(film.qpos, np.concatenate([measured, measured]), strict=True)
+        ]
+    rows = zip(t, measured, before, after, strict=True)
+    return tuple(
+        Frame(*map(float, row), *both)
+        for row, both in zip(rows, zip(pictures[: t.size], pictures[t.size :]), strict=True)
+    )
