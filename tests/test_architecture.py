@@ -28,7 +28,7 @@ MAY_READ = {
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "commands": (
         "control", "data", "diagnosis", "errors", "experiment_design", "identification", "online", "plants", "proving", "report",
-        "selection", "servo", "validation", "view",
+        "servo", "validation", "view",
     ),
     "cli": ("commands", "errors"),
 }  # fmt: skip
