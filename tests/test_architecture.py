@@ -11,15 +11,19 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ers_mj"
 MAY_READ = {
     "errors": (),
-    "data": ("errors",),
-    "effects": ("errors",),
+    "decisions": (),
+    "solvers": (),
+    "data": ("decisions", "errors"),
+    "effects": ("decisions", "errors"),
     "plants": ("effects", "errors"),
     "servo": ("data", "effects", "errors", "plants"),
-    "estimation": ("data", "effects", "errors", "servo"),
+    "estimation": ("data", "decisions", "effects", "errors", "servo", "solvers"),
     "identification": ("data", "errors", "estimation", "plants", "servo"),
-    "selection": ("data", "effects", "estimation", "plants", "servo"),
-    "experiment_design": ("data", "effects", "errors", "estimation", "plants", "servo"),
-    "diagnosis": ("data", "effects", "estimation", "experiment_design", "plants", "selection", "servo"),
+    "selection": ("data", "decisions", "effects", "estimation", "plants", "servo", "solvers"),
+    "experiment_design": ("data", "decisions", "effects", "errors", "estimation", "plants", "servo"),
+    "diagnosis": (
+        "data", "decisions", "effects", "estimation", "experiment_design", "plants", "selection", "servo",
+    ),
     "online": ("data", "estimation", "servo"),
     "control": ("data", "effects", "errors", "plants", "servo"),
     "validation": ("plants", "servo"),
@@ -27,8 +31,8 @@ MAY_READ = {
     "proving": ("data", "errors", "plants"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "commands": (
-        "control", "data", "diagnosis", "errors", "experiment_design", "identification", "online", "plants", "proving", "report",
-        "servo", "validation", "view",
+        "control", "data", "diagnosis", "errors", "experiment_design", "identification", "online", "plants", "proving",
+        "report", "servo", "validation", "view",
     ),
     "cli": ("commands", "errors"),
 }  # fmt: skip

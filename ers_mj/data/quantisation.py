@@ -13,13 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-COARSE, FINE = (
-    1 / 300,
-    1 / 1000,
-)  # share of the travel from which a step is an effect whatever its size, and up to which an ordinary one
-ORDINARY = math.radians(
-    0.03
-)  # of a rudder's angle, the step of an ordinary converter at most: 12 bits over 120 degrees have 0.0293
 AHEAD = 0.05  # of a step, the least noise ahead of it: what a sample time, its lattice and a sensor's small errors make
 WITHIN = 0.1  # of the weight that a deviation has as noise, which it has within a step: hardly more than nothing
 STRAIGHT = 0.05  # [s] between two thresholds, up to which the way between is taken for straight

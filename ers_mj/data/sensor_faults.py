@@ -22,8 +22,8 @@ LEAP = (
     3.5,
     6.0,
     1.5,
-    # grid steps, noise levels beyond the usual change, and usual changes that the catching up after a held span must exceed
-    # at least
+    # grid steps, noise levels beyond the usual change, and usual changes that the catching up after a held span must
+    # exceed at least
 )
 LEAP_SIDES, LEAP_WAY = (
     4,
@@ -32,8 +32,8 @@ LEAP_SIDES, LEAP_WAY = (
 DITHER, COLOURED = (
     0.35,
     3.0,
-    # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may let
-    # it stay
+    # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may
+    # let it stay
 )
 FEWEST_TURNS = 5  # of the reading within NEIGHBOURS, as noise makes them and motion does not
 # steps between any two neighbouring levels, from which a lattice that all are on is chance, or a converter behind

@@ -1,6 +1,7 @@
 """Where does the refitted baseline fail? In time, angle, speed, direction, input level, frequency, and in which
 subsystem.
- The error that is located is that of a fast observer (LOCAL_RATE): it forgets within 1 / LOCAL_RATE, so that a force
+
+The error that is located is that of a fast observer (LOCAL_RATE): it forgets within 1 / LOCAL_RATE, so that a force
 that was missing shows where it was missing and not where its effect on the angle ended.
 """
 

@@ -39,6 +39,9 @@ class AsymmetricFriction(Friction):
             for a, b in ((1, 1), (1, -1))
         ]
 
+    def scaffold(self, scales, sprung):
+        return None if sprung else self.starts(scales)[0]
+
     def grown(self, name, p, scales):
         """From one difference: with half of it where motion begins."""
         return (

@@ -43,6 +43,12 @@ class SensorNonlinearity(Sensor):
         wave = amplitude * np.sin(2 * np.pi / period * y + phase) if np.isfinite(period) else 0.0
         return y + wave + (bend * y**2 if np.isfinite(bend) else 0.0) + (twist * y**3 if np.isfinite(twist) else 0.0)
 
+    def is_within(self, p, y, step):
+        error = self.measure(p, None, y) - y
+        beside = np.stack([np.ones(y.size), y], axis=1)  # an offset and a gain are no error that position can tell
+        error = error - beside @ np.linalg.lstsq(beside, error, rcond=None)[0]
+        return float(np.max(np.abs(error))) < step
+
     def behind(self, p, y):
         theta = y
         for _ in range(NEWTON):

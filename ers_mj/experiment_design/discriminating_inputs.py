@@ -16,7 +16,8 @@ import numpy as np
 from ers_mj.data.excitation import GENTLE, SHARES, Limits, excitations, signal
 from ers_mj.data.prepared import Blocks, Trace, make_trace
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import Fit, step_of
+from ers_mj.estimation.jacobian import step_of
+from ers_mj.estimation.objective import Fit
 from ers_mj.servo.model import OBSERVER_RATE, STATES, Free, Model
 
 DESIGN, DESIGN_SAMPLES = (

@@ -1,5 +1,6 @@
 """What to record next: the input, or the further channel, that would settle what the recordings at hand leave open.
- Where explanations are left, the input under which they differ most after a refit (discriminating_inputs.py); where none is, the one
+ Where explanations are left, the input under which they differ most after a refit (discriminating_inputs.py); where
+ none is, the one
 that narrows the intervals of what was named. Everything is simulated within the limits that the recordings show.
 """
 
@@ -14,7 +15,8 @@ import numpy as np
 from ers_mj.data.excitation import GENTLE, SHARES, Limits, excitations
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import Fit, step_of, tau_of
+from ers_mj.estimation.jacobian import step_of
+from ers_mj.estimation.objective import Fit, tau_of
 from ers_mj.experiment_design.discriminating_inputs import (
     CHANNELS,
     DESIGN_RATE,

@@ -22,8 +22,10 @@ import numpy as np
 from ers_mj.data.excitation import GENTLE, MARGIN, SHARES, TOP, Limits, excitations, signal
 from ers_mj.data.prepared import Channel, Trace, make_trace
 from ers_mj.errors import InputError
-from ers_mj.estimation.fit import SQUARES, descend, fit, jacobian_of, residuals, run_of
+from ers_mj.estimation.fit import SQUARES, descend, fit
+from ers_mj.estimation.jacobian import jacobian_of
 from ers_mj.estimation.known_model import model_of
+from ers_mj.estimation.objective import residuals, run_of
 from ers_mj.experiment_design.discriminating_inputs import VAGUE
 from ers_mj.plants.inputs import DURATION, INPUTS
 from ers_mj.servo.datasheet import Datasheet

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
-from ers_mj.estimation.fit import residuals
+from ers_mj.estimation.objective import residuals
 from ers_mj.identification.structure import Structure, structure_of
 from ers_mj.identification.unknowns import Unknowns
 

@@ -25,9 +25,11 @@ from ers_mj.data.prepared import Blocks, Trace, make_trace, noise_sigma
 from ers_mj.data.recording import GAP
 from ers_mj.data.sensor_faults import converter_step
 from ers_mj.estimation.baseline import baseline
-from ers_mj.estimation.fit import Run, fit, jacobian_of
+from ers_mj.estimation.fit import fit
 from ers_mj.estimation.initial_state import fitted_start, with_starts
+from ers_mj.estimation.jacobian import jacobian_of
 from ers_mj.estimation.known_model import model_of
+from ers_mj.estimation.objective import Run
 from ers_mj.servo.datasheet import LUMPED, Datasheet
 from ers_mj.servo.model import OBSERVER_RATE, Free, Model
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients, Effect
+from ers_mj.plants.effort import Effort
 from ers_mj.plants.events import simulate_kernel
 from ers_mj.plants.laws import N_PARAMETERS, rows_of
 from ers_mj.plants.tangents import NUDGE, prepare_kernel, tangent_kernel
@@ -23,28 +23,6 @@ PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = (
     60,
 )  # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on
 # a bristle, of both; of a tangent
-OVERHEAD = 20  # samples whose handling takes another microsecond
-
-
-class Effort:
-    """What has been simulated so far by this process, in the microseconds that it takes a slow core, about: a clock
-    that goes alike on every machine, whatever runs beside."""
-
-    def __init__(self):
-        self._lock, self._spent = threading.Lock(), 0
-
-    @property
-    def spent(self) -> int:
-        """[us]"""
-        return self._spent
-
-    def add(self, t: np.ndarray, per_second: int) -> None:
-        """Count a simulation of the samples at t (N,) [s] that takes so many microseconds a second."""
-        with self._lock:
-            self._spent += int((t[-1] - t[0]) * per_second) + t.size // OVERHEAD
-
-
-EFFORT = Effort()
 
 
 def lumped(values: Mapping[str, float]) -> Coefficients:
@@ -90,12 +68,13 @@ class ReducedModel:
     """Eq. (6)'s coefficients and the effects on top of them.
 
     ``effects`` is a sequence of (name, parameters (k,)); torques are carried per inertia (see effects/base.py).
-    ``supply`` is what a recording measured of it [V] (N,), or None.
+    ``supply`` is what a recording measured of it [V] (N,), or None; ``effort`` counts what is simulated with it.
     """
 
     coefficients: Coefficients
     effects: Sequence[tuple[str, np.ndarray]] = ()
     supply: np.ndarray | None = field(default=None, repr=False, compare=False)
+    effort: Effort | None = field(default=None, repr=False, compare=False)
     _lowered: tuple = field(init=False, repr=False, compare=False)
 
     def __post_init__(self):
@@ -145,7 +124,7 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         both = self.bends and self.has_motor_side
-        EFFORT.add(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on[:2, 0].any() else PLAIN)
+        self._count(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on[:2, 0].any() else PLAIN)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
         kernel = simulate_kernel
         if both:
@@ -256,7 +235,7 @@ class ReducedModel:
         read, followed, instant, out = self.read(t, theta), self.behind(y), self._is_instant, []
         maps, slopes, still = np.empty((2, 3, 5, 14)), np.zeros((t.size, 3)), np.zeros(t.size)
         prepare_kernel(t, load, path, c.copy(), on, p.copy(), maps, slopes)
-        EFFORT.add(t, TANGENT * len(others))
+        self._count(t, TANGENT * len(others))
         for other in others:
             c_2, on_2, p_2 = other._lowered
             change, added, dy = np.empty((t.size, 4)), still, still
@@ -288,6 +267,10 @@ class ReducedModel:
             change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
             out.append(change)
         return out
+
+    def _count(self, t: np.ndarray, per_second: int) -> None:
+        if self.effort is not None:
+            self.effort.add(t, per_second)
 
     def _arriving(self, t: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Mean (N,) over each uniform sample of the input that arrives at the motor: after a dead time the impulse of a
