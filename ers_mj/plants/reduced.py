@@ -9,12 +9,12 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients, Effect
+from ers_mj.plants import fixed_steps, march
 from ers_mj.plants.effort import Effort
-from ers_mj.plants.events import simulate_kernel
-from ers_mj.plants.laws import N_PARAMETERS, rows_of
-from ers_mj.plants.tangents import NUDGE, prepare_kernel, tangent_kernel
+from ers_mj.plants.laws import acting, laid_out
+from ers_mj.plants.state import N_CONSTANTS
+from ers_mj.plants.tangents import NUDGE, prepare, tangent
 
-ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
 PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = (
     150,
     400,
@@ -59,6 +59,11 @@ class Motion:
     measured: np.ndarray
 
 
+def _step(c: np.ndarray, c_2: np.ndarray) -> np.ndarray:
+    """c_2 - c, and 0 where both are the same infinity."""
+    return np.subtract(c_2, c, out=np.zeros_like(c), where=c != c_2)
+
+
 def _touches_sensor(name: str) -> bool:
     return type(BY_NAME[name]).measure is not Effect.measure
 
@@ -79,15 +84,17 @@ class ReducedModel:
 
     def __post_init__(self):
         c = self.coefficients
-        p, lawful = np.zeros((len(EFFECTS), N_PARAMETERS)), []
+        given = {}
         for name, values in self.effects:
             effect = BY_NAME[name]
             c = effect.coefficients(values, c)
             if (effect.torque or effect.friction or effect.inertia or effect.memory) and effect.is_lawful(values):
-                lawful.append(name)
-                constants = effect.constants(values, c)
-                p[ROW[name], : len(constants)] = constants
-        object.__setattr__(self, "_lowered", (np.array(c, float), rows_of(tuple(lawful), c.has_motor_side), p))
+                given[name] = effect.constants(values, c)
+        on = acting(tuple(given), c.has_motor_side)
+        p = np.zeros((len(on.rows), N_CONSTANTS))
+        for row, constants in zip(on.rows, p):
+            constants[: len(given[EFFECTS[row].name])] = given[EFFECTS[row].name]
+        object.__setattr__(self, "_lowered", (np.array(c, float), on, p))
 
     @property
     def coupled(self) -> bool:
@@ -124,28 +131,11 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         both = self.bends and self.has_motor_side
-        self._count(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on[:2, 0].any() else PLAIN)
+        self._count(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on.pushes else PLAIN)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        kernel = simulate_kernel
-        if both:
-            from ers_mj.plants.fixed_steps import (
-                simulate_kernel as kernel,
-            )  # here alone: it takes seconds to compile and is seldom needed
-        kernel(
-            t,
-            self.terminal(u),
-            enable,
-            load,
-            t if y is None else y,
-            gain,
-            every,
-            c.copy(),
-            on,
-            p.copy(),
-            refine,
-            x0,
-            out,
-        )
+        followed = t if y is None else y
+        run = fixed_steps.simulate if both else march.simulate
+        run(t, self.terminal(u), enable, load, followed, gain, every, laid_out(c, on, p), refine, x0, out)
         return out
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
@@ -233,36 +223,20 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         theta, y, arriving = path[:, 0], t if y is None else y, self._arriving(t, u)
         read, followed, instant, out = self.read(t, theta), self.behind(y), self._is_instant, []
-        maps, slopes, still = np.empty((2, 3, 5, 14)), np.zeros((t.size, 3)), np.zeros(t.size)
-        prepare_kernel(t, load, path, c.copy(), on, p.copy(), maps, slopes)
+        maps, slopes, still = np.empty((6, 5, 17)), np.zeros((t.size, 3)), np.zeros(t.size)
+        prepare(t, load, path, laid_out(c, on, p), maps, slopes)
         self._count(t, TANGENT * len(others))
         for other in others:
             c_2, on_2, p_2 = other._lowered
+            dc, differ = laid_out(_step(c, c_2) * scale, acting((), False), p[:0]), on != on_2 or bool((p != p_2).any())
             change, added, dy = np.empty((t.size, 4)), still, still
             if self._touches_reading or other._touches_reading:
                 added = (other.read(t, theta) - read) * scale
                 dy = (other.behind(y) - followed) * scale if instant else -added
-            tangent_kernel(
-                t,
-                arriving,
-                (other._arriving(t, u) - arriving) * scale,
-                enable,
-                load,
-                followed if instant else y,
-                dy,
-                path,
-                maps,
-                slopes,
-                gain,
-                every,
-                c.copy(),
-                on,
-                p.copy(),
-                c_2,
-                on_2,
-                p_2.copy(),
-                scale,
-                change,
+            du, here = (other._arriving(t, u) - arriving) * scale, followed if instant else y
+            plants = laid_out(c, on, p), laid_out(c_2, on_2, p_2)
+            tangent(
+                t, arriving, du, enable, load, here, dy, path, maps, slopes, gain, every, *plants, dc, differ, scale, change
             )
             change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
             out.append(change)
