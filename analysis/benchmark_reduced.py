@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from ers_mj.effects import EFFECTS, Scales  # noqa: E402
-from ers_mj.plants.inputs import INPUTS  # noqa: E402
-from ers_mj.plants.reduced import ReducedModel, lumped  # noqa: E402
-from ers_mj.proving import quick  # noqa: E402
-from ers_mj.servo.datasheet import read_datasheet  # noqa: E402
+from ers_mj.effects import EFFECTS, Scales
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.proving import quick
+from ers_mj.servo.datasheet import read_datasheet
 
 T = np.arange(0.0, 10.0, 1e-3)
 SHEET = read_datasheet("table1")

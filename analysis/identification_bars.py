@@ -121,7 +121,7 @@ def many(title: str, sheet: Datasheet, duration: float, sets: int, seed: int) ->
         cramer_rao(sheet, t, u),
         {k: [] for k in known},
         {k: [] for k in known},
-        {k: 0 for k in known},
+        dict.fromkeys(known, 0),
     )
     begin = time.process_time()
     for k in range(sets):

@@ -80,7 +80,7 @@ class Trace:
     def part(self, begin: int, end: int) -> Trace:
         """Samples begin..end as a trace of their own."""
         cut = slice(begin, end)
-        pick = lambda a: None if a is None else a[cut]  # noqa: E731
+        pick = lambda a: None if a is None else a[cut]
         made = make_trace(
             self.name,
             self.t[cut],
@@ -104,7 +104,7 @@ class Trace:
         if stride <= 1:
             return self
         some, begins = slice(None, None, stride), np.arange(0, self.t.size, stride)
-        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])  # noqa: E731
+        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])
         mean = np.add.reduceat(self.u, begins) / np.diff(np.append(begins, self.t.size))
         block = self.block[some]
         return replace(

@@ -205,13 +205,13 @@ def march(plant, u_in, target, c, closed, dt, substeps, noise, stuck, spike, gai
     ring = np.full(window, p.theta_0)
     before = int(round(stand / h))
     step = -before
-    for s in range(before):
+    for _ in range(before):
         advance(p, y, step * h, 0.0, 1.0, h, work)
         step += 1
         ring[step % window] = y[TH]
     for k in range(samples):
         take(p, y, k, out, ring, step, late, noise, stuck, spike, c, memory, target, u_in, closed, dt, printed)
-        for s in range(substeps):
+        for _ in range(substeps):
             told = (step - delay) // substeps
             advance(p, y, step * h, out[3, told] if told >= 0 else 0.0, gain[k], h, work)
             step += 1
