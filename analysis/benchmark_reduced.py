@@ -58,9 +58,8 @@ def main():
     for effect in EFFECTS:
         for start in effect.starts(SCALES)[:1]:
             model = ReducedModel(base.coefficients, [(effect.name, start)])
-            print(
-                f"{effect.name:34}{milliseconds(model, u):8.3f}{worst(model.simulate(T, u).theta, model.simulate(T, u, refine=10).theta):14.1e}"
-            )
+            off = worst(model.simulate(T, u).theta, model.simulate(T, u, refine=10).theta)
+            print(f"{effect.name:34}{milliseconds(model, u):8.3f}{off:14.1e}")
 
 
 if __name__ == "__main__":
