@@ -8,7 +8,7 @@ import pytest
 
 from ers_mj.commands.diagnose import _input_table
 from ers_mj.data.excitation import SHARES, WAVES, Limits, excitations, signal
-from ers_mj.data.prepared import make_trace, trace_of
+from ers_mj.data.prepared import Signals, make_trace, trace_of
 from ers_mj.data.recording import from_arrays
 from ers_mj.estimation.baseline import baseline
 from ers_mj.estimation.fit import descend, fit
@@ -155,7 +155,7 @@ def test_what_is_advised_settles_it(late):
         y = fits[true].model.plant().theta(t, u, (advice["excitation"]["start"], 0.0)) + NOISE * np.random.default_rng(
             9
         ).standard_normal(t.size)
-        new = make_trace("next", t, u, y, np.ones(t.size, bool), None, None, traces[0].sigma, 0.0)
+        new = make_trace("next", Signals(t, u, y, np.ones(t.size, bool)), traces[0].sigma)
         both = [*traces, *with_starts(fits[true].model, [new])]
         again = {name: fit(found.model, both, steps=15) for name, found in fits.items()}
         won = again[wrong].cost - again[true].cost

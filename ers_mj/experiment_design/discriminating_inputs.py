@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.excitation import GENTLE, SHARES, Limits, excitations, signal
-from ers_mj.data.prepared import Blocks, Trace, make_trace
+from ers_mj.data.prepared import Blocks, Signals, Trace, make_trace
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import Fit, step_of
 from ers_mj.servo.model import OBSERVER_RATE, STATES, Free, Model
@@ -113,18 +113,7 @@ class Bench:
     def trace(self, excitation: Mapping, duration: float, rate: float) -> Trace:
         """An empty recording of an excitation."""
         t, u = signal({**excitation, "duration_s": duration, "rate_hz": min(rate, excitation["rate_hz"])})
-        return make_trace(
-            "next",
-            t,
-            u,
-            np.zeros(t.size),
-            np.ones(t.size, bool),
-            None,
-            None,
-            self.sigma,
-            0.0,
-            (excitation["start"], 0.0),
-        )
+        return make_trace("next", Signals.empty(t, u), self.sigma, start=(excitation["start"], 0.0))
 
     def filled(self, model: Model, trace: Trace) -> Trace | None:
         """The recording as the model would make it, without noise; None where the motion leaves the limits."""
@@ -170,10 +159,7 @@ class Bench:
         motion = plant.outputs(trace.t, trace.u, **run)[1]
         theta, drive, theta_m, supply = motion[:, 0], motion[:, 2], motion[:, 3], np.ones(trace.t.size)
         for name, values in plant.effects:
-            if name == "supply_sag":
-                supply = BY_NAME[name].winding(values, plant.coefficients, trace.t, motion, drive) / np.where(
-                    drive == 0.0, 1.0, drive
-                )
+            supply = supply * BY_NAME[name].supply_left(values, plant.coefficients, trace.t, motion, drive)
         return {
             "i_A": plant.current(trace.t, motion),
             "theta_m_rad": theta_m if plant.coupled else theta,

@@ -19,8 +19,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ers_mj.data.excitation import GENTLE, MARGIN, SHARES, TOP, Limits, excitations, signal
-from ers_mj.data.prepared import Channel, Trace, make_trace
+from ers_mj.data.excitation import ASKING, GENTLE, SHARES, Limits, excitations, signal
+from ers_mj.data.prepared import Channel, Signals, Trace, make_trace
 from ers_mj.errors import InputError
 from ers_mj.estimation.fit import SQUARES, descend, fit, jacobian_of, residuals, run_of
 from ers_mj.estimation.known_model import model_of
@@ -94,7 +94,7 @@ class Rig:
         current_sigma: float | None = None,
     ) -> Rig:
         """A rig that bears +-u_max [V] and +-travel [rad] about its home."""
-        inside = travel / (1 + 2 * MARGIN)
+        inside = travel / (1 + 2 * ASKING.margin)
         return Rig(Limits(-u_max, u_max, home - inside, home + inside, rate_hz, duration, home), sigma, current_sigma)
 
     @property
@@ -437,7 +437,7 @@ def _neighbours(excitation: Mapping, limits: Limits) -> Iterator[dict]:
             elif key == "sines":
                 new = max(round(new), 2)
             elif key.endswith("_hz"):
-                new = min(max(new, 1.0 / limits.duration), TOP * limits.rate_hz)
+                new = min(max(new, 1.0 / limits.duration), ASKING.top * limits.rate_hz)
             else:
                 new = min(max(new, 4.0 / limits.rate_hz), limits.duration)
             changed = {**excitation, key: new}
@@ -487,5 +487,5 @@ def _inverse(information: np.ndarray) -> np.ndarray:
 
 def _empty(rig: Rig, u: np.ndarray) -> Trace:
     t = rig.t
-    trace = make_trace("plan", t, u, np.zeros(t.size), np.ones(t.size, bool), None, None, rig.sigma, 0.0)
+    trace = make_trace("plan", Signals.empty(t, u), rig.sigma)
     return replace(trace, start=(rig.limits.start, 0.0))
