@@ -106,8 +106,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Design, write, tell; 0."""
     out = checked_out(arguments)
-    from ers_mj.data.checks import LIMITS
-    from ers_mj.data.recording import write_recording
+    from ers_mj.data.recording import FEWEST_SAMPLES, write_recording
     from ers_mj.experiment_design.optimal_input import Question, Rig, planned, reference
     from ers_mj.plants.inputs import INPUTS
     from ers_mj.servo.datasheet import read_datasheet
@@ -115,10 +114,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.against not in INPUTS:
         raise InputError(f"--against: there is no input {arguments.against[:40]!r}; there are {', '.join(INPUTS)}")
     samples = arguments.duration_s * arguments.rate_hz
-    if not LIMITS.fewest_samples <= samples <= MOST_SAMPLES:
+    if not FEWEST_SAMPLES <= samples <= MOST_SAMPLES:
         raise InputError(
-            f"{arguments.duration_s:g} s at {arguments.rate_hz:g} Hz are {samples:.3g} samples, "
-            f"{LIMITS.fewest_samples} to"
+            f"{arguments.duration_s:g} s at {arguments.rate_hz:g} Hz are {samples:.3g} samples, {FEWEST_SAMPLES} to"
             f" {MOST_SAMPLES} were expected"
         )
     datasheet = read_datasheet(arguments.model)

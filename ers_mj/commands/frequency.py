@@ -165,10 +165,10 @@ def run(arguments: argparse.Namespace) -> int:
 def _conditions(arguments: argparse.Namespace, datasheet: Datasheet) -> Conditions:
     from ers_mj.control.controllers import parse_gains, parse_pid
     from ers_mj.control.trial import Conditions
-    from ers_mj.servo.simulation import delayed, parse_effect
+    from ers_mj.servo.simulation import parse_effect
 
     effects = [parse_effect(text) for text in arguments.effect]
-    effects += [delayed(1e-3 * arguments.delay_ms)] if arguments.delay_ms else []
+    effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
     rest = datasheet.to_lumped().get("theta_0", 0.0)
     return Conditions(
         amplitude=math.radians(arguments.amplitude_deg),

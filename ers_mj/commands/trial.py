@@ -242,11 +242,11 @@ def _refuse_cases(arguments: argparse.Namespace) -> None:
 def _conditions(arguments: argparse.Namespace) -> Conditions:
     from ers_mj.control.controllers import parse_gains, parse_pid
     from ers_mj.control.trial import Conditions
-    from ers_mj.servo.simulation import counting, delayed, parse_effect
+    from ers_mj.servo.simulation import parse_effect
 
     effects = [parse_effect(text) for text in arguments.effect]
-    effects += [delayed(1e-3 * arguments.delay_ms)] if arguments.delay_ms else []
-    effects += [counting(math.radians(arguments.quantum_deg))] if arguments.quantum_deg else []
+    effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
+    effects += [("sensor_quantisation", {"step": math.radians(arguments.quantum_deg)})] if arguments.quantum_deg else []
     return Conditions(
         amplitude=math.radians(arguments.amplitude_deg),
         start=math.radians(arguments.start_deg),

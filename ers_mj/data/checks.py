@@ -10,11 +10,13 @@ from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
 
 
+FEWEST_SAMPLES = 100
+
+
 @dataclass(frozen=True)
 class Limits:
     """From where on a recording is refused, or something of it told."""
 
-    fewest_samples: int = 100
     most_missing: float = 0.20  # share of a column: a required one is refused, another one not used
     gap: float = 3.0  # median steps of time, from which a longer one is a gap
     least_jitter: float = 0.01  # rms share of the step from which jitter is worth a sentence
@@ -45,8 +47,8 @@ def checked(values: dict[str, np.ndarray], labels: dict[str, str], name: str) ->
 def _refuse_length(x: np.ndarray, label: str, count: int, name: str) -> None:
     if len(x) != count:
         raise InputError(f"{name}: {label} has {len(x)} samples, the time has {count}")
-    if count < LIMITS.fewest_samples:
-        raise InputError(f"{name}: has {count} samples, at least {LIMITS.fewest_samples} are needed")
+    if count < FEWEST_SAMPLES:
+        raise InputError(f"{name}: has {count} samples, at least {FEWEST_SAMPLES} are needed")
 
 
 def _refuse_infinite(x: np.ndarray, label: str, name: str) -> None:
