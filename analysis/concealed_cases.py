@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from ers_mj.proving.catalogue import CATALOGUE, LISTED, OUTSIDE  # noqa: E402
-from ers_mj.proving.plant import DEG, TABLE_1  # noqa: E402
-from ers_mj.proving.quick import FINE, simulate  # noqa: E402
-from ers_mj.proving.servo import draw_servo  # noqa: E402
-from ers_mj.proving.sizing import ALIKE, pooled, refit, sizes, step_for  # noqa: E402
+from ers_mj.proving.catalogue import CATALOGUE, LISTED, OUTSIDE
+from ers_mj.proving.plant import DEG, TABLE_1
+from ers_mj.proving.quick import FINE, simulate
+from ers_mj.proving.servo import draw_servo
+from ers_mj.proving.sizing import ALIKE, pooled, refit, sizes, step_for
 
 FIRST = (
     "asymmetric_friction",

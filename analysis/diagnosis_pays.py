@@ -75,7 +75,7 @@ def tuned(model: Datasheet, seed: int) -> tuple[PidGains, float]:
     first = np.array(error(model, "reduced", model, PidGains(), LOOP.filter_s, seed))
     score = lambda x: float(
         np.sum(np.array(error(model, "reduced", model, PidGains(P=x[0], D=x[1]), x[2], seed)) / first)
-    )  # noqa: E731
+    )
     best = min(product(P, D, FILTERS), key=score)
     return PidGains(P=best[0], D=best[1]), best[2]
 

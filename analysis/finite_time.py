@@ -82,7 +82,7 @@ def main() -> None:
                     V = np.array([lyapunov(Gains(q=q), *x) for x in rows[::EVERY, 1:]])
                     growth = np.diff(V) / V[0]
                     print(
-                        f"  {str(q):>6} {start:12g} {1e3 * within(rows, 0.1):12.1f} {1e3 * within(rows, 0.005):13.1f}"
+                        f"  {q!s:>6} {start:12g} {1e3 * within(rows, 0.1):12.1f} {1e3 * within(rows, 0.005):13.1f}"
                         f" {np.mean(growth > GROWTH):13.1%} {max(growth.max(), 0):11.2g}"
                     )
                     portrait.plot(np.degrees(rows[:, 2]), np.degrees(rows[:, 3]), color=colour, linewidth=1.1)

@@ -34,7 +34,7 @@ print(start, time.process_time() - start, file=sys.stderr)
 
 def timed(record: Path, out: Path, options: list[str]) -> tuple[float, float]:
     """(start [s], identification [s]) of one call."""
-    one = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
+    one = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
     ran = subprocess.run(
         [sys.executable, "-c", TIMED, "identify", str(record), *options, "--jobs", "1", "--out", str(out), "--force"],
         capture_output=True,

@@ -91,7 +91,7 @@ def main() -> None:
                 )
                 continue
             after = _after(fits, traces, recorded(values, effect, *signal(advice["excitation"]), "advised", rng))
-            others = [n for n in advice["checked"]["against"]] + [leader]
+            others = list(advice["checked"]["against"]) + [leader]
             promised = min(c["cost"] for c in advice["checked"]["against"].values())
             found = min(after[n].cost - fits[n].cost for n in others if n != true) - (
                 after[true].cost - fits[true].cost

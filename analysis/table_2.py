@@ -142,7 +142,8 @@ def main() -> None:
         reached = [[run.evaluations_to(level) for run in runs[method]] for level in LEVELS]
         cells = "".join(f"{_reached(found):>16}" for found in reached)
         print(
-            f"{method:12}{np.median(value):16.1e}{value.min():10.1e}{value.max():10.1e}{cells}{np.mean([spent for _, spent in ended]):11.1f}",
+            f"{method:12}{np.median(value):16.1e}{value.min():10.1e}{value.max():10.1e}{cells}"
+            f"{np.mean([spent for _, spent in ended]):11.1f}",
             flush=True,
         )
     print(

@@ -12,6 +12,7 @@ over processor time, of one core.
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import time
 from dataclasses import replace
@@ -62,7 +63,7 @@ def changed(sheet: Datasheet, factor: float) -> Datasheet:
 
 def flags(found: list[Estimate]) -> int:
     """Times that the flag rose."""
-    return sum(b.flag and not a.flag for a, b in zip(found, found[1:])) + found[0].flag
+    return sum(b.flag and not a.flag for a, b in itertools.pairwise(found)) + found[0].flag
 
 
 def steps(plant: str, count: int, spread: float, random: np.random.Generator) -> None:
@@ -126,12 +127,12 @@ def nothing(
 def drifting(spread: float, random: np.random.Generator) -> None:
     """F_c swings by 30 % with a period of 60 s, in parts of 0.1 s."""
     sheet = servo(spread, random)
-    share = lambda t: 1 + 0.3 * np.sin(2 * np.pi * t / 60)  # noqa: E731
+    share = lambda t: 1 + 0.3 * np.sin(2 * np.pi * t / 60)
     found, speed = watched(
         *stream([(0.1, changed(sheet, share(k / 10)), 0.0) for k in range(1200)], "reduced", NOISE, random)
     )
     c_2 = sheet.to_lumped()["c_2"]
-    at = lambda lag: [e.values["c_2"] / c_2 - share(e.t - lag) for e in found if e.t > 5]  # noqa: E731
+    at = lambda lag: [e.values["c_2"] / c_2 - share(e.t - lag) for e in found if e.t > 5]
     lags = np.arange(0, 3, 0.1)
     left = [np.sqrt(np.mean(np.square(at(lag)))) for lag in lags]
     print(

@@ -27,8 +27,8 @@ MAY_READ = {
     "proving": ("data", "errors", "plants"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "commands": (
-        "control", "data", "diagnosis", "errors", "experiment_design", "identification", "online", "plants", "proving", "report",
-        "servo", "validation", "view",
+        "control", "data", "diagnosis", "errors", "experiment_design", "identification", "online", "plants", "proving",
+        "report", "servo", "validation", "view",
     ),
     "cli": ("commands", "errors"),
 }  # fmt: skip

@@ -237,7 +237,7 @@ def test_a_gain_beyond_the_margin_is_unstable_in_the_loop_too():
         f_hz,
         linear.response(f_hz),
         pid_by_hand(f_hz, RATE, PidGains(*(factor * x for x in (5, 1.2, 0.1)))),
-    )  # noqa: E731
+    )
     limit = at(1.0).gain_range[1]
     for factor, holds in ((0.85 * limit, True), (1.2 * limit, False)):
         assert at(factor).stable is holds
@@ -253,7 +253,7 @@ def test_a_gain_beyond_the_margin_is_unstable_in_the_loop_too():
 def test_the_cycle_of_a_relay_is_the_textbooks():
     """1/G + N = 0 with N = 4/(pi E) and G = K/(s (s/p + 1)^2): w = p, E = 2 K/(pi p); and it lasts."""
     K, p = 5.0, 2 * math.pi * 20.0
-    s = lambda f: 2j * math.pi * f  # noqa: E731
+    s = lambda f: 2j * math.pi * f
     (found,) = balanced(lambda f, E: s(f) * (s(f) / p + 1) ** 2 / K + 4 / (math.pi * E))
     assert (
         found.f_hz == pytest.approx(20.0, rel=1e-6)

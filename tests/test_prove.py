@@ -270,9 +270,8 @@ def test_another_proof_in_the_folder_is_refused_and_forced(tmp_path, asked):
 
 
 def test_a_folder_in_which_another_run_is_at_work_is_refused(tmp_path, asked):
-    with sealing.held(tmp_path / "p"):
-        with pytest.raises(InputError, match="another `ers prove` is at work"):
-            conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
+    with sealing.held(tmp_path / "p"), pytest.raises(InputError, match="another `ers prove` is at work"):
+        conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
     assert not any((tmp_path / "p").iterdir())
     conduct.conduct(tmp_path / "p", TASKS, SETTINGS)  # let go of, it is free again
 
@@ -331,7 +330,7 @@ def truth_and_answer(
     verdict="missing_physics",
     where="load",
     alternatives=(),
-    each={},
+    each=None,
 ):
     truth = {
         "case": "case-001",
@@ -341,7 +340,7 @@ def truth_and_answer(
         "linkage": "constant",
         "effects": [
             {"label": label, "strength": None, "shape": {}, "quick_visibility_sigma": sigma}
-            for label, sigma in each.items()
+            for label, sigma in (each or {}).items()
         ],
     }
     missing = [

@@ -107,7 +107,7 @@ def test_each_output_is_converted(tmp_path, columns, name, factor, unit):
 
 def test_optional_columns_are_taken_and_foreign_ones_told(tmp_path, columns):
     optional = ["omega_rad_s", "i_A", "theta_m_rad", "vin_V", "T_L_Nm", "temp_C", "theta_ref_deg"]
-    more = {name: columns["u_V"] for name in optional} | {"torque_enable": columns["t_s"] > 0.1}
+    more = dict.fromkeys(optional, columns["u_V"]) | {"torque_enable": columns["t_s"] > 0.1}
     more = {name: np.asarray(x, float) for name, x in more.items()} | {"F_N": columns["u_V"]}
     record = read_recording(put(tmp_path, csv_text(columns | more)))
     for field in ("omega", "current", "theta_m", "vin", "load", "temperature"):
@@ -540,7 +540,7 @@ def test_the_servo_on_a_bus_and_its_columns():
     assert record.name == "runs.parquet#run=17"
     assert record.omega is not None and record.vin is not None and record.enable.dtype == bool
     assert problem(record, "ignored").endswith(": duty, i_slow_mA")
-    with pytest.raises(InputError, match="the runs are 0, 1, .* 959 \\(960 in all\\)"):
+    with pytest.raises(InputError, match=r"the runs are 0, 1, .* 959 \(960 in all\\)"):
         read_recording(shared("data/sts3215/runs.parquet#run=960"))
 
 

@@ -73,7 +73,7 @@ def m_3(gains: Gains) -> float:
         gains.k_1,
         gains.l,
         gains.gamma,
-    )  # noqa: E741  the paper's letter
+    )
     two, (M_1, M_2, M_3) = 2.0 ** (2.0 - 2.0 * q), products(gains)
     return (
         l * gains.k_3
@@ -189,7 +189,7 @@ def freed(gains: Gains, seed: int = 0) -> Gains:
     """The same q and k with those l and gamma that leave the smallest of m_1/k_1, m_2/k_2 and m_3/(l k_3) largest."""
 
     def with_(z: np.ndarray) -> Gains:
-        l, *gamma = np.exp(np.clip(z, -40.0, 20.0)).tolist()  # noqa: E741
+        l, *gamma = np.exp(np.clip(z, -40.0, 20.0)).tolist()
         return replace(gains, l=l, gamma=tuple(gamma))
 
     def worst(z: np.ndarray) -> float:

@@ -85,7 +85,7 @@ def scattered(
     Effects beside the datasheet's are scattered alike. An effect without a size of its own is scattered in its first
     parameter, within its bounds.
     """
-    factor = lambda: float(spread ** random.uniform(-1.0, 1.0))  # noqa: E731
+    factor = lambda: float(spread ** random.uniform(-1.0, 1.0))
     sheet = replace(
         datasheet,
         parameters={k: x * (factor() if k in SCATTERED else 1.0) for k, x in datasheet.parameters.items()},

@@ -116,7 +116,7 @@ class Trace:
     def part(self, begin: int, end: int) -> Trace:
         """Samples begin..end as a trace of their own."""
         cut = slice(begin, end)
-        pick = lambda a: None if a is None else a[cut]  # noqa: E731
+        pick = lambda a: None if a is None else a[cut]
         kept = Signals(*(pick(a) for a in (self.t, self.u, self.y, self.valid, self.enable, self.load)))
         return replace(
             make_trace(self.name, kept, self.sigma, self.quantum),
@@ -130,7 +130,7 @@ class Trace:
         if stride <= 1:
             return self
         some, begins = slice(None, None, stride), np.arange(0, self.t.size, stride)
-        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])  # noqa: E731
+        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])
         mean = np.add.reduceat(self.u, begins) / np.diff(np.append(begins, self.t.size))
         block = self.block[some]
         return replace(

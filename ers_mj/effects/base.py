@@ -9,8 +9,9 @@ is carried as an acceleration [output unit / s^2] and only turned into N m for t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Callable, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dtbsv

@@ -174,7 +174,7 @@ class Question:
         layout = self.model.layout()
         z, rows = self.model.vector(layout), []
         for name, known in zip(self.wanted, self.known or np.ones(len(self.wanted))):
-            value = lambda z, name=name: TOLD[name][1](self.model.at(layout, z).values)  # noqa: E731
+            value = lambda z, name=name: TOLD[name][1](self.model.at(layout, z).values)
             size = known * (1.0 if name == "theta_0" else value(z))
             rows.append(
                 [

@@ -59,7 +59,7 @@ def mechanism(plant: np.ndarray, linkage: str, h: float) -> Mechanism:
     laws["k_s"] = 0.0
     laws["rod"] = float(linkage == "rod")
     model = spec.compile()
-    joint = lambda name: int(model.jnt_qposadr[model.joint(name).id])  # noqa: E731
+    joint = lambda name: int(model.jnt_qposadr[model.joint(name).id])
     places = [
         joint("rocker"),
         joint("gap") if two else -1,

@@ -5,6 +5,7 @@ An answer that failed or ran out of time counts as wrong, and as neither a flag 
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -220,7 +221,7 @@ def wilson(k: int, n: int) -> tuple[float, float]:
 def accuracy(singles: Sequence[Mapping]) -> list[dict]:
     """Right by class against visibility, in bins, with Wilson's intervals."""
     out = []
-    for low, high in zip(EDGES, EDGES[1:]):
+    for low, high in itertools.pairwise(EDGES):
         inside = [r for r in singles if low <= r["visibility"] < high]
         k = sum(map(right, inside))
         out += (
@@ -243,7 +244,7 @@ def reliability(rows: Iterable[Mapping]) -> list[dict]:
     """How often what was said with a probability was so: bins of mean probability and share that was right."""
     said = [(p, class_of(name) in {class_of(label) for label in r["labels"]}) for r in rows for name, p in r["beliefs"]]
     out = []
-    for low, high in zip(SURE, SURE[1:]):
+    for low, high in itertools.pairwise(SURE):
         inside = [(p, so) for p, so in said if low <= p < high or (high == 1.0 and p == 1.0)]
         if inside:
             k = sum(so for _, so in inside)

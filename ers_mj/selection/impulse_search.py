@@ -62,7 +62,7 @@ def knocks(
     for levels, most in (((1,), effect.tries), ((2, 1), 1)):
 
         def gain(start):
-            return gains(start)[levels[0]]
+            return gains(start)[levels[0]]  # noqa: B023
 
         best: dict[tuple, tuple[float, np.ndarray]] = {}
         for pushes in tried.values():
@@ -73,9 +73,9 @@ def knocks(
                 kind = int(start[column]), start[0] > 0, start[2]
                 best[kind] = max(best.get(kind, (0.0, start)), (won, start), key=lambda found: found[0])
         likely = [start for won, start in sorted(best.values(), key=lambda found: -found[0])[:most] if won > 0]
-        for start in (form for start in likely for form in (start, *effect.grown(effect.name, start, place.scales))):
+        for start in (form for push in likely for form in (push, *effect.grown(effect.name, push, place.scales))):
             for level in levels:
-                start = _nearer(lambda p: gains(p)[level], effect, start)
+                start = _nearer(lambda p: gains(p)[level], effect, start)  # noqa: B023
             nearer.append(start)
     return [
         (2.0 * won / float(target @ target), place.with_effect(effect.name, start))

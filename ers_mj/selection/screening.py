@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -384,7 +385,7 @@ def _shares(
     """
     root, basis, residual = target
     weighted = root * changes
-    spans = [slice(a, b) for a, b in zip(ends, ends[1:])]
+    spans = [slice(a, b) for a, b in itertools.pairwise(ends)]
     known = np.stack([weighted[:, s] @ basis[s] for s in spans], axis=1)
     pulls = -np.stack([weighted[:, s] @ residual[s] for s in spans], axis=1)
     shares, multiples = np.zeros(len(changes) // waves), np.zeros((len(changes) // waves, len(spans), waves))

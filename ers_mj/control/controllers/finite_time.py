@@ -29,7 +29,7 @@ class Gains:
     k_1: float = 0.25
     k_2: float = 38.0
     k_3: float = 400.0
-    l: float = 0.00019  # noqa: E741  the paper's letter
+    l: float = 0.00019
     gamma: tuple[float, ...] = (0.03, 1.0, 20.0, 1.0, 15.0, 10.0, 54.0)
 
     def __post_init__(self):

@@ -130,12 +130,12 @@ def balanced(residual: Callable[[float, float], complex], to_hz: float = TO_HZ) 
     f_hz, E = np.geomspace(FROM_HZ, to_hz, LOOKED_HZ), np.geomspace(LEAST, MOST, LOOKED_E)
     R = np.array([[residual(f, e) for e in E] for f in f_hz])
     ends = np.log([[f_hz[0], E[0]], [f_hz[-1], E[-1]]])
-    at = lambda z: residual(*np.exp(np.clip(z, *ends)).tolist())  # noqa: E731
+    at = lambda z: residual(*np.exp(np.clip(z, *ends)).tolist())
     found: list[Cycle] = []
     for i, j in np.argwhere(_turns(R.real) & _turns(R.imag)):
         start = np.log([math.sqrt(f_hz[i] * f_hz[i + 1]), math.sqrt(E[j] * E[j + 1])])
         size = abs(R[i, j])
-        solved = root(lambda z: [at(z).real / size, at(z).imag / size], start, tol=1e-10)
+        solved = root(lambda z: [at(z).real / size, at(z).imag / size], start, tol=1e-10)  # noqa: B023
         f, e = np.exp(np.clip(solved.x, *ends)).tolist()
         inside = bool((ends[0] < solved.x).all() and (solved.x < ends[1]).all())
         if (

@@ -7,6 +7,7 @@ differences, ``stages``, easier objectives to go through first, ``draw(random)``
 
 from __future__ import annotations
 
+import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -133,10 +134,8 @@ class Minimiser(ABC):
             )
         meter = Meter(objective, lower, upper, budget)
         cube = None if start is None else np.clip((np.asarray(start, float) - lower) / meter.width, 0.0, 1.0)
-        try:
+        with contextlib.suppress(Spent):
             self._search(meter, np.random.default_rng(seed), cube)
-        except Spent:
-            pass
         return meter.minimum()
 
     @abstractmethod
