@@ -13,8 +13,10 @@ from ers_mj.data.recording import from_arrays
 from ers_mj.estimation.baseline import baseline
 from ers_mj.estimation.fit import descend, fit
 from ers_mj.estimation.initial_state import with_starts
-from ers_mj.experiment_design.discriminating_inputs import SETTLED, drawn
-from ers_mj.experiment_design.next_recording import _said, _widened, next_recording
+from ers_mj.experiment_design.discriminating_inputs import SETTLED
+from ers_mj.experiment_design.next_recording import next_recording
+from ers_mj.experiment_design.refits import drawn
+from ers_mj.experiment_design.wording import said, widened
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.posterior import isolability, probabilities
@@ -184,7 +186,7 @@ def test_a_wider_travel_is_told_with_what_to_record_there():
             "rate_hz": 500.0,
         },
     )
-    told = _widened(
+    told = widened(
         "backlash",
         ["shaft_compliance", "gravity_imbalance"],
         {"shaft_compliance": found},
@@ -227,7 +229,7 @@ def test_the_input_is_written_as_a_table(late):
 
 def test_a_richer_rival_that_further_numbers_alone_set_apart_is_told():
     told = {"backlash": {"recordings_needed": None, "channels_sigmas": {}, "rms_over_left": 0.3, "cost": 2.0 * SETTLED}}
-    (words,) = _said("shaft_compliance", told, None, {}, 50, "the noise")
+    (words,) = said("shaft_compliance", told, None, {}, 50, "the noise")
     assert "tells shaft compliance and backlash apart" in words
 
 
