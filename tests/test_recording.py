@@ -1,7 +1,6 @@
 """A recording is read whole and in SI, or refused with one sentence; nothing is passed over in silence."""
 
 import pickle
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +9,8 @@ import pyarrow.parquet
 import pytest
 
 from ers_mj.data.prepared import start_seen
-from ers_mj.data.recording import converter_step, from_arrays, read_recording, write_recording
-from ers_mj.data.sensor_faults import leapt_spans, unmoved_spans
+from ers_mj.data.recording import from_arrays, read_recording, write_recording
+from ers_mj.data.sensor_faults import converter_step, leapt_spans, unmoved_spans
 from ers_mj.errors import InputError
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -183,24 +182,14 @@ def test_a_write_that_fails_leaves_nothing_behind(tmp_path, columns):
     assert [path.name for path in tmp_path.iterdir()] == ["folder.csv"]
 
 
-def test_a_long_file_is_not_read_cell_by_cell(tmp_path):
-    """Ten times as many samples cost no more calls, of Python's or of C's."""
-
-    def calls(samples):
-        path = tmp_path / f"{samples}.csv"
-        noise = np.random.default_rng(0).normal(size=(5, samples))
-        names = ["t_s", "u_V", "theta_rad", "i_A", "omega_rad_s", "vin_V"]
-        write_recording(path, dict(zip(names, [np.arange(samples) * 1e-3, *noise], strict=True)))
-        read_recording(path)
-        made = []
-        sys.setprofile(lambda frame, event, argument: made.append(event) if event in ("call", "c_call") else None)
-        try:
-            read_recording(path)
-        finally:
-            sys.setprofile(None)
-        return len(made)
-
-    assert calls(10_000) < 1.2 * calls(1_000)
+def test_a_long_file_is_read_whole(tmp_path):
+    t = np.arange(25_000) * 1e-3
+    path = tmp_path / "long.csv"
+    noise = np.random.default_rng(0).normal(size=(5, t.size))
+    names = ["t_s", "u_V", "theta_rad", "i_A", "omega_rad_s", "vin_V"]
+    write_recording(path, dict(zip(names, [t, *noise], strict=True)))
+    recording = read_recording(path)
+    assert all(np.array_equal(x, recording.columns()[name]) for name, x in zip(names, [t, *noise], strict=True))
 
 
 # -- what is refused ------------------------------------------------------------------------------------

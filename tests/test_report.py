@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from ers_mj.data.prepared import make_trace
+from ers_mj.data.prepared import Signals, make_trace
 from ers_mj.diagnosis.evidence import Evidence, RecordView, ResidualMap, Rung
 from ers_mj.diagnosis.mismatch_spectrum import mismatch
 from ers_mj.report import diagnosis_figures as figures
@@ -312,7 +312,7 @@ def test_an_error_beyond_the_noise_is_drawn_over_frequency():
     random = np.random.default_rng(1)
     t, u = np.arange(6000) * 1e-3, random.standard_normal(6000)
     x = np.cumsum(u) * 1e-3
-    traces = [make_trace("made", t, u, x * gain, np.ones(6000, bool), None, None, 1e-5, 0.0) for gain in (1.0, 1.1)]
+    traces = [make_trace("made", Signals(t, u, x * gain, np.ones(6000, bool)), 1e-5) for gain in (1.0, 1.1)]
     told = [
         replace(evidence(), spectrum=mismatch(traces, [e, e], 1e-9))
         for e in (0.1 * x + 1e-5 * random.standard_normal(6000), 1e-5 * random.standard_normal(6000))

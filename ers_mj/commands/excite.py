@@ -12,7 +12,7 @@ from ers_mj.commands.simulate import checked_out
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.experiment_design.optimal_input import Plan, Question
+    from ers_mj.experiment_design.question import Plan, Question
 
 CRITERIA = ("A", "D")
 MOST_SAMPLES = 200_000
@@ -107,7 +107,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Design, write, tell; 0."""
     out = checked_out(arguments)
     from ers_mj.data.recording import FEWEST_SAMPLES, write_recording
-    from ers_mj.experiment_design.optimal_input import Question, Rig, planned, reference
+    from ers_mj.experiment_design.optimal_input import planned, reference
+    from ers_mj.experiment_design.question import Question, Rig
     from ers_mj.plants.inputs import INPUTS
     from ers_mj.servo.datasheet import read_datasheet
 
@@ -141,7 +142,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _document(arguments: argparse.Namespace, question: Question, before: Plan, plan: Plan) -> dict:
-    from ers_mj.experiment_design.optimal_input import TOLD
+    from ers_mj.experiment_design.question import TOLD
 
     rows = {
         name: {
@@ -169,8 +170,8 @@ def _document(arguments: argparse.Namespace, question: Question, before: Plan, p
 
 
 def _told(document: dict) -> list[str]:
-    from ers_mj.experiment_design.next_recording import asked
     from ers_mj.experiment_design.optimal_input import UNSEEN
+    from ers_mj.experiment_design.wording import asked
 
     parts = [
         (

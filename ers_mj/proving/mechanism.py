@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from ers_mj.plants.mjcf import read_mjcf
-from ers_mj.proving.laws import TABLE_1
+from ers_mj.proving.plant import TABLE_1
 
 LINKAGES = ("constant", "rod")
 ARM, ROD = 0.01417, 0.042  # [m] rocker arm and rod between its pins, as mjcf/ has them

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ers_mj.proving.catalogue import CATALOGUE, Effect
+from ers_mj.proving.catalogue import CATALOGUE
+from ers_mj.proving.concealed.base import Effect
 from ers_mj.proving.forms import draw_shape
 from ers_mj.proving.sizing import Ruler
 

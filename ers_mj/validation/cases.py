@@ -16,7 +16,7 @@ import numpy as np
 from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
 from ers_mj.plants.mechanical import simulate_many
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.simulation import build_plant, finite
+from ers_mj.servo.simulation import build_plant, finite, has_play
 
 GAPS, LINKAGES, INDUCTANCES = (0.0, float(np.radians(0.5))), ("constant", "rod"), (False, True)  # [rad] of play
 AMPLITUDES, FREQUENCIES_HZ = (
@@ -141,7 +141,7 @@ def possible(datasheet: Datasheet) -> tuple[tuple[float, ...], tuple[str, ...], 
     """
     p, left_out = datasheet.parameters, []
     gaps, linkages, inductances = GAPS, LINKAGES, INDUCTANCES
-    if _has_play(datasheet):
+    if has_play(datasheet.effects):
         gaps = (0.0,)
         left_out.append("a gap, as the model has a play of its own")
     if not all(p.get(name, 0.0) > 0.0 for name in ("J", "n", "K_t")):
@@ -151,10 +151,6 @@ def possible(datasheet: Datasheet) -> tuple[tuple[float, ...], tuple[str, ...], 
         inductances = (False,)
         left_out.append("the inductance, which needs L and R")
     return gaps, linkages, inductances, left_out
-
-
-def _has_play(datasheet: Datasheet) -> bool:
-    return any(name == "backlash" for name, _ in datasheet.effects)
 
 
 def validate(
@@ -248,7 +244,7 @@ def _maps(datasheet: Datasheet, conditions: Sequence[Condition], jobs: int, prog
     over_play = (
         any(c.gap or c.inductance for c in conditions)
         and datasheet.parameters.get("L", 0.0) > 0.0
-        and not _has_play(datasheet)
+        and not has_play(datasheet.effects)
     )
     sines = []
     for k, condition in enumerate(chosen):
