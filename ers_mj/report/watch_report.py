@@ -11,7 +11,6 @@ from ers_mj.report.display import figure
 
 MEANING = {"a_1": "spring", "a_2": "damping", "b": "drive", "c_1": "preload", "c_2": "friction", "theta_0": "home"}
 BARS = "▁▂▃▄▅▆▇█"
-LEAST_RANGE = 0.02  # share of a value that a whole line of bars spans at least
 BOLD, RED, GREEN, YELLOW, PLAIN = "\x1b[1m", "\x1b[1;31m", "\x1b[32m", "\x1b[33m", "\x1b[0m"
 
 
@@ -122,11 +121,10 @@ def screen(
 
 
 def _bars(values: Sequence[float], width: int) -> str:
+    """A line of bars, the lowest value to the highest or 2 % of a value, whichever is more."""
     values = list(values)[-max(width, 0) :]
     if not values or width <= 0:
         return ""
-    middle, span = (
-        0.5 * (max(values) + min(values)),
-        max(max(values) - min(values), LEAST_RANGE * abs(max(values, key=abs)), 1e-300),
-    )
+    middle = 0.5 * (max(values) + min(values))
+    span = max(max(values) - min(values), 0.02 * abs(max(values, key=abs)), 1e-300)
     return "".join(BARS[min(int((0.5 + (x - middle) / span) * len(BARS)), len(BARS) - 1)] for x in values)
