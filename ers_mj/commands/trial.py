@@ -196,22 +196,13 @@ def _spreads(
     progress: Progress,
 ) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
-    from ers_mj.control.monte_carlo import scatter
+    from ers_mj.control.monte_carlo import Fleet, scatter
 
     if not arguments.plants:
         return []
-    return scatter(
-        datasheet,
-        controllers,
-        arguments.plant,
-        arguments.case,
-        conditions,
-        count=arguments.plants,
-        spread=arguments.scatter,
-        design=design,
-        jobs=arguments.jobs,
-        progress=progress,
-    )
+    fleet = Fleet(datasheet, arguments.plants, arguments.scatter, design)
+    asked = controllers, arguments.plant, arguments.case
+    return scatter(fleet, *asked, conditions, jobs=arguments.jobs, progress=progress)
 
 
 def _refuse_cases(arguments: argparse.Namespace) -> None:
