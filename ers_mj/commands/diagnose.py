@@ -98,7 +98,7 @@ def input_table(excitation: dict) -> str:
     from ers_mj.data.excitation import signal
 
     column = {"%": "u_duty_pct"}.get(excitation["input_unit"], f"u_{excitation['input_unit']}")
-    return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation)))]) + "\n"
+    return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation), strict=True))]) + "\n"
 
 
 # -- the diagnosis in lines ---------------------------------------------------------------------------------------

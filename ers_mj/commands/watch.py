@@ -119,13 +119,15 @@ def _estimates(stream, pieces: Iterator[str], datasheet, show) -> Iterator[Estim
     """Estimates of a stream; the first ones once it has moved for long enough."""
     import numpy as np
 
-    from ers_mj.online.moving_horizon import OPENING, UNKNOWN_OPENING, Tracker, is_moving, opening
+    from ers_mj.online.horizon import HORIZON
+    from ers_mj.online.moving_horizon import Tracker, is_moving, opening
 
-    begun, needed, tracker = (np.zeros(0),) * 3, UNKNOWN_OPENING if datasheet is None else OPENING, None
+    begun, tracker = (np.zeros(0),) * 3, None
+    needed = HORIZON.unknown_opening if datasheet is None else HORIZON.opening
     for piece in pieces:
         samples = stream.feed(piece)
         if tracker is None:
-            begun = tuple(np.append(a, b) for a, b in zip(begun, samples))
+            begun = tuple(np.append(a, b) for a, b in zip(begun, samples, strict=True))
             if not begun[0].size or begun[0][-1] - begun[0][0] < needed or not is_moving(*begun[1:]):
                 show.wait(begun[0])
                 begun = (

@@ -103,7 +103,7 @@ def _profiles(found: Sequence[Profile], width: float) -> Figure:
     columns = min(len(found), 3 if width == STYLE.wide else 1)
     rows = math.ceil(len(found) / columns)
     figure = Figure(figsize=(width, 2.8 * rows), layout="constrained")
-    for ax, p in zip(figure.subplots(rows, columns, squeeze=False).ravel(), found):
+    for ax, p in zip(figure.subplots(rows, columns, squeeze=False).ravel(), found, strict=False):
         ax.plot(p.x, p.rise, color=STYLE.after, marker="o", markersize=3.5)
         ax.axhline(p.level, color=STYLE.faint, linewidth=0.8, linestyle=(0, (3, 3)))
         ax.set_ylim(0, 2.5 * p.level)

@@ -138,7 +138,7 @@ def _reliability(bins: Sequence[Mapping], width: float) -> Figure:
     ax.plot([0, 1], [0, 1], color=STYLE.faint, linewidth=1.0, linestyle=(0, (3, 3)))
     x, share = [b["probability"] for b in bins], [b["right"] / b["of"] for b in bins]
     ax.plot(x, share, "o-", color=STYLE.after, linewidth=1.3)
-    for b, here, p in zip(bins, share, x):
+    for b, here, p in zip(bins, share, x, strict=True):
         ax.plot([p, p], b["ci95"], color=STYLE.after, linewidth=1.2)
         left = p > 0.85
         ax.annotate(

@@ -15,7 +15,7 @@ from ers_mj.report.display import NONE
 from ers_mj.report.drawing import restart_ids
 from ers_mj.report.traces import close_up, traces
 from ers_mj.report.validity import VALID, Departure, called, degrees, departures, headline, per_cent
-from ers_mj.validation.cases import MOST_TRAVEL, Case, Validation, rms, spoken
+from ers_mj.validation.cases import GRID, Case, Validation, rms, spoken
 
 NO_EVIDENCE = Evidence((), (), None, float("nan"), "rad", "V")
 
@@ -88,7 +88,7 @@ def _departure(departure: Departure) -> str:
         drawn += page.figure(
             maps.sine_map(departure.sines, VALID),
             f"Sines of 2 s. Framed: within {100 * VALID:.0f} % of the motion. Empty: Eq. (6) would turn more than "
-            f"{np.degrees(MOST_TRAVEL):.0f}° from θ₀, or nothing moves.",
+            f"{np.degrees(GRID.most_travel):.0f}° from θ₀, or nothing moves.",
         )
     title = called(departure.condition)
     return page.section(page.text(title[0].upper() + title[1:]), "", places + drawn)

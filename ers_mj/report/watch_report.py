@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
 
-from ers_mj.online.moving_horizon import EXPLAINED, Estimate
+from ers_mj.online.horizon import HORIZON
+from ers_mj.online.moving_horizon import Estimate
 from ers_mj.report.display import figure
 
 MEANING = {"a_1": "spring", "a_2": "damping", "b": "drive", "c_1": "preload", "c_2": "friction", "theta_0": "home"}
@@ -115,7 +116,9 @@ def screen(
         half = now.spread[n] * 1.96 * (factor if n == "theta_0" else abs(now.values[n]) * factor)
         since = f"{100 * (now.values[n] / first[n] - 1):+7.1f} %" if n != "theta_0" and first.get(n) else " " * 9
         text = f"  {MEANING[n]:9}{n:8}{figure(now.values[n] * factor, 4):>9} ± {figure(half, 2):<8} {unit:10}{since}  "
-        lines.append((text + _bars([e.values[n] for e in history if e.misfit <= EXPLAINED], width - len(text)))[:width])
+        lines.append(
+            (text + _bars([e.values[n] for e in history if e.misfit <= HORIZON.explained], width - len(text)))[:width]
+        )
     said = [row for event in told for row in wrap(event, width, initial_indent="  ", subsequent_indent="      ")]
     return [*lines, "", *said, "", "  Ctrl-C ends"[:width]]
 

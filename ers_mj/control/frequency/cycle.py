@@ -154,7 +154,7 @@ def balanced(residual: Callable[[float, float], complex], to_hz: float = GRID.to
     for i, j in np.argwhere(_turns(R.real) & _turns(R.imag)):
         start = np.log([math.sqrt(f_hz[i] * f_hz[i + 1]), math.sqrt(E[j] * E[j + 1])])
         size = abs(R[i, j])
-        solved = root(lambda z: [at(z).real / size, at(z).imag / size], start, tol=1e-10)
+        solved = root(lambda z, size=size: [at(z).real / size, at(z).imag / size], start, tol=1e-10)
         f, e = np.exp(np.clip(solved.x, *ends)).tolist()
         inside = bool((ends[0] < solved.x).all() and (solved.x < ends[1]).all())
         if (
