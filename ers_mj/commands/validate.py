@@ -61,14 +61,13 @@ def run(arguments: argparse.Namespace) -> int:
     folder = results_folder(arguments.out, arguments.force, arguments.json)
     from ers_mj.report.validity import as_document
     from ers_mj.servo.datasheet import read_datasheet
-    from ers_mj.validation.cases import validate
+    from ers_mj.validation.cases import GRID, validate
 
     datasheet = read_datasheet(arguments.datasheet)
     gaps, linkages, inductances, left_out = _asked(arguments, datasheet)
     with Progress() as progress:
-        found = validate(
-            datasheet, gaps, linkages, inductances, maps=not arguments.no_maps, jobs=arguments.jobs, progress=progress
-        )
+        maps = None if arguments.no_maps else GRID
+        found = validate(datasheet, gaps, linkages, inductances, maps=maps, jobs=arguments.jobs, progress=progress)
         document = plain(
             {
                 **as_document(found),

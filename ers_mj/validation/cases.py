@@ -177,7 +177,7 @@ def validate(
     linkages: Sequence[str] = LINKAGES,
     inductances: Sequence[bool] = INDUCTANCES,
     *,
-    maps: bool = True,
+    maps: Grid | None = GRID,
     jobs: int = 0,
     duration: float = DURATION,
     progress: Progress = lambda text, fraction: None,
@@ -186,7 +186,7 @@ def validate(
 
     Args:
         datasheet: the servo; effects that it holds act in both plants.
-        maps: whether the maps are run.
+        maps: what the maps are made of; None for no maps.
         jobs: cores to use, 0 for all.
         duration: of each input [s].
         progress: told (text, fraction).
@@ -199,16 +199,16 @@ def validate(
     conditions = [Condition(*values) for values in product(gaps, linkages, inductances)]
     for condition in conditions:  # what cannot be built is refused before anything runs
         _mujoco(datasheet, condition)
-    share, cases = 1.0 - GRID.share * maps, []
+    share, cases = 1.0 - (maps.share if maps else 0.0), []
     for k, condition in enumerate(conditions):
         progress(f"simulating {spoken(condition)}", share * k / len(conditions))
         cases += _cases(datasheet, condition, t, inputs, jobs)
-    if not maps:
+    if maps is None:
         return Validation(tuple(cases), datasheet.to_lumped())
     return Validation(
         tuple(cases),
         datasheet.to_lumped(),
-        *_maps(datasheet, conditions, jobs, lambda text, x: progress(text, share + GRID.share * x)),
+        *_maps(datasheet, conditions, maps, jobs, lambda text, x: progress(text, share + maps.share * x)),
     )
 
 
@@ -256,7 +256,7 @@ def mapped(conditions: Sequence[Condition]) -> list[Condition]:
     return [c for c in single if c.gap == widest or not c.gap] or [c for c in conditions if c.departures][:1]
 
 
-def _maps(datasheet: Datasheet, conditions: Sequence[Condition], jobs: int, progress: Progress):
+def _maps(datasheet: Datasheet, conditions: Sequence[Condition], grid: Grid, jobs: int, progress: Progress):
     """(maps over sines, map over play and L or None)."""
     chosen = mapped(conditions)
     over_play = (
@@ -267,11 +267,11 @@ def _maps(datasheet: Datasheet, conditions: Sequence[Condition], jobs: int, prog
     sines = []
     for k, condition in enumerate(chosen):
         progress(f"mapping {spoken(condition)}", k / (len(chosen) + over_play))
-        sines.append(_sine_map(datasheet, condition, jobs))
+        sines.append(_sine_map(datasheet, condition, grid, jobs))
     if not over_play:
         return tuple(sines), None
     progress("mapping play and inductance", len(chosen) / (len(chosen) + 1))
-    return tuple(sines), _play_map(datasheet, jobs)
+    return tuple(sines), _play_map(datasheet, grid, jobs)
 
 
 def breakaway(lumped: Mapping[str, float]) -> float:
@@ -279,28 +279,28 @@ def breakaway(lumped: Mapping[str, float]) -> float:
     return (lumped.get("c_1", 0.0) + lumped.get("c_2", 0.0)) / abs(lumped["b"]) or 1.0
 
 
-def _sine_map(datasheet: Datasheet, condition: Condition, jobs: int) -> ValidityMap:
+def _sine_map(datasheet: Datasheet, condition: Condition, grid: Grid, jobs: int) -> ValidityMap:
     """Over amplitude [V] and frequency [Hz] of a sine; empty where Eq. (5) travels too far."""
-    t = np.arange(round(GRID.sine_s * RATE_HZ)) / RATE_HZ
-    amplitudes = tuple(float(f"{breakaway(datasheet.to_lumped()) * factor:.2g}") for factor in GRID.amplitudes)
-    cells = list(product(range(len(amplitudes)), range(len(GRID.frequencies_hz))))
-    u = np.array([amplitudes[i] * np.sin(2 * np.pi * GRID.frequencies_hz[j] * t) for i, j in cells])
+    t = np.arange(round(grid.sine_s * RATE_HZ)) / RATE_HZ
+    amplitudes = tuple(float(f"{breakaway(datasheet.to_lumped()) * factor:.2g}") for factor in grid.amplitudes)
+    cells = list(product(range(len(amplitudes)), range(len(grid.frequencies_hz))))
+    u = np.array([amplitudes[i] * np.sin(2 * np.pi * grid.frequencies_hz[j] * t) for i, j in cells])
     eq_5 = np.array([build_plant(datasheet).simulate(t, row).theta for row in u])
-    within = np.flatnonzero(np.abs(eq_5 - eq_5[:, :1]).max(axis=1) <= GRID.most_travel)
-    error, motion = np.full((2, len(amplitudes), len(GRID.frequencies_hz)), np.nan)
+    within = np.flatnonzero(np.abs(eq_5 - eq_5[:, :1]).max(axis=1) <= grid.most_travel)
+    error, motion = np.full((2, len(amplitudes), len(grid.frequencies_hz)), np.nan)
     if within.size:
         for k, run in zip(within, simulate_many([_mujoco(datasheet, condition)], t, u[within], jobs), strict=True):
             error[cells[k]], motion[cells[k]] = rms(run.theta - eq_5[k]), run.theta.std()
-    return ValidityMap(condition, amplitudes, GRID.frequencies_hz, error, motion)
+    return ValidityMap(condition, amplitudes, grid.frequencies_hz, error, motion)
 
 
-def _play_map(datasheet: Datasheet, jobs: int) -> ValidityMap:
+def _play_map(datasheet: Datasheet, grid: Grid, jobs: int) -> ValidityMap:
     """Over play [rad] and inductance [H], under the multisine."""
-    t = np.arange(round(GRID.play_s * RATE_HZ)) / RATE_HZ
+    t = np.arange(round(grid.play_s * RATE_HZ)) / RATE_HZ
     u, L = INPUTS["multisine"](t), datasheet.parameters["L"]
-    inductances = tuple(factor * L for factor in GRID.L_factors)
+    inductances = tuple(factor * L for factor in grid.L_factors)
     eq_5 = build_plant(datasheet).simulate(t, u).theta
-    gaps = tuple(np.radians(GRID.gaps_deg).tolist())
+    gaps = tuple(np.radians(grid.gaps_deg).tolist())
     plants = [
         _mujoco(replace(datasheet, parameters={**datasheet.parameters, "L": x}), Condition(gap, "constant", x > 0))
         for gap, x in product(gaps, inductances)
