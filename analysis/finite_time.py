@@ -23,12 +23,12 @@ from ers_mj.control.controllers import CONTROLLERS, Gains, Servo
 from ers_mj.control.gains import lyapunov
 from ers_mj.control.references import Reference
 from ers_mj.control.trial import sampled
-from ers_mj.report.diagnosis_figures import AFTER, BEFORE, INK, STYLE
+from ers_mj.report.style import STYLE
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.simulation import build_plant
 
 RATE, SECONDS, EVERY = 10_000.0, 0.6, 40  # [Hz], [s], samples from one value of V_3 to the next
-POWERS = ((Fraction(97, 99), AFTER), (Fraction(5, 7), "#8a6bb8"), (Fraction(1), BEFORE))
+POWERS = ((Fraction(97, 99), STYLE.after), (Fraction(5, 7), "#8a6bb8"), (Fraction(1), STYLE.before))
 STARTS_DEG = (-10.0, -5.0, 5.0, 10.0)
 GROWTH = 1e-6
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "paper" / "finite_time.png"
@@ -64,7 +64,7 @@ def main() -> None:
     """Run, tell, draw."""
     sheet = read_datasheet("table1")
     bare = replace(sheet, parameters={**sheet.parameters, "F_c": 0.0, "T_LH": 0.0})
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE.settings):
         figure = Figure(figsize=(9.8, 6.6), layout="constrained")
         for row, (name, plant, u_max) in zip(
             figure.subplots(2, 3),
@@ -91,7 +91,7 @@ def main() -> None:
                         approach.semilogy(
                             1e3 * rows[:, 0], np.maximum(np.degrees(np.abs(rows[:, 2])), 1e-8), color=colour
                         )
-            portrait.set_title(name, color=INK)
+            portrait.set_title(name, color=STYLE.ink)
             for ax, x, y in (
                 (portrait, "x2 [°]", "x3 [°/s]"),
                 (fall, "time [ms]", "V_3"),

@@ -5,7 +5,7 @@
 and over), watched from Table 1's datasheet whatever the servo is. Reduced plant and MuJoCo; servos are Table 1's with J
 B K_t K_e k_s T_LH F_c R scattered within a factor --scatter. Noise
 0.01 deg where nothing else is said. A change of F_c by 20 % counts as found from when c_2 stays within 5 % of its new
-value; a play opens to +-0.5 deg. Times are counted from the change, and show the HOP of the estimates. "x real time" is
+value; a play opens to +-0.5 deg. Times are counted from the change, and show the hop of the estimates. "x real time" is
 over processor time, of one core.
 """
 
@@ -20,7 +20,8 @@ from dataclasses import replace
 import numpy as np
 
 from ers_mj.control.monte_carlo import scattered
-from ers_mj.online.moving_horizon import OPENING, Estimate, Tracker, opening
+from ers_mj.online.horizon import HORIZON
+from ers_mj.online.moving_horizon import Estimate, Tracker, opening
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.simulation import build_plant
@@ -49,7 +50,7 @@ def stream(
 
 def watched(t: np.ndarray, u: np.ndarray, y: np.ndarray) -> tuple[list[Estimate], float]:
     """The estimates, and how many times faster than real time they came."""
-    before, head = time.process_time(), round(OPENING * RATE)
+    before, head = time.process_time(), round(HORIZON.opening * RATE)
     tracker, found = Tracker(opening(t[:head], u[:head], y[:head], read_datasheet("table1"), True)), []
     for k in range(0, t.size, 50):
         found += tracker.push(t[k : k + 50], u[k : k + 50], y[k : k + 50])

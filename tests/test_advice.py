@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ers_mj.commands.diagnose import _input_table
+from ers_mj.commands.diagnose import input_table
 from ers_mj.data.excitation import SHARES, WAVES, Limits, excitations, signal
 from ers_mj.data.prepared import Signals, make_trace, trace_of
 from ers_mj.data.recording import from_arrays
@@ -221,7 +221,7 @@ def test_without_a_rival_the_weakest_number_is_narrowed(late):
 
 def test_the_input_is_written_as_a_table(late):
     excitation = advised(late, "input_delay", "sensor_lag")["excitation"]
-    lines = _input_table(excitation).splitlines()
+    lines = input_table(excitation).splitlines()
     t, u = signal(excitation)
     assert lines[0] == "t_s,u_V" and len(lines) == t.size + 1
     assert np.allclose([float(line.split(",")[1]) for line in lines[1:]], u, rtol=1e-5, atol=1e-9)

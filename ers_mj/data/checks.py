@@ -9,7 +9,6 @@ from ers_mj.data.sensor_faults import at_extreme, decimal_grain, frozen_spans, h
 from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
 
-
 FEWEST_SAMPLES = 100
 
 
