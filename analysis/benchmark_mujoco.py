@@ -14,16 +14,16 @@ import mujoco.rollout
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-import independent_two_mass  # noqa: E402
+import independent_two_mass
 
-from ers_mj.effects import EFFECTS, Scales  # noqa: E402
-from ers_mj.plants.inputs import INPUTS  # noqa: E402
-from ers_mj.plants.mechanical import MechanicalPlant, simulate_many  # noqa: E402
-from ers_mj.plants.mjcf import mjcf_folder  # noqa: E402
-from ers_mj.plants.play import MOTOR_SHARE  # noqa: E402
-from ers_mj.plants.reduced import ReducedModel, lumped  # noqa: E402
-from ers_mj.plants.skeletons import LINKAGES  # noqa: E402
-from ers_mj.servo.datasheet import read_datasheet  # noqa: E402
+from ers_mj.effects import EFFECTS, Scales
+from ers_mj.plants.inputs import INPUTS
+from ers_mj.plants.mechanical import MechanicalPlant, simulate_many
+from ers_mj.plants.mjcf import mjcf_folder
+from ers_mj.plants.play import MOTOR_SHARE
+from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.plants.skeletons import LINKAGES
+from ers_mj.servo.datasheet import read_datasheet
 
 T = np.arange(0.0, 10.0, 1e-3)
 SHEET = read_datasheet("table1")
@@ -151,7 +151,7 @@ def speed():
         for _ in range(3):
             ours.append(_seconds(lambda: simulate_many(plants, t, u)))
             data = [mujoco.MjData(plants[0].model) for _ in range(cores)]
-            bare.append(_seconds(lambda: pool.rollout([p.model for p in plants], data, states, control)))
+            bare.append(_seconds(lambda: pool.rollout([p.model for p in plants], data, states, control)))  # noqa: B023
     steps = 32 * (t.size - 1) * 20
     print(
         f"  32 plants on {cores} cores: {steps / min(ours) / 1e3:.0f} k steps/s, bare rollout"

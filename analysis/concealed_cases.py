@@ -1,7 +1,8 @@
 """Conceal effects in an independent servo and write the recordings, in the format of the shared development cases.
 
     python analysis/concealed_cases.py --out DIR --seed 1 --cases 28 --effects first --kind single
- writes DIR/case-NNN/{datasheet.toml, rec1.csv, ...} and DIR/truth/case-NNN.json. Kinds and effects are taken in turn:
+
+writes DIR/case-NNN/{datasheet.toml, rec1.csv, ...} and DIR/truth/case-NNN.json. Kinds and effects are taken in turn:
 case i has kind number i modulo the kinds given (repeat a word to weigh it: `--kind single,single,none`), and the k-th
 single case has effect number k modulo the effects. Every case draws from its own child of the seed, so a case does not
 depend on the others or on --jobs.
@@ -16,12 +17,28 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from ers_mj.proving.catalogue import CATALOGUE, FIRST, LISTED, OUTSIDE  # noqa: E402
-from ers_mj.proving.laws import DEG, TABLE_1  # noqa: E402
-from ers_mj.proving.quick import FINE, simulate  # noqa: E402
-from ers_mj.proving.servo import draw_servo  # noqa: E402
-from ers_mj.proving.sizing import ALIKE, pooled, refit, sizes, step_for  # noqa: E402
+from ers_mj.proving.catalogue import CATALOGUE, LISTED, OUTSIDE
+from ers_mj.proving.plant import DEG, TABLE_1
+from ers_mj.proving.quick import FINE, simulate
+from ers_mj.proving.servo import draw_servo
+from ers_mj.proving.sizing import ALIKE, pooled, refit, sizes, step_for
 
+FIRST = (
+    "asymmetric_friction",
+    "bias_torque",
+    "stribeck",
+    "load_dependent_friction",
+    "quadratic_drag",
+    "backlash",
+    "voltage_saturation",
+    "drive_dead_zone",
+    "input_delay",
+    "inductance",
+    "gravity_imbalance",
+    "hinge_moment_cubic",
+    "end_stop",
+    "sensor_quantisation",
+)
 KINDS = ("single", "none", "pair", "outside")
 
 

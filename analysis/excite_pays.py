@@ -17,7 +17,8 @@ from itertools import repeat
 
 import numpy as np
 
-from ers_mj.experiment_design.optimal_input import Question, Rig, planned, reference
+from ers_mj.experiment_design.optimal_input import planned, reference
+from ers_mj.experiment_design.question import Question, Rig
 from ers_mj.servo.datasheet import read_datasheet
 
 CURRENT = 0.02  # [A]

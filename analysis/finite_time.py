@@ -1,5 +1,6 @@
 """Is it finite time? Phase portraits, V_3 along them, and the approach to rest: `python analysis/finite_time.py`.
- The loop of `ftrc` around Eq. (5) at 10 kHz, let go at several distances, with q = 97/99 (the paper's), q = 5/7 (far
+
+The loop of `ftrc` around Eq. (5) at 10 kHz, let go at several distances, with q = 97/99 (the paper's), q = 5/7 (far
 from 1, so that finite time shows) and q = 1 (the same law made linear), otherwise Eq. (40)'s gains. Two plants: Eq. (5)
 as it is, and one without friction, preload and voltage limit, which is the double integrator of the proof. V_3 is Eq.
 (24)'s with x1 as the controller has it. Printed: the time to come within 0.1 and 0.005 of the start for good, the share
@@ -23,12 +24,12 @@ from ers_mj.control.controllers import CONTROLLERS, Gains, Servo
 from ers_mj.control.gains import lyapunov
 from ers_mj.control.references import Reference
 from ers_mj.control.trial import sampled
-from ers_mj.report.diagnosis_figures import AFTER, BEFORE, INK, STYLE
+from ers_mj.report.style import STYLE
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.simulation import build_plant
 
 RATE, SECONDS, EVERY = 10_000.0, 0.6, 40  # [Hz], [s], samples from one value of V_3 to the next
-POWERS = ((Fraction(97, 99), AFTER), (Fraction(5, 7), "#8a6bb8"), (Fraction(1), BEFORE))
+POWERS = ((Fraction(97, 99), STYLE.after), (Fraction(5, 7), "#8a6bb8"), (Fraction(1), STYLE.before))
 STARTS_DEG = (-10.0, -5.0, 5.0, 10.0)
 GROWTH = 1e-6
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "paper" / "finite_time.png"
@@ -64,7 +65,7 @@ def main() -> None:
     """Run, tell, draw."""
     sheet = read_datasheet("table1")
     bare = replace(sheet, parameters={**sheet.parameters, "F_c": 0.0, "T_LH": 0.0})
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE.settings):
         figure = Figure(figsize=(9.8, 6.6), layout="constrained")
         for row, (name, plant, u_max) in zip(
             figure.subplots(2, 3),
@@ -82,7 +83,7 @@ def main() -> None:
                     V = np.array([lyapunov(Gains(q=q), *x) for x in rows[::EVERY, 1:]])
                     growth = np.diff(V) / V[0]
                     print(
-                        f"  {str(q):>6} {start:12g} {1e3 * within(rows, 0.1):12.1f} {1e3 * within(rows, 0.005):13.1f}"
+                        f"  {q!s:>6} {start:12g} {1e3 * within(rows, 0.1):12.1f} {1e3 * within(rows, 0.005):13.1f}"
                         f" {np.mean(growth > GROWTH):13.1%} {max(growth.max(), 0):11.2g}"
                     )
                     portrait.plot(np.degrees(rows[:, 2]), np.degrees(rows[:, 3]), color=colour, linewidth=1.1)
@@ -91,7 +92,7 @@ def main() -> None:
                         approach.semilogy(
                             1e3 * rows[:, 0], np.maximum(np.degrees(np.abs(rows[:, 2])), 1e-8), color=colour
                         )
-            portrait.set_title(name, color=INK)
+            portrait.set_title(name, color=STYLE.ink)
             for ax, x, y in (
                 (portrait, "x2 [°]", "x3 [°/s]"),
                 (fall, "time [ms]", "V_3"),

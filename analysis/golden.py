@@ -2,14 +2,14 @@
 
 analysis/golden/SET/CASE.json holds a case: per round and candidate what the decision read (gain, z-score, losses, best
 block, size, probability, how far its blocks are from every other's), the order that was made, what held-out data said,
-what the verdict read, and the answer. Deciding sets: `tuning` (the tuning half of ../shared/concealed), `seeds` (cases of
-`ers prove --seed 4201`), `foreign` (../shared/foreign), `rigs` (../shared/data). `reporting` decides nothing.
+what the verdict read, and the answer. Deciding sets: `tuning` (the tuning half of ../shared/concealed), `seeds` (cases
+of `ers prove --seed 4201`), `foreign` (../shared/foreign), `rigs` (../shared/data). `reporting` decides nothing.
 
 - `replay` makes every decision anew from the tables, in seconds, with ers_mj.decisions and its policy, and prints what
-  differs. `--policy NAME=VALUE` asks another policy; `--thresholds` asks each threshold what its absence, a fifth less and
-  a fifth more would have changed.
-- `ask` diagnoses the recordings anew and prints what differs: verdict, names, parameters, errors. It needs ../shared, and
-  for `seeds` the recordings that `make` makes with the generator of commit 581c791 (some 45 s of a core a case).
+  differs. `--policy NAME=VALUE` asks another policy; `--thresholds` asks each threshold what its absence, a fifth less
+  and a fifth more would have changed.
+- `ask` diagnoses the recordings anew and prints what differs: verdict, names, parameters, errors. It needs ../shared,
+  and for `seeds` the recordings that `make` makes with the generator of commit 581c791 (some 45 s of a core a case).
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ def tables(sets: list[str]) -> Iterator[tuple[str, dict]]:
                 yield f"{name}/{path.stem}", table
 
 
-# -- the decisions, from the tables -------------------------------------------------------------------------------------
+# -- the decisions, from the tables
+# -------------------------------------------------------------------------------------
 
 
 def is_clocked(name: str) -> bool:
@@ -231,8 +232,8 @@ def named(pairs: list[str]) -> Iterator[tuple[str, float]]:
 
 
 def tell_thresholds(sets: list[str], already: list) -> None:
-    """How many decisions each threshold changes where it is taken away (at nought and beyond every number), and where it
-    is a fifth smaller or larger.
+    """How many decisions each threshold changes where it is taken away (at nought and beyond every number), and where
+    it is a fifth smaller or larger.
     """
     print(f"\n{'threshold':22}{'value':>10}{'nought':>8}{'beyond':>8}{'x 0.8':>8}{'x 1.2':>8}")
     for f in fields(Policy):
@@ -248,7 +249,8 @@ def tell_thresholds(sets: list[str], already: list) -> None:
         print(f"{f.name:22}{value:10.4g}" + "".join(f"{count:>8}" for count in counts))
 
 
-# -- the cases, asked anew ----------------------------------------------------------------------------------------------
+# -- the cases, asked anew
+# ----------------------------------------------------------------------------------------------
 
 
 def recordings_of(table: dict, made: Path) -> tuple[list, list, object]:

@@ -121,7 +121,7 @@ def many(title: str, sheet: Datasheet, duration: float, sets: int, seed: int) ->
         cramer_rao(sheet, t, u),
         {k: [] for k in known},
         {k: [] for k in known},
-        {k: 0 for k in known},
+        dict.fromkeys(known, 0),
     )
     begin = time.process_time()
     for k in range(sets):
@@ -144,7 +144,8 @@ def many(title: str, sheet: Datasheet, duration: float, sets: int, seed: int) ->
     for name in known:
         rms = float(np.sqrt(np.mean(np.square(errors[name]))))
         print(
-            f"   {name:12}{100 * level[name]:14.3f}{100 * rms:14.3f}{rms / level[name]:8.2f}{100 * np.mean(held[name]):11.1f}{missing[name]:10d}"
+            f"   {name:12}{100 * level[name]:14.3f}{100 * rms:14.3f}{rms / level[name]:8.2f}"
+            f"{100 * np.mean(held[name]):11.1f}{missing[name]:10d}"
         )
     print(f"   all together{'':37}{100 * np.mean(np.concatenate(list(held.values()))):11.1f}", flush=True)
 

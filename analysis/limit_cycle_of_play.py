@@ -1,5 +1,6 @@
 """Where the describing function of a play holds: `python analysis/limit_cycle_of_play.py` writes docs/limit_cycle.png.
- Table 1 with F_c = T_LH = 0, play +-0.5 deg (effect `backlash`), feedback of the rudder's angle by a PID of 2 V/deg,
+
+Table 1 with F_c = T_LH = 0, play +-0.5 deg (effect `backlash`), feedback of the rudder's angle by a PID of 2 V/deg,
 1.2 V/(deg s), 0.05 V s/deg at 2 kHz with a speed filter of
 0.5 ms and 24 V; 0.64 of the inertia and of the bearing's damping at the motor. The contact is a spring-damper that
 pushes and never pulls; its frequency (against the whole inertia) and damping ratio are varied. Printed: predicted and
@@ -21,7 +22,7 @@ from ers_mj.control.controllers import CONTROLLERS, Aim, PidGains, Servo
 from ers_mj.control.frequency.cycle import Cycle, lasting, predicted
 from ers_mj.effects.base import Coefficients
 from ers_mj.plants.sampled_reduced import SampledReduced
-from ers_mj.report.diagnosis_figures import AFTER, BEFORE, INK, MEASURED, STYLE
+from ers_mj.report.style import STYLE
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.simulation import build_plant
 
@@ -94,10 +95,10 @@ def main() -> None:
 
 
 def _draw(kept: dict, motions: dict) -> None:
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE.settings):
         figure = Figure(figsize=(9.8, 3.4), layout="constrained")
         ratios, *waves = figure.subplots(1, 3, width_ratios=(1.1, 1, 1))
-        for f_contact, shade in zip(CONTACTS_HZ, (AFTER, BEFORE, "#8a6bb8"), strict=True):
+        for f_contact, shade in zip(CONTACTS_HZ, (STYLE.after, STYLE.before, "#8a6bb8"), strict=True):
             points = [(zeta, *kept[f_contact, zeta]) for zeta in DAMPINGS if (f_contact, zeta) in kept]
             for column, dash in ((1, "-"), (2, (0, (3, 2)))):
                 ratios.plot(
@@ -119,9 +120,9 @@ def _draw(kept: dict, motions: dict) -> None:
             n = min(round(2.5 * RATE / seen.f_hz), angle.size)
             t = 1e3 * np.arange(n) / RATE
             ax.axhspan(-0.5, 0.5, color="#f3efe2", zorder=0, linewidth=0)
-            ax.plot(t, np.degrees(angle[:n]), color=MEASURED, linewidth=2.2, label="rudder")
-            ax.plot(t, np.degrees(twist[:n]), color=BEFORE, label="twist")
-            ax.set_title(f"contact {key[0]:g} Hz, {key[1]:g}", color=INK)
+            ax.plot(t, np.degrees(angle[:n]), color=STYLE.measured, linewidth=2.2, label="rudder")
+            ax.plot(t, np.degrees(twist[:n]), color=STYLE.before, label="twist")
+            ax.set_title(f"contact {key[0]:g} Hz, {key[1]:g}", color=STYLE.ink)
             ax.set_xlabel("time [ms]")
             ax.set_ylabel("angle [°]")
             ax.legend(fontsize=8)

@@ -1,5 +1,6 @@
 """How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
- Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits
+
+Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits
 every effect whose secant promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of
 race.py open. Prints the largest gain in C of each servo, whether no other law is offered nearly as much
 (ranking.stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that
@@ -14,17 +15,17 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from concealed_cases import main as make_cases  # noqa: E402
+from concealed_cases import main as make_cases
 
-from ers_mj import selection  # noqa: E402
-from ers_mj.data.prepared import trace_of  # noqa: E402
-from ers_mj.data.recording import read_recording  # noqa: E402
-from ers_mj.effects import BY_NAME  # noqa: E402
-from ers_mj.estimation.baseline import baseline  # noqa: E402
+from ers_mj import selection
+from ers_mj.data.prepared import trace_of
+from ers_mj.data.recording import read_recording
+from ers_mj.effects import BY_NAME
+from ers_mj.estimation.baseline import baseline
 from ers_mj.selection import moves as reviews
 from ers_mj.selection import screening
-from ers_mj.selection.comparison import stands_alone  # noqa: E402
-from ers_mj.servo.datasheet import read_datasheet  # noqa: E402
+from ers_mj.selection.comparison import stands_alone
+from ers_mj.servo.datasheet import read_datasheet
 
 
 def largest_gain(folder):

@@ -5,13 +5,14 @@
 and over), watched from Table 1's datasheet whatever the servo is. Reduced plant and MuJoCo; servos are Table 1's with J
 B K_t K_e k_s T_LH F_c R scattered within a factor --scatter. Noise
 0.01 deg where nothing else is said. A change of F_c by 20 % counts as found from when c_2 stays within 5 % of its new
-value; a play opens to +-0.5 deg. Times are counted from the change, and show the HOP of the estimates. "x real time" is
+value; a play opens to +-0.5 deg. Times are counted from the change, and show the hop of the estimates. "x real time" is
 over processor time, of one core.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import time
 from dataclasses import replace
@@ -19,7 +20,8 @@ from dataclasses import replace
 import numpy as np
 
 from ers_mj.control.monte_carlo import scattered
-from ers_mj.online.moving_horizon import OPENING, Estimate, Tracker, opening
+from ers_mj.online.horizon import HORIZON
+from ers_mj.online.moving_horizon import Estimate, Tracker, opening
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.simulation import build_plant
@@ -48,7 +50,7 @@ def stream(
 
 def watched(t: np.ndarray, u: np.ndarray, y: np.ndarray) -> tuple[list[Estimate], float]:
     """The estimates, and how many times faster than real time they came."""
-    before, head = time.process_time(), round(OPENING * RATE)
+    before, head = time.process_time(), round(HORIZON.opening * RATE)
     tracker, found = Tracker(opening(t[:head], u[:head], y[:head], read_datasheet("table1"), True)), []
     for k in range(0, t.size, 50):
         found += tracker.push(t[k : k + 50], u[k : k + 50], y[k : k + 50])
@@ -62,7 +64,7 @@ def changed(sheet: Datasheet, factor: float) -> Datasheet:
 
 def flags(found: list[Estimate]) -> int:
     """Times that the flag rose."""
-    return sum(b.flag and not a.flag for a, b in zip(found, found[1:])) + found[0].flag
+    return sum(b.flag and not a.flag for a, b in itertools.pairwise(found)) + found[0].flag
 
 
 def steps(plant: str, count: int, spread: float, random: np.random.Generator) -> None:
@@ -126,12 +128,12 @@ def nothing(
 def drifting(spread: float, random: np.random.Generator) -> None:
     """F_c swings by 30 % with a period of 60 s, in parts of 0.1 s."""
     sheet = servo(spread, random)
-    share = lambda t: 1 + 0.3 * np.sin(2 * np.pi * t / 60)  # noqa: E731
+    share = lambda t: 1 + 0.3 * np.sin(2 * np.pi * t / 60)
     found, speed = watched(
         *stream([(0.1, changed(sheet, share(k / 10)), 0.0) for k in range(1200)], "reduced", NOISE, random)
     )
     c_2 = sheet.to_lumped()["c_2"]
-    at = lambda lag: [e.values["c_2"] / c_2 - share(e.t - lag) for e in found if e.t > 5]  # noqa: E731
+    at = lambda lag: [e.values["c_2"] / c_2 - share(e.t - lag) for e in found if e.t > 5]
     lags = np.arange(0, 3, 0.1)
     left = [np.sqrt(np.mean(np.square(at(lag)))) for lag in lags]
     print(

@@ -8,15 +8,12 @@ import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-os.environ.setdefault(
-    "OPENBLAS_NUM_THREADS", "1"
-)  # before numpy comes: threads are for recordings and effects, not for small matrices
+# before numpy comes: threads are for recordings and effects, not for small matrices
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from ers_mj import __version__
 from ers_mj.commands import COMMANDS
 from ers_mj.errors import InputError
-
-DONE, CHECK_FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 130
 
 
 class Parser(argparse.ArgumentParser):
@@ -81,10 +78,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return arguments.run(arguments)
     except InputError as error:
         print(f"ers: {error}", file=sys.stderr)
-        return BAD_INPUT
+        return 2
     except KeyboardInterrupt:
         print("ers: stopped, nothing was written", file=sys.stderr)
-        return STOPPED
+        return 130
     except BrokenPipeError:  # the reader of our output has left
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DONE
+        return 0

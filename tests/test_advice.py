@@ -6,15 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ers_mj.commands.diagnose import _input_table
+from ers_mj.commands.diagnose import input_table
 from ers_mj.data.excitation import SHARES, WAVES, Limits, excitations, signal
-from ers_mj.data.prepared import make_trace, trace_of
+from ers_mj.data.prepared import Signals, make_trace, trace_of
 from ers_mj.data.recording import from_arrays
 from ers_mj.estimation.baseline import baseline
 from ers_mj.estimation.fit import descend, fit
 from ers_mj.estimation.initial_state import with_starts
-from ers_mj.experiment_design.discriminating_inputs import SETTLED, drawn
-from ers_mj.experiment_design.next_recording import _said, _widened, next_recording
+from ers_mj.experiment_design.discriminating_inputs import SETTLED
+from ers_mj.experiment_design.next_recording import next_recording
+from ers_mj.experiment_design.refits import drawn
+from ers_mj.experiment_design.wording import said, widened
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.posterior import isolability, probabilities
@@ -155,7 +157,7 @@ def test_what_is_advised_settles_it(late):
         y = fits[true].model.plant().theta(t, u, (advice["excitation"]["start"], 0.0)) + NOISE * np.random.default_rng(
             9
         ).standard_normal(t.size)
-        new = make_trace("next", t, u, y, np.ones(t.size, bool), None, None, traces[0].sigma, 0.0)
+        new = make_trace("next", Signals(t, u, y, np.ones(t.size, bool)), traces[0].sigma)
         both = [*traces, *with_starts(fits[true].model, [new])]
         again = {name: fit(found.model, both, steps=15) for name, found in fits.items()}
         won = again[wrong].cost - again[true].cost
@@ -184,7 +186,7 @@ def test_a_wider_travel_is_told_with_what_to_record_there():
             "rate_hz": 500.0,
         },
     )
-    told = _widened(
+    told = widened(
         "backlash",
         ["shaft_compliance", "gravity_imbalance"],
         {"shaft_compliance": found},
@@ -219,7 +221,7 @@ def test_without_a_rival_the_weakest_number_is_narrowed(late):
 
 def test_the_input_is_written_as_a_table(late):
     excitation = advised(late, "input_delay", "sensor_lag")["excitation"]
-    lines = _input_table(excitation).splitlines()
+    lines = input_table(excitation).splitlines()
     t, u = signal(excitation)
     assert lines[0] == "t_s,u_V" and len(lines) == t.size + 1
     assert np.allclose([float(line.split(",")[1]) for line in lines[1:]], u, rtol=1e-5, atol=1e-9)
@@ -227,7 +229,7 @@ def test_the_input_is_written_as_a_table(late):
 
 def test_a_richer_rival_that_further_numbers_alone_set_apart_is_told():
     told = {"backlash": {"recordings_needed": None, "channels_sigmas": {}, "rms_over_left": 0.3, "cost": 2.0 * SETTLED}}
-    (words,) = _said("shaft_compliance", told, None, {}, 50, "the noise")
+    (words,) = said("shaft_compliance", told, None, {}, 50, "the noise")
     assert "tells shaft compliance and backlash apart" in words
 
 

@@ -17,7 +17,6 @@ def imported(home, **more):
         cwd=home,
         capture_output=True,
         text=True,
-        timeout=120,
     )
     assert done.returncode == 0, done.stderr
     return done.stderr

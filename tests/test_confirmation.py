@@ -55,7 +55,7 @@ def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
     not, nor any beside a finer converter.
     """
     step = 0.016
-    coarse, fine = ([trace("multisine", sensor=lambda y: s * np.round(y / s))] for s in (step, NOISE))
+    coarse, fine = ([trace("multisine", sensor=lambda y: s * np.round(y / s))] for s in (step, NOISE))  # noqa: B023
     small, large = (
         plain.fit.model.with_effect("sensor_nonlinearity", np.array([np.inf, np.inf, size * step, 0.043, 0.3]))
         for size in (0.3, 0.8)
@@ -146,7 +146,7 @@ def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out():
 
 
 def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks():
-    score = lambda *rmse: [Score(e**2, 1, np.ones(1)) for e in rmse]  # noqa: E731
+    score = lambda *rmse: [Score(e**2, 1, np.ones(1)) for e in rmse]
     assert _no_closer(score(1.2), score(1.0), 0.04) and not _no_closer(score(1.2), score(1.0), 1e-6)
     assert _no_closer(score(1.4), score(1.0), 1e-6) and not _no_closer(score(0.9), score(1.0), 0.04)
     assert not _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 1e-6) and _no_closer(

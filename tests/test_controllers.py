@@ -61,11 +61,13 @@ def test_no_law_sees_what_comes(name):
 
 @pytest.mark.parametrize("name", ["ftrc", "pid", "pid-ff"])
 def test_the_integral_stands_still_while_the_voltage_is_at_its_limit(name):
-    law = CONTROLLERS[name](SERVO, 1000.0, u_max=3.0)
-    law.reset(HOME)
+    """What it says afterwards is what it says without that time."""
+    held, fresh = (CONTROLLERS[name](SERVO, 1000.0, u_max=3.0) for _ in range(2))
+    held.reset(HOME)
+    fresh.reset(HOME)
     for k in range(500):
-        assert law.voltage(Aim(HOME + 1.0), HOME, 1e-3 * k) == 3.0
-    assert law._x1 == 0.0
+        assert held.voltage(Aim(HOME + 1.0), HOME, 1e-3 * k) == 3.0
+    assert held.voltage(Aim(HOME), HOME, 0.5) == fresh.voltage(Aim(HOME), HOME, 0.0)
 
 
 @pytest.mark.parametrize("name", ["ftrc", "ftrc-literal"])

@@ -141,7 +141,7 @@ def test_what_the_library_has_no_name_for_is_unexplained(step):
     """
     rng = np.random.default_rng(4)
     out = []
-    for k, r in enumerate(recordings()):
+    for r in recordings():
         hops = np.repeat(rng.choice([-25.0, 25.0], 40), 100)
         plant = ReducedModel(lumped(TRUTH))
         y = plant.theta(T, r.u, (TRUTH["theta_0"], 0.0), load=hops) + NOISE * rng.standard_normal(T.size)

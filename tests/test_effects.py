@@ -189,7 +189,7 @@ def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
     period may be its own.
     """
     scales = replace(pushed.fit.model.scales, low=-0.3, high=0.3, cog=2 * np.pi / 60.0)
-    cogs, gears = ([p for p in BY_NAME[name].starts(scales)] for name in ("cogging", "transmission_ripple"))
+    cogs, gears = (list(BY_NAME[name].starts(scales)) for name in ("cogging", "transmission_ripple"))
     torques = [p for p in gears if np.isfinite(p[3])]
     assert max(p[1] for p in cogs) <= scales.cog < min(p[1] for p in torques) and len(torques) < len(gears)
     assert not any(np.isfinite(p[3]) for p in BY_NAME["transmission_ripple"].starts(replace(scales, cog=np.inf)))

@@ -10,7 +10,8 @@ from ers_mj import cli
 from ers_mj.data.recording import read_input
 from ers_mj.errors import InputError
 from ers_mj.experiment_design import optimal_input as experiment
-from ers_mj.experiment_design.optimal_input import Question, Rig, built, planned, reference
+from ers_mj.experiment_design.optimal_input import built, planned, reference
+from ers_mj.experiment_design.question import Question, Rig
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import read_datasheet
 
@@ -87,9 +88,7 @@ def test_bad_options_are_one_sentence_and_write_nothing(options, tmp_path, capsy
 
 
 def test_the_command_writes_an_input_that_simulate_takes(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(experiment, "REFITS", 2)
-    monkeypatch.setattr(experiment, "ROUNDS", 1)
-    monkeypatch.setattr(experiment, "CHECKED", 2)
+    monkeypatch.setattr(experiment, "EFFORT", experiment.Effort(refits=2, rounds=1, checked=2))
     out = tmp_path / "next.csv"
     assert (
         cli.main(

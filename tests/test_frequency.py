@@ -11,7 +11,7 @@ from test_report import read
 
 from ers_mj import cli
 from ers_mj.control.controllers import CONTROLLERS, PidGains, Servo
-from ers_mj.control.frequency.cycle import _passed, balanced, lasting, predicted, simulated
+from ers_mj.control.frequency.cycle import balanced, lasting, passed, predicted, simulated
 from ers_mj.control.frequency.describing import (
     contact,
     controller_response,
@@ -21,7 +21,7 @@ from ers_mj.control.frequency.describing import (
     rubbing,
     saturation,
 )
-from ers_mj.control.frequency.linear import at, linearised
+from ers_mj.control.frequency.linear import at, coefficients, linearised
 from ers_mj.control.frequency.loop import ask, close_loop, judged
 from ers_mj.control.trial import sampled
 from ers_mj.effects.base import Coefficients
@@ -36,8 +36,7 @@ SPRINGY = ("backlash", {"gap": math.radians(0.5), "rho": 0.64, "phi": 0.0, "f_co
 RATE = 2000.0
 
 
-# -- linear plants
-# -------------------------------------------------------------------------------------------------------
+# -- linear plants -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -135,8 +134,7 @@ def test_effects_that_no_linear_plant_has_are_named():
     )  # friction that falls undamps
 
 
-# -- describing functions
-# ------------------------------------------------------------------------------------------------
+# -- describing functions ----------------------------------------------------------------------------------------------
 
 
 PHASE = 2 * np.pi * (np.arange(40_000) + 0.5) / 40_000
@@ -194,16 +192,13 @@ def test_friction_compensation_undoes_the_friction_of_the_plant():
     np.testing.assert_allclose(servo.b * difference, -coulomb(servo.c_2, E) * np.ones(2), rtol=0.15)
 
 
-# -- margins
-# ---------------------------------------------------------------------------------------------------------------
+# -- margins -----------------------------------------------------------------------------------------------------------
 
 
 def test_margins_are_those_of_the_rational_loop():
     plant = build_plant(FREE)
     linear = linearised(plant, RATE, HOME + 0.17)
-    loop = close_loop(
-        ask(CONTROLLERS["pid"](Servo.of(FREE), RATE), HOME + 0.17, 0.01), linear, Coefficients(*plant._lowered[0])
-    )
+    loop = close_loop(ask(CONTROLLERS["pid"](Servo.of(FREE), RATE), HOME + 0.17, 0.01), linear, coefficients(plant))
     z, h, new, servo = control.tf("z"), 1 / RATE, 1 - math.exp(-1 / (RATE * 5e-4)), Servo.of(FREE)
     z.dt = h
     C = math.degrees(1) * (5 + 1.2 * h * z / (z - 1) + 0.1 * new / h * (z - 1) / (z - (1 - new))) - servo.a_1 / servo.b
@@ -237,7 +232,7 @@ def test_a_gain_beyond_the_margin_is_unstable_in_the_loop_too():
         f_hz,
         linear.response(f_hz),
         pid_by_hand(f_hz, RATE, PidGains(*(factor * x for x in (5, 1.2, 0.1)))),
-    )  # noqa: E731
+    )
     limit = at(1.0).gain_range[1]
     for factor, holds in ((0.85 * limit, True), (1.2 * limit, False)):
         assert at(factor).stable is holds
@@ -246,14 +241,13 @@ def test_a_gain_beyond_the_margin_is_unstable_in_the_loop_too():
         assert bool(np.isfinite(theta).all() and np.abs(theta[-200:]).max() < 0.01) is holds
 
 
-# -- limit cycles
-# ------------------------------------------------------------------------------------------------------------
+# -- limit cycles ------------------------------------------------------------------------------------------------------
 
 
 def test_the_cycle_of_a_relay_is_the_textbooks():
     """1/G + N = 0 with N = 4/(pi E) and G = K/(s (s/p + 1)^2): w = p, E = 2 K/(pi p); and it lasts."""
     K, p = 5.0, 2 * math.pi * 20.0
-    s = lambda f: 2j * math.pi * f  # noqa: E731
+    s = lambda f: 2j * math.pi * f
     (found,) = balanced(lambda f, E: s(f) * (s(f) / p + 1) ** 2 / K + 4 / (math.pi * E))
     assert (
         found.f_hz == pytest.approx(20.0, rel=1e-6)
@@ -269,7 +263,7 @@ def cycles_of(datasheet, kind):
     plant, reduced = (build_plant(datasheet, plant=name, effects=[SPRINGY]) for name in (kind, "reduced"))
     law = CONTROLLERS["pid"](Servo.of(FREE), RATE, pid=PidGains(P=2.0, D=0.05))
     seen, _ = simulated(law, sampled(plant, RATE, (HOME + 0.03, 0.0)), plant.effects, plant.terminal, HOME, 0.03, 2.0)
-    return [c for c in predicted(law, Coefficients(*reduced._lowered[0]), HOME) if c.lasting], seen
+    return [c for c in predicted(law, coefficients(reduced), HOME) if c.lasting], seen
 
 
 @pytest.mark.parametrize("kind", ["reduced", "mujoco"])
@@ -284,7 +278,7 @@ def test_the_cycle_of_a_play_is_predicted(kind):
 
 def test_nothing_is_asked_beyond_half_the_sample_rate():
     law = CONTROLLERS["pid"](Servo.of(FREE), 100.0)
-    assert all(c.f_hz < 50.0 for c in predicted(law, Coefficients(*build_plant(FREE)._lowered[0]), HOME))
+    assert all(c.f_hz < 50.0 for c in predicted(law, coefficients(build_plant(FREE)), HOME))
 
 
 def test_only_what_goes_on_is_a_cycle():
@@ -299,8 +293,7 @@ def test_only_what_goes_on_is_a_cycle():
     )
 
 
-# -- the command
-# ------------------------------------------------------------------------------------------------------------------
+# -- the command -------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -405,5 +398,5 @@ def test_bad_input_is_one_sentence_and_code_2(arguments, says, capsys):
 def test_a_shaft_that_hardens_passes_more_the_wider_it_swings():
     """k (1 + 3/4 (A / twist_2)^2) of a cube; a linear spring's where it hardly twists."""
     c = Coefficients(two_body=1.0, k_twist=1e4, harden=1e4)
-    assert _passed(c, 0.0, 1e-6) == pytest.approx(1e4, rel=1e-6)
-    assert _passed(c, 0.0, 1.75e4 * 0.01) == pytest.approx(1.75e4, rel=2e-3)
+    assert passed(c, 0.0, 1e-6) == pytest.approx(1e4, rel=1e-6)
+    assert passed(c, 0.0, 1.75e4 * 0.01) == pytest.approx(1.75e4, rel=2e-3)

@@ -241,11 +241,11 @@ def test_five_parameters_of_a_mujoco_plant():
 @pytest.mark.parametrize(
     "settings, said",
     [
-        (dict(method="magic"), "no method"),
-        (dict(fixed={"zeta": 1.0}), "no parameter"),
-        (dict(fixed={"a_1": 1.0}), "cannot be fixed or bounded"),
-        (dict(bounds={"R": (2.0, 1.0)}), "bounds of R"),
-        (dict(fixed={"R": 1.0}, bounds={"R": (1.0, 2.0)}), "is fixed and has bounds"),
+        ({"method": "magic"}, "no method"),
+        ({"fixed": {"zeta": 1.0}}, "no parameter"),
+        ({"fixed": {"a_1": 1.0}}, "cannot be fixed or bounded"),
+        ({"bounds": {"R": (2.0, 1.0)}}, "bounds of R"),
+        ({"fixed": {"R": 1.0}, "bounds": {"R": (1.0, 2.0)}}, "is fixed and has bounds"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(settings, said):

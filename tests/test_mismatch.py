@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, welch
 
-from ers_mj.data.prepared import make_trace, trace_of
+from ers_mj.data.prepared import Signals, make_trace, trace_of
 from ers_mj.data.recording import from_arrays
 from ers_mj.diagnosis.localisation import LOCAL_RATE, gather, over_frequency, places
 from ers_mj.diagnosis.mismatch_spectrum import mismatch, observed_noise
@@ -29,7 +29,7 @@ def made(error, seed=0, n=8000, holes=slice(0, 0)):
     e = error(x) + SIGMA * random.standard_normal(n)
     valid = np.ones(n, bool)
     valid[holes] = False
-    return make_trace("made", H * np.arange(n), u, x + e, valid, None, None, SIGMA, 0.0), e[valid]
+    return make_trace("made", Signals(H * np.arange(n), u, x + e, valid), SIGMA), e[valid]
 
 
 def told(error, rate=1e-9, **options):
@@ -77,9 +77,7 @@ def test_a_sweep_that_passes_a_line_once_is_not_called_linear_for_that():
     for error, kind in ((0.1 * gain * x, "distortion"), (late(x), "linear")):
         error = error + SIGMA * np.random.default_rng(6).standard_normal(t.size)
         assert (
-            mismatch(
-                [make_trace("sweep", t, x, x + error, np.ones(t.size, bool), None, None, SIGMA, 0.0)], [error], 1e-9
-            ).kind
+            mismatch([make_trace("sweep", Signals(t, x, x + error, np.ones(t.size, bool)), SIGMA)], [error], 1e-9).kind
             == kind
         )
 

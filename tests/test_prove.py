@@ -23,8 +23,9 @@ from ers_mj.plants.reduced import lumped
 from ers_mj.proving import asking, case, conduct, quick, real, recorder, scoring, sealing
 from ers_mj.proving.catalogue import CATALOGUE, LISTED
 from ers_mj.proving.forms import TEXTBOOK, draw_shape
-from ers_mj.proving.laws import TABLE_1
 from ers_mj.proving.parameters import covered
+from ers_mj.proving.plant import TABLE_1
+from ers_mj.proving.sampling import Setup
 from ers_mj.proving.strength import nearest
 from ers_mj.report import proof_report
 from ers_mj.servo.datasheet import read_datasheet
@@ -70,7 +71,7 @@ def imported(path):
 
 
 def test_the_generator_knows_nothing_of_the_effects_folder():
-    seen, todo = set(), set((PACKAGE / "proving").glob("*.py"))
+    seen, todo = set(), set((PACKAGE / "proving").rglob("*.py"))
     while todo:
         path = todo.pop()
         seen.add(path)
@@ -161,15 +162,15 @@ def test_a_loop_is_closed_round_the_measured_angle():
         "FF_KS": 0.0,
         "FF_TH0": 0.0,
     }
-    options = {
-        "noise": 1e-4 * rng.standard_normal(T.size),
-        "controller": controller,
-        "theta_ref": 0.26 + 0.2 * np.sin(4 * T),
-        "decimals": 4,
-    }
+    setup = Setup(
+        noise=1e-4 * rng.standard_normal(T.size),
+        controller=controller,
+        theta_ref=0.26 + 0.2 * np.sin(4 * T),
+        decimals=4,
+    )
     truth, ours = (
-        quick.simulate(TABLE_1, [], T, None, **options),
-        recorder.record(TABLE_1, [], T, None, step=2.5e-5, **options),
+        quick.simulate(TABLE_1, [], T, None, setup=setup),
+        recorder.record(TABLE_1, [], T, None, setup=setup, step=2.5e-5),
     )
     assert rms_deg(ours.true - truth.true) < 0.01
     assert np.abs(ours.u).max() <= 14.0
@@ -211,7 +212,7 @@ def asked(monkeypatch):
         seen.append(sorted(p.name for p in folder.iterdir()))
         return dict(COST), json.dumps({"verdict": "consistent", "missing": []}), ""
 
-    monkeypatch.setattr(asking.Asker, "_run", stub)
+    monkeypatch.setattr(asking.Asker, "run", stub)
     return seen
 
 
@@ -269,9 +270,8 @@ def test_another_proof_in_the_folder_is_refused_and_forced(tmp_path, asked):
 
 
 def test_a_folder_in_which_another_run_is_at_work_is_refused(tmp_path, asked):
-    with sealing.held(tmp_path / "p"):
-        with pytest.raises(InputError, match="another `ers prove` is at work"):
-            conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
+    with sealing.held(tmp_path / "p"), pytest.raises(InputError, match="another `ers prove` is at work"):
+        conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
     assert not any((tmp_path / "p").iterdir())
     conduct.conduct(tmp_path / "p", TASKS, SETTINGS)  # let go of, it is free again
 
@@ -285,7 +285,7 @@ def test_a_stopped_proof_keeps_its_answers(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return dict(COST), "{}", ""
 
-    monkeypatch.setattr(asking.Asker, "_run", stub)
+    monkeypatch.setattr(asking.Asker, "run", stub)
     with pytest.raises(KeyboardInterrupt):
         conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
     assert len(list((tmp_path / "p" / "answers").glob("*.json"))) >= 1
@@ -304,7 +304,7 @@ def test_a_stopped_proof_keeps_its_answers(tmp_path, monkeypatch):
 def test_failures_are_answers_without_a_document(tmp_path, monkeypatch, exit_code, cpu, text, error):
     monkeypatch.setattr(
         asking.Asker,
-        "_run",
+        "run",
         lambda self, folder: ({**COST, "exit": exit_code, "cpu_s": cpu}, text, "ers: rec1.csv: is bad\n"),
     )
     (tmp_path / "rec1.csv").write_text("x")
@@ -330,7 +330,7 @@ def truth_and_answer(
     verdict="missing_physics",
     where="load",
     alternatives=(),
-    each={},
+    each=None,
 ):
     truth = {
         "case": "case-001",
@@ -340,7 +340,7 @@ def truth_and_answer(
         "linkage": "constant",
         "effects": [
             {"label": label, "strength": None, "shape": {}, "quick_visibility_sigma": sigma}
-            for label, sigma in each.items()
+            for label, sigma in (each or {}).items()
         ],
     }
     missing = [

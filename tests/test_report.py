@@ -7,12 +7,13 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from ers_mj.data.prepared import make_trace
+from ers_mj.data.prepared import Signals, make_trace
 from ers_mj.diagnosis.evidence import Evidence, RecordView, ResidualMap, Rung
 from ers_mj.diagnosis.mismatch_spectrum import mismatch
-from ers_mj.report import diagnosis_figures as figures
 from ers_mj.report.diagnosis_report import VERDICTS, report_page
 from ers_mj.report.display import figure, interval, pretty, shown, spoken
+from ers_mj.report.drawing import decimate
+from ers_mj.report.traces import merged
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
 NASTY = '<script>alert("1 & 2")</script>'
@@ -284,14 +285,14 @@ def test_decimation_keeps_every_extreme():
     t = np.arange(10_000) / 1000.0
     x = np.random.default_rng(1).normal(size=t.size)
     x[4567], x[1234] = 50.0, -40.0
-    s, z = figures.decimate(t, x, 400)
+    s, z = decimate(t, x, 400)
     assert s.size == z.size == 400 and z.max() == 50.0 and z.min() == -40.0 and (np.diff(s) >= 0).all()
     assert abs(s[np.argmax(z)] - t[4567]) < 0.06
 
 
 def test_spans_that_touch_become_one():
-    assert list(figures.merged(((3, 4), (0, 1), (1.05, 2)), 0.1)) == [(0, 2), (3, 4)]
-    assert list(figures.merged((), 0.1)) == []
+    assert list(merged(((3, 4), (0, 1), (1.05, 2)), 0.1)) == [(0, 2), (3, 4)]
+    assert list(merged((), 0.1)) == []
 
 
 @pytest.mark.parametrize(
@@ -312,7 +313,7 @@ def test_an_error_beyond_the_noise_is_drawn_over_frequency():
     random = np.random.default_rng(1)
     t, u = np.arange(6000) * 1e-3, random.standard_normal(6000)
     x = np.cumsum(u) * 1e-3
-    traces = [make_trace("made", t, u, x * gain, np.ones(6000, bool), None, None, 1e-5, 0.0) for gain in (1.0, 1.1)]
+    traces = [make_trace("made", Signals(t, u, x * gain, np.ones(6000, bool)), 1e-5) for gain in (1.0, 1.1)]
     told = [
         replace(evidence(), spectrum=mismatch(traces, [e, e], 1e-9))
         for e in (0.1 * x + 1e-5 * random.standard_normal(6000), 1e-5 * random.standard_normal(6000))

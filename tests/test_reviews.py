@@ -89,7 +89,7 @@ def test_of_rivals_that_tie_the_likelier_class_stays_once_the_rest_is_known(push
     found = exchanged(ranked[0].fit, rounds, traces, 1.0, 1)
     assert (
         found.model.names == ("bias_torque",)
-        and [c.name for c in rounds[0]][0] == "bias_torque"
+        and next(c.name for c in rounds[0]) == "bias_torque"
         and len(rounds[0]) == 3
     )
     assert rounds[0][0].beside is found and all(
@@ -165,7 +165,7 @@ def test_a_sweep_goes_on_from_the_best_starts_only(pushed, monkeypatch):
     )
     others = [name for name in BY_NAME if name != "drive_dead_zone"]
     swept(pushed.fit, [], pushed.traces, 1.0, others, 1)
-    starts = [p for p in BY_NAME["drive_dead_zone"].starts(pushed.fit.model.scales)]
+    starts = list(BY_NAME["drive_dead_zone"].starts(pushed.fit.model.scales))
     assert [steps for _, steps in tried[: len(starts) + 2]] == [reviews.GLANCE] * len(starts) + [
         reviews.SWEEP - reviews.GLANCE
     ] * 2

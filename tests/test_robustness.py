@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ers_mj import cli
-from ers_mj.control.monte_carlo import Spread, scatter, scattered
+from ers_mj.control.monte_carlo import Fleet, Spread, scatter, scattered
 from ers_mj.control.trial import Conditions, try_out
 from ers_mj.servo.datasheet import read_datasheet
 
@@ -17,7 +17,7 @@ CONDITIONS = Conditions(rate_hz=500.0, noise=1e-4, seed=3, effects=(("stribeck",
 
 def test_jobs_do_not_change_the_result_and_seeds_do():
     runs = [
-        scatter(SHEET, ["pid"], ["reduced"], ["step"], replace(CONDITIONS, seed=seed), count=3, spread=1.3, jobs=jobs)
+        scatter(Fleet(SHEET, 3, 1.3), ["pid"], ["reduced"], ["step"], replace(CONDITIONS, seed=seed), jobs=jobs)
         for seed, jobs in ((3, 1), (3, 2), (4, 1))
     ]
     assert runs[0] == runs[1] and runs[0] != runs[2] and len(runs[0][0].measures) == 3
@@ -41,7 +41,7 @@ def test_factors_stay_within_the_spread_and_differ():
 
 
 def test_no_spread_is_the_servo_itself():
-    (spread,) = scatter(SHEET, ["pid"], ["reduced"], ["step"], CONDITIONS, count=1, spread=1.0)
+    (spread,) = scatter(Fleet(SHEET, 1, 1.0), ["pid"], ["reduced"], ["step"], CONDITIONS)
     assert spread.measures == (try_out(SHEET, ["pid"], ["reduced"], ["step"], CONDITIONS)[0].measures,)
 
 

@@ -91,7 +91,7 @@ def test_a_tangent_that_runs_away_promises_nothing(pushed, monkeypatch):
     monkeypatch.setattr(
         type(model), "changes", lambda *a: changes(*a) + np.where(np.arange(len(starts)) == lost, size, 0.0)
     )
-    for lost, size in ((0, np.inf), (0, np.nan), (2, 1e200)):
+    for lost, size in ((0, np.inf), (0, np.nan), (2, 1e200)):  # noqa: B007
         told = _first_order(run, targets, pushed.traces, effect, starts)
         shares = [share for share, _ in told]
         assert (

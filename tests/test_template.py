@@ -38,9 +38,7 @@ def copy(tmp_path_factory):
 
 def run(copy, *arguments):
     folder, environment = copy
-    return subprocess.run(
-        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, timeout=600
-    )
+    return subprocess.run([sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True)
 
 
 def test_the_tests_that_every_effect_owes_find_it(copy):

@@ -14,7 +14,8 @@ import pytest
 from ers_mj import cli
 from ers_mj.data.streaming import Stream
 from ers_mj.errors import InputError
-from ers_mj.online.moving_horizon import EXPLAINED, HOP, OPENING, PATIENCE, SHORTEST, Tracker, opening
+from ers_mj.online.horizon import HORIZON
+from ers_mj.online.moving_horizon import Tracker, opening
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.play import stiff_play
 from ers_mj.plants.reduced import ReducedModel, lumped
@@ -43,7 +44,7 @@ def stream(*parts, noise=NOISE, seed=0):
 
 
 def watched(t, u, y, piece=70, datasheet=OFF):
-    head = round(OPENING * RATE)
+    head = round(HORIZON.opening * RATE)
     tracker, out = Tracker(opening(t[:head], u[:head], y[:head], datasheet, True)), []
     for k in range(0, t.size, piece):
         out += tracker.push(t[k : k + piece], u[k : k + piece], y[k : k + piece])
@@ -64,8 +65,8 @@ def between(found, begin, end):
 
 def test_an_unchanged_servo_is_found_within_its_spread_and_never_flagged(life):
     calm = between(life[1], 1.0, 4.0)
-    assert len(calm) == pytest.approx(3.0 / HOP, abs=1) and all(
-        e.misfit < EXPLAINED and not e.flag and not e.changed for e in calm
+    assert len(calm) == pytest.approx(3.0 / HORIZON.hop, abs=1) and all(
+        e.misfit < HORIZON.explained and not e.flag and not e.changed for e in calm
     )
     for name, spread in calm[-1].spread.items():
         miss = calm[-1].values[name] - TRUTH[name]
@@ -82,13 +83,13 @@ def test_a_step_in_friction_is_found_within_a_second_and_announced_alone(life):
 
 def test_a_play_raises_the_flag_and_its_end_lowers_it(life):
     up = [e.t for e in between(life[1], 7.0, 10.0) if e.flag]
-    assert 7.0 + PATIENCE < up[0] < 9.0 and not between(life[1], 12.0, 13.0)[-1].flag
+    assert 7.0 + HORIZON.patience < up[0] < 9.0 and not between(life[1], 12.0, 13.0)[-1].flag
     assert between(life[1], 12.0, 13.0)[-1].values["c_2"] == pytest.approx(1.2 * TRUTH["c_2"], rel=0.01)
 
 
 def test_what_no_parameter_explains_leaves_the_parameters_as_they_were(life):
     before, during = between(life[1], 6.5, 7.0)[-1], between(life[1], 8.5, 10.0)
-    assert all(e.values == during[0].values for e in during if e.misfit > EXPLAINED)
+    assert all(e.values == during[0].values for e in during if e.misfit > HORIZON.explained)
     assert during[-1].values["b"] == pytest.approx(before.values["b"], rel=0.05)
 
 
@@ -104,7 +105,7 @@ def test_missing_samples_spikes_and_a_gap_in_time_are_no_change():
     kept = (t < 3.0) | (t > 4.2)
     found = watched(t[kept], u[kept], y[kept])
     assert not any(e.flag or e.changed for e in found)
-    assert not between(found, 3.2, 4.2 + SHORTEST) and abs(found[-1].values["c_2"] / TRUTH["c_2"] - 1) < 0.01
+    assert not between(found, 3.2, 4.2 + HORIZON.shortest) and abs(found[-1].values["c_2"] / TRUTH["c_2"] - 1) < 0.01
 
 
 def test_a_slow_drift_is_followed():
@@ -121,11 +122,9 @@ def test_a_slow_drift_is_followed():
 def test_lines_may_come_in_any_pieces():
     text = "\ufeffnote;t_s;theta_deg;u_V\r\nx;0,0;1,5;2\r\nx;0,1;;nan\r\nx;0,2;-1e1;3"
     for size in (1, 7, 1000):
-        stream, rows = Stream("s"), []
-        for k in range(0, len(text), size):
-            rows.append(stream.feed(text[k : k + size]))
-        rows.append(stream.feed("\n"))
-        t, u, y = (np.concatenate(column) for column in zip(*rows))
+        stream = Stream("s")
+        rows = [stream.feed(piece) for piece in (*(text[k : k + size] for k in range(0, len(text), size)), "\n")]
+        t, u, y = (np.concatenate(column) for column in zip(*rows, strict=True))
         assert t.tolist() == [0.0, 0.1, 0.2] and u.tolist() == [2.0, 2.0, 3.0]
         assert (
             np.degrees(y[[0, 2]]) == pytest.approx([1.5, -10.0])
@@ -171,7 +170,8 @@ def test_what_happens_is_told(life):
 
 
 def csv(data, rows=slice(None)):
-    return "t_s,u_V,theta_rad\n" + "".join(f"{t!r},{u!r},{y!r}\n" for t, u, y in zip(*(x[rows].tolist() for x in data)))
+    cells = zip(*(x[rows].tolist() for x in data), strict=True)
+    return "t_s,u_V,theta_rad\n" + "".join(f"{t!r},{u!r},{y!r}\n" for t, u, y in cells)
 
 
 def test_the_command_reads_a_file_once(life, tmp_path, capsys):
@@ -179,7 +179,7 @@ def test_the_command_reads_a_file_once(life, tmp_path, capsys):
     assert cli.main(["watch", str(tmp_path / "s.csv"), "--datasheet", "table1", "--once", "--json"]) == 0
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [r["t_s"] for r in rows] == pytest.approx(
-        [SHORTEST + HOP * k for k in range(len(rows))], abs=2e-3
+        [HORIZON.shortest + HORIZON.hop * k for k in range(len(rows))], abs=2e-3
     ) and "c_2" in {n for r in rows for n in r["changed"]}
     low, high = rows[30]["parameters"]["b"]["ci95"]
     assert low < rows[30]["parameters"]["b"]["value"] < high
@@ -200,7 +200,7 @@ def test_a_growing_file_is_followed_until_ctrl_c(life, tmp_path):
         handle.write(text[1000:])
     line = process.stdout.readline()
     process.send_signal(signal.SIGINT)
-    rest, errors = process.communicate(timeout=60)
+    rest, errors = process.communicate()
     assert line.startswith("0.5 s") and "c_2" in line and process.returncode == 0 and errors == ""
 
 

@@ -207,7 +207,8 @@ def test_a_reference_from_a_file_has_causal_derivatives_and_its_jumps(tmp_path):
     t = np.arange(1000) / 1000.0
     theta = 15 + 3 * np.sin(2 * np.pi * 2 * t) + 5.0 * (t >= 0.5)
     file = tmp_path / "mine.csv"
-    file.write_text("t_s,theta_ref_deg\n" + "\n".join(f"{a!r},{b!r}" for a, b in zip(t.tolist(), theta.tolist())))
+    rows = zip(t.tolist(), theta.tolist(), strict=True)
+    file.write_text("t_s,theta_ref_deg\n" + "\n".join(f"{a!r},{b!r}" for a, b in rows))
     aim = read_reference(file, SERVO, 24.0)
     assert aim.name == "mine" and aim.jumps == (500,) and aim.rate_hz == pytest.approx(1000.0)
     true = np.radians(3 * 4 * np.pi * np.cos(4 * np.pi * t))

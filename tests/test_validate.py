@@ -13,7 +13,7 @@ from ers_mj.report.validation_report import validation_page
 from ers_mj.report.validity import as_document, called, degrees, departures, headline
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.validation import cases as validation
-from ers_mj.validation.cases import Case, Condition, Validation, mapped, possible, rms, validate
+from ers_mj.validation.cases import Case, Condition, Grid, Validation, mapped, possible, rms, validate
 
 SHEET, HALF = read_datasheet("table1"), float(np.radians(0.5))
 PLAIN, PLAY, ROD, COIL = (
@@ -24,25 +24,13 @@ PLAIN, PLAY, ROD, COIL = (
 )
 
 
-def small_maps(patch) -> None:
-    """Maps of four cells, half a second each."""
-    for name, value in {
-        "AMPLITUDES": (1.2, 1.6),
-        "FREQUENCIES_HZ": (2.0, 8.0),
-        "SINE_S": 0.5,
-        "PLAY_S": 0.3,
-        "MAP_GAPS_DEG": (0.0, 0.5),
-        "MAP_L_FACTORS": (0.0, 1.0),
-    }.items():
-        patch.setattr(validation, name, value)
+SMALL = Grid((1.2, 1.6), (2.0, 8.0), sine_s=0.5, gaps_deg=(0.0, 0.5), L_factors=(0.0, 1.0), play_s=0.3)
 
 
 @pytest.fixture(scope="module")
 def short() -> Validation:
     """Every default condition for one second, with small maps."""
-    with pytest.MonkeyPatch.context() as patch:
-        small_maps(patch)
-        return validate(SHEET, duration=1.0)
+    return validate(SHEET, maps=SMALL, duration=1.0)
 
 
 def case(error: np.ndarray, angle: np.ndarray, condition: Condition = ROD) -> Case:
@@ -55,7 +43,7 @@ def case(error: np.ndarray, angle: np.ndarray, condition: Condition = ROD) -> Ca
 
 
 def test_without_play_and_rod_the_reduced_model_is_mujocos():
-    found = validate(SHEET, (0.0,), ("constant",), maps=False)
+    found = validate(SHEET, (0.0,), ("constant",), maps=None)
     assert [(c.input, c.condition.inductance) for c in found.cases] == [
         (name, on) for on in (False, True) for name in INPUTS
     ]
@@ -197,7 +185,7 @@ def asked(short, tmp_path, monkeypatch):
 )
 def test_with_no_option_every_combination_else_the_defaults(argv, conditions, asked, capsys, tmp_path):
     assert cli.main(["validate", *argv.split(), "--json", "--jobs", "1", "--no-maps"]) == 0
-    assert asked[0][:3] == conditions and asked[0][3]["maps"] is False and asked[0][3]["jobs"] == 1
+    assert asked[0][:3] == conditions and asked[0][3]["maps"] is None and asked[0][3]["jobs"] == 1
     assert json.loads(capsys.readouterr().out)["cases"] and list(tmp_path.iterdir()) == []
 
 

@@ -32,17 +32,19 @@ SHOWN = (
 )
 FINITE = """**Finite time** (`python analysis/finite_time.py`)
 
-With q = 97/99 the loop comes as near as with the linear law q = 1, three milliseconds sooner: 54 against 57 ms to a tenth of 10°. V_3 falls along every trajectory (where the
-rudder sticks it grows by less than 2e-5 of its first value), but not to zero in finite time of any use: once x2 and x3 are small the integral x1 is left, which k_1 = 0.25 lets
-go in seconds. A q far from 1 (5/7) is quicker at first and then waits for the same integral.
+With q = 97/99 the loop comes as near as with the linear law q = 1, three milliseconds sooner: 54 against
+57 ms to a tenth of 10°. V_3 falls along every trajectory (where the rudder sticks it grows by less than 2e-5 of its
+first value), but not to zero in finite time of any use: once x2 and x3 are small the integral x1 is left, which
+k_1 = 0.25 lets go in seconds. A q far from 1 (5/7) is quicker at first and then waits for the same integral.
 
 ![Phase portraits, V_3 and the approach](finite_time.png)
 """
 LEAD = """# The paper's claims, and what we measure
 
-Written by `python analysis/paper_figures/claims.py`; the figures by `figure_07.py` to `figure_15.py` beside it. The paper's figures 7 and 8 are simulations of Eq. (5); its test
-bench is not ours: in its place stands the MuJoCo plant. All laws know the plant exactly. `pid-ff`, which the paper does not have, is its PID (38) with the feed-forward
-of FTRC: what FTRC gains over PID and not over `pid-ff` is the feed-forward's, not finite time's.
+Written by `python analysis/paper_figures/claims.py`; the figures by `figure_07.py` to `figure_15.py` beside it. The
+paper's figures 7 and 8 are simulations of Eq. (5); its test bench is not ours: in its place stands the MuJoCo plant. All
+laws know the plant exactly. `pid-ff`, which the paper does not have, is its PID (38) with the feed-forward of FTRC: what
+FTRC gains over PID and not over `pid-ff` is the feed-forward's, not finite time's.
 
 | where | case | claim of FTRC | measured | |
 |---|---|---|---|---|

@@ -1,5 +1,6 @@
 """What the scripts of this folder share: the trials behind a figure, their curves and bars, and where pictures go.
- The paper's figures 7 and 8 are simulations of Eq. (5) at 10 kHz; 11 to 15 were measured on its test bench, in whose
+
+The paper's figures 7 and 8 are simulations of Eq. (5) at 10 kHz; 11 to 15 were measured on its test bench, in whose
 place stands the MuJoCo plant here, with a sensor noise of 0.01 deg and a loop of 1 kHz. Beside the paper's three laws
 stands the fair rival, its PID with the feed-forward of FTRC.
 """
@@ -16,8 +17,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ers_mj.control.trial import Conditions, Trial, try_out
-from ers_mj.report.diagnosis_figures import INK, MEASURED, STYLE
-from ers_mj.report.trial_figures import COLOURS, ROOMY
+from ers_mj.report.style import STYLE
+from ers_mj.report.trial_figures import COLOURS, error_limit
 from ers_mj.servo.datasheet import read_datasheet
 
 LAWS = ("hinf", "pid", "pid-ff", "ftrc")
@@ -38,21 +39,25 @@ def curves(found: Sequence[Trial], name: str, until: float | None = None) -> Pat
     """Response (a) and error (b) of one case, as the paper draws them; the picture's path."""
     reference = found[0].run.reference
     shown = slice(None, None if until is None else int(np.searchsorted(reference.t, until)))
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE.settings):
         figure = Figure(figsize=(9.8, 3.6), layout="constrained")
         response, error = figure.subplots(1, 2)
         response.plot(
-            reference.t[shown], np.degrees(reference.theta[shown]), color=MEASURED, linewidth=3.0, label="reference"
+            reference.t[shown],
+            np.degrees(reference.theta[shown]),
+            color=STYLE.measured,
+            linewidth=3.0,
+            label="reference",
         )
         for trial in found:
             shade = COLOURS[trial.controller]
             response.plot(reference.t[shown], np.degrees(trial.run.theta[shown]), color=shade, label=trial.controller)
             error.plot(reference.t[shown], np.degrees(trial.run.theta - reference.theta)[shown], color=shade)
         largest = [float(np.abs(t.run.theta - t.run.reference.theta).max()) for t in found]
-        limit = np.degrees(min(1.05 * max(largest), ROOMY * float(np.median(largest))))
+        limit = np.degrees(error_limit(largest))
         error.set_ylim(-limit, limit)
         for ax, label in ((response, "(a) angle [°]"), (error, "(b) error [°]")):
-            ax.set_ylabel(label, color=INK)
+            ax.set_ylabel(label, color=STYLE.ink)
             ax.set_xlabel("time [s]")
             ax.margins(x=0)
         figure.legend(loc="outside upper left", ncols=6)
@@ -61,7 +66,7 @@ def curves(found: Sequence[Trial], name: str, until: float | None = None) -> Pat
 
 def bars(panels: Sequence[tuple[str, dict[str, float | None]]], name: str) -> Path:
     """One panel a measure: (its label, value by law); a law without one gets the word never."""
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE.settings):
         figure = Figure(figsize=(9.8, 3.0), layout="constrained")
         for ax, (label, values) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
             for k, (law, x) in enumerate(values.items()):
@@ -72,10 +77,10 @@ def bars(panels: Sequence[tuple[str, dict[str, float | None]]], name: str) -> Pa
                     ha="center",
                     va="bottom",
                     fontsize=8.5,
-                    color=INK,
+                    color=STYLE.ink,
                 )
             ax.set_xticks(range(len(values)), values, rotation=20)
-            ax.set_title(label, color=INK)
+            ax.set_title(label, color=STYLE.ink)
             ax.grid(axis="x", visible=False)
             ax.margins(y=0.15)
         return saved(figure, name)

@@ -18,7 +18,8 @@ if __name__ == "__main__":
     for letter, case in (("a", "square"), ("b", "ramp")):
         found = trials([case], on_bench=True)
         values = lambda key, factor: {
-            t.controller: None if getattr(t.measures, key) is None else factor * getattr(t.measures, key) for t in found
-        }  # noqa: E731, B023
+            t.controller: None if getattr(t.measures, key) is None else factor * getattr(t.measures, key)
+            for t in found  # noqa: B023
+        }
         bars([(label, values(key, factor)) for label, key, factor in MEASURES], f"figure_15{letter}")
         table(found)

@@ -1,6 +1,7 @@
 """The commands of `ers`: one file each, with `add_parser(commands)` and `run(arguments) -> exit code`.
 
-What is slow to import is imported inside `run`, so that `ers --help` is quick.
+What several share: options (and checks on them), recordings (what they must have in common), loop (of trial and
+frequency), output (files, JSON, lines). What is slow to import is imported inside `run`, so that `ers --help` is quick.
 """
 
 from ers_mj.commands import (

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_common, add_out, mapping, pair, results_folder
-from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
-from ers_mj.errors import InputError
+from ers_mj.commands.options import add_common, add_map, add_out, add_recordings, mapping, results_folder
+from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, write_results, write_text
+from ers_mj.commands.recordings import refuse_mixed_units, refuse_twice
 
 if TYPE_CHECKING:
     from ers_mj.data.recording import Recording
@@ -27,23 +26,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         epilog="examples:\n  ers diagnose run1.csv run2.csv --datasheet servo.toml --holdout run3.csv\n"
         "  ers diagnose runs.parquet#run=17 --map t_s=Time --map theta_deg=Angle --json",
     )
-    parser.add_argument(
-        "recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several"
-    )
+    add_recordings(parser)
     parser.add_argument(
         "--datasheet", metavar="TOML", help="what is known of the servo; table1 is the paper's (default: nothing)"
     )
     parser.add_argument(
         "--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable"
     )
-    parser.add_argument(
-        "--map",
-        type=pair,
-        action="append",
-        default=[],
-        metavar="name=column",
-        help="take the column as this name, as in t_s=Time; repeatable",
-    )
+    add_map(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -94,60 +84,21 @@ def _write(folder: Path, document: dict, found: object, progress: Progress) -> l
     following = (document.get("next_recording") or {}).get("excitation")
     return write_results(
         folder,
-        {
-            "diagnosis.json": lambda path: write_text(path, as_json(document) + "\n"),
-            "report.html": lambda path: write_text(path, page),
+        report_writers("diagnosis.json", document, page)
+        | {
             "model.toml": lambda path: write_model(path, found.model),
             "plant.xml": lambda path: write_text(path, found.plant.xml()),
         }
-        | ({"next_recording.csv": lambda path: write_text(path, _input_table(following))} if following else {}),
+        | ({"next_recording.csv": lambda path: write_text(path, input_table(following))} if following else {}),
     )
 
 
-def _input_table(excitation: dict) -> str:
+def input_table(excitation: dict) -> str:
     """The input to record next, as `ers simulate --input` takes it."""
     from ers_mj.data.excitation import signal
 
     column = {"%": "u_duty_pct"}.get(excitation["input_unit"], f"u_{excitation['input_unit']}")
-    return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation)))]) + "\n"
-
-
-# -- what cannot be diagnosed together --------------------------------------------------------------------------
-
-
-def refuse_twice(recordings: list[Recording], holdout: list[Recording]) -> None:
-    """Raise InputError where one recording, by its content, is given twice or both trained and held out."""
-    first: dict[tuple[str, str], str] = {}
-    trained = {_identity(recording) for recording in recordings}
-    for recording, held_out in [*((r, False) for r in recordings), *((r, True) for r in holdout)]:
-        key = _identity(recording)
-        if held_out and key in trained:
-            raise InputError(
-                f"{recording.name}: is held out and also among the training recordings "
-                f"(as {first[key]}), a recording cannot judge what it taught"
-            )
-        if key in first:
-            raise InputError(f"{recording.name}: is the same recording as {first[key]}, give it once")
-        first[key] = recording.name
-
-
-def _identity(recording: Recording) -> tuple[str, str]:
-    """Content and run."""
-    return recording.sha256, recording.name.partition("#run=")[2]
-
-
-def refuse_mixed_units(recordings: list[Recording]) -> None:
-    """Raise InputError where outputs or inputs are not all of one unit."""
-    for noun, attribute in (("output", "output_unit"), ("input", "input_unit")):
-        units = Counter(getattr(recording, attribute) for recording in recordings)
-        if len(units) > 1:
-            common = units.most_common(1)[0][0]
-            odd = next(r for r in recordings if getattr(r, attribute) != common)
-            other = next(r for r in recordings if getattr(r, attribute) == common)
-            raise InputError(
-                f"{odd.name}: its {noun} is in {getattr(odd, attribute)} and that of {other.name} in {common}, "
-                "recordings of one unit were expected"
-            )
+    return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation), strict=True))]) + "\n"
 
 
 # -- the diagnosis in lines ---------------------------------------------------------------------------------------

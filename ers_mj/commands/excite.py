@@ -6,17 +6,14 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import number, one_of, several
+from ers_mj.commands.options import number, one_of, several, table_file
 from ers_mj.commands.output import Progress, as_json, bold, make_room
-from ers_mj.commands.simulate import checked_out
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.experiment_design.optimal_input import Plan, Question
+    from ers_mj.experiment_design.question import Plan, Question
 
 CRITERIA = ("A", "D")
-MOST_SAMPLES = 200_000
-Z_95 = 1.96  # half-width of a 95 % interval over the standard deviation
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -35,6 +32,16 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             " next.csv --out rec.csv"
         ),
     )
+    _add_rig(parser)
+    _add_question(parser)
+    parser.add_argument("--out", required=True, metavar="FILE", help="the CSV file to write: t_s,u_V")
+    parser.add_argument("--force", action="store_true", help="overwrite FILE")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def _add_rig(parser: argparse.ArgumentParser) -> None:
+    """The servo, what may be done to it, and how it is measured."""
     parser.add_argument(
         "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
     )
@@ -76,6 +83,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--inductance", choices=("on", "off"), default="on", help="whether the datasheet's L acts (default on)"
     )
+
+
+def _add_question(parser: argparse.ArgumentParser) -> None:
+    """Which parameters are wanted, and against what the design is judged."""
     parser.add_argument(
         "--for",
         dest="wanted",
@@ -97,27 +108,24 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="NAME",
         help="named input to compare with, cut off at --umax-V (default multisine)",
     )
-    parser.add_argument("--out", required=True, metavar="FILE", help="the CSV file to write: t_s,u_V")
-    parser.add_argument("--force", action="store_true", help="overwrite FILE")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Design, write, tell; 0."""
-    out = checked_out(arguments)
+    out = table_file(arguments.out, arguments.force)
     from ers_mj.data.recording import FEWEST_SAMPLES, write_recording
-    from ers_mj.experiment_design.optimal_input import Question, Rig, planned, reference
+    from ers_mj.experiment_design.optimal_input import planned, reference
+    from ers_mj.experiment_design.question import Question, Rig
     from ers_mj.plants.inputs import INPUTS
     from ers_mj.servo.datasheet import read_datasheet
 
     if arguments.against not in INPUTS:
         raise InputError(f"--against: there is no input {arguments.against[:40]!r}; there are {', '.join(INPUTS)}")
-    samples = arguments.duration_s * arguments.rate_hz
-    if not FEWEST_SAMPLES <= samples <= MOST_SAMPLES:
+    samples, most = arguments.duration_s * arguments.rate_hz, 200_000
+    if not FEWEST_SAMPLES <= samples <= most:
         raise InputError(
             f"{arguments.duration_s:g} s at {arguments.rate_hz:g} Hz are {samples:.3g} samples, {FEWEST_SAMPLES} to"
-            f" {MOST_SAMPLES} were expected"
+            f" {most} were expected"
         )
     datasheet = read_datasheet(arguments.model)
     rig = Rig.of(
@@ -140,18 +148,23 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _half_width(sigma: float) -> float:
+    """Of a 95 % interval, from its standard deviation."""
+    return 1.96 * sigma
+
+
 def _document(arguments: argparse.Namespace, question: Question, before: Plan, plan: Plan) -> dict:
-    from ers_mj.experiment_design.optimal_input import TOLD
+    from ers_mj.experiment_design.question import TOLD
 
     rows = {
         name: {
             "meaning": TOLD[name][0],
             "relative": name != "theta_0",
-            "against": Z_95 * before.spread[name],
-            "designed": Z_95 * plan.spread[name],
+            "against": _half_width(before.spread[name]),
+            "designed": _half_width(plan.spread[name]),
             "ratio": plan.spread[name] / before.spread[name],
-            "refits_against": Z_95 * before.found[name],
-            "refits_designed": Z_95 * plan.found[name],
+            "refits_against": _half_width(before.found[name]),
+            "refits_designed": _half_width(plan.found[name]),
             "refits_ratio": plan.found[name] / before.found[name],
         }
         for name in question.wanted
@@ -169,8 +182,8 @@ def _document(arguments: argparse.Namespace, question: Question, before: Plan, p
 
 
 def _told(document: dict) -> list[str]:
-    from ers_mj.experiment_design.next_recording import asked
     from ers_mj.experiment_design.optimal_input import UNSEEN
+    from ers_mj.experiment_design.wording import asked
 
     parts = [
         (
@@ -190,12 +203,11 @@ def _told(document: dict) -> list[str]:
     for name, row in document["half_width_95"].items():
         scale, unit = (100.0, " %") if row["relative"] else (math.degrees(1.0), "°")
         widths = [
-            f"{scale * row[key]:.3g}{unit}" if row[key] < Z_95 * UNSEEN or not row["relative"] else "not seen"
+            f"{scale * row[key]:.3g}{unit}" if row[key] < _half_width(UNSEEN) or not row["relative"] else "not seen"
             for key in ("refits_against", "refits_designed")
         ]
-        lines.append(
-            f"  {name:8}{row['meaning']:20}{widths[0]:>14}{widths[1]:>14}{row['refits_ratio']:>9.2f}{row['ratio']:>11.2f}"
-        )
+        ratios = f"{row['refits_ratio']:>9.2f}{row['ratio']:>11.2f}"
+        lines.append(f"  {name:8}{row['meaning']:20}{widths[0]:>14}{widths[1]:>14}{ratios}")
     lines += [
         "",
         "Widths and ratio are what refits to simulated recordings find; promised is the ratio by Fisher's information"

@@ -7,8 +7,19 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import QUARTER, TURN, add_out, mapping, number, one_of, pair, results_folder, several
-from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
+from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
+from ers_mj.commands.options import (
+    add_out,
+    angle_deg,
+    mapping,
+    number,
+    one_of,
+    pair,
+    results_folder,
+    several,
+    swing_deg,
+)
+from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
 
 if TYPE_CHECKING:
     from ers_mj.control.frequency.study import Study
@@ -41,6 +52,25 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             " --effect backlash:gap=0.0087,rho=0.64,f_contact=40,zeta=0.2 --json"
         ),
     )
+    _add_what(parser)
+    _add_how(parser)
+    add_plant(parser)
+    add_laws(parser)
+    parser.add_argument(
+        "--map",
+        action="append",
+        type=pair,
+        default=[],
+        metavar="NAME=COLUMN",
+        help="column of the recordings that holds NAME; repeatable",
+    )
+    add_out(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
+    parser.set_defaults(run=run)
+
+
+def _add_what(parser: argparse.ArgumentParser) -> None:
+    """Which laws, on which plants, beside which recordings."""
     parser.add_argument(
         "recordings", nargs="*", metavar="REC", help="recordings whose frequency response is set beside the models'"
     )
@@ -63,16 +93,20 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="reduced,mujoco",
         help="default reduced",
     )
+
+
+def _add_how(parser: argparse.ArgumentParser) -> None:
+    """At which amplitude, about which angle, how fast, with what voltage."""
     parser.add_argument(
         "--amplitude-deg",
-        type=number(above=0, most=TURN),
+        type=swing_deg,
         default=1.0,
         metavar="X",
         help="of the rudder's sine at which what is not linear is described (default 1)",
     )
     parser.add_argument(
         "--at-deg",
-        type=number(least=-TURN, most=TURN),
+        type=angle_deg,
         metavar="X",
         help="angle about which the loops are linearised (default 10 beyond theta_0)",
     )
@@ -87,62 +121,17 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="X",
         help="largest voltage, for limit cycles (default 24)",
     )
-    parser.add_argument(
-        "--gap", type=number(least=0, most=QUARTER), default=0.0, metavar="DEG", help="play of +-DEG (default 0)"
-    )
-    parser.add_argument(
-        "--linkage", choices=("constant", "rod"), default="constant", help="of MuJoCo's rudder (default constant)"
-    )
-    parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME:key=value,...",
-        help="physics to add to the plant, SI; repeatable",
-    )
-    parser.add_argument(
-        "--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)"
-    )
-    parser.add_argument(
-        "--filter-ms",
-        type=number(least=0),
-        default=0.5,
-        metavar="X",
-        help="time constant of the speed's filter (default 0.5)",
-    )
-    parser.add_argument(
-        "--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them"
-    )
-    parser.add_argument(
-        "--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)"
-    )
-    parser.add_argument(
-        "--map",
-        action="append",
-        type=pair,
-        default=[],
-        metavar="NAME=COLUMN",
-        help="column of the recordings that holds NAME; repeatable",
-    )
-    add_out(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, write, tell; 0."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    from ers_mj.commands.trial import refuse_unknown, versions
     from ers_mj.control.controllers import CONTROLLERS
     from ers_mj.control.frequency.study import study
     from ers_mj.data.recording import read_recording
-    from ers_mj.servo.datasheet import read_datasheet
 
-    controllers = arguments.controller or list(CONTROLLERS)
-    refuse_unknown("--controller", controllers, CONTROLLERS)
-    datasheet = read_datasheet(arguments.datasheet)
-    design = datasheet if arguments.design is None else read_datasheet(arguments.design)
+    controllers = chosen_controllers(arguments)
+    datasheet, design = plant_and_design(arguments.datasheet, arguments.design)
     conditions = _conditions(arguments, datasheet)
     recordings = [read_recording(spec, mapping(arguments.map)) for spec in arguments.recordings]
     with Progress() as progress:
@@ -163,26 +152,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _conditions(arguments: argparse.Namespace, datasheet: Datasheet) -> Conditions:
-    from ers_mj.control.controllers import parse_gains, parse_pid
-    from ers_mj.control.trial import Conditions
-    from ers_mj.servo.simulation import parse_effect
-
-    effects = [parse_effect(text) for text in arguments.effect]
-    effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
     rest = datasheet.to_lumped().get("theta_0", 0.0)
-    return Conditions(
-        amplitude=math.radians(arguments.amplitude_deg),
-        start=rest + math.radians(10.0) if arguments.at_deg is None else math.radians(arguments.at_deg),
-        rate_hz=arguments.rate_hz,
-        u_max=arguments.umax,
-        gap=math.radians(arguments.gap),
-        linkage=arguments.linkage,
-        inductance=arguments.inductance == "on",
-        filter_s=1e-3 * arguments.filter_ms,
-        gains=parse_gains(arguments.gains),
-        pid=parse_pid(arguments.pid),
-        effects=tuple(effects),
-    )
+    start = rest + math.radians(10.0) if arguments.at_deg is None else math.radians(arguments.at_deg)
+    return conditions_of(arguments, start=start, rate_hz=arguments.rate_hz)
 
 
 def _document(found: Study, conditions: Conditions) -> dict:
@@ -203,17 +175,10 @@ def _write(folder: Path, document: dict, found: Study, progress: Progress) -> li
 
     progress("drawing the report", 1.0)
     page = frequency_page(document, found)
-    return write_results(
-        folder,
-        {
-            "frequency.json": lambda path: write_text(path, as_json(document) + "\n"),
-            "report.html": lambda path: write_text(path, page),
-        },
-    )
+    return write_results(folder, report_writers("frequency.json", document, page))
 
 
-# -- in lines
-# ------------------------------------------------------------------------------------------------------------
+# -- in lines ---------------------------------------------------------------------------------------------------------
 
 
 def _told(document: dict, files: list[Path]) -> list[str]:
@@ -232,7 +197,7 @@ def _told(document: dict, files: list[Path]) -> list[str]:
             *(f"  {sentence}" for r in document["recordings"] for sentence in r["sentences"]),
         ]
     lines += ["", *document["notes"]] if document["notes"] else []
-    return lines + (["", bold("written"), *(f"  {path}" for path in files)] if files else [])
+    return lines + written(files)
 
 
 def _cell(x: float | None, form: str) -> str:

@@ -6,14 +6,12 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import TURN, number, whole
+from ers_mj.commands.options import angle_deg, number, swing_deg, whole
 from ers_mj.commands.output import Progress, as_json, bold
 
 if TYPE_CHECKING:
     from ers_mj.control.controllers import Gains
     from ers_mj.servo.datasheet import Datasheet
-
-DONE, CHECK_FAILED = 0, 1
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -47,14 +45,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         "--amplitude-deg",
-        type=number(above=0, most=TURN),
+        type=swing_deg,
         default=10.0,
         metavar="X",
         help="step that settling and bound belong to (default 10)",
     )
     parser.add_argument(
         "--start-deg",
-        type=number(least=-TURN, most=TURN),
+        type=angle_deg,
         default=15.0,
         metavar="X",
         help="where it starts (default 15)",
@@ -96,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
         "wished_s": None if arguments.settling_ms is None else 1e-3 * arguments.settling_ms,
     }
     print(as_json(document) if arguments.json else "\n".join(_told(document, arguments)))
-    return DONE if document["feasible"] else CHECK_FAILED
+    return 0 if document["feasible"] else 1
 
 
 def _settle(datasheet: Datasheet, arguments: argparse.Namespace):

@@ -6,9 +6,21 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.diagnose import refuse_mixed_units, refuse_twice
-from ers_mj.commands.options import add_common, add_out, mapping, number, one_of, pair, results_folder, several, whole
-from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
+from ers_mj.commands.options import (
+    add_common,
+    add_map,
+    add_out,
+    add_recordings,
+    mapping,
+    number,
+    one_of,
+    pair,
+    results_folder,
+    several,
+    whole,
+)
+from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
+from ers_mj.commands.recordings import refuse_mixed_units, refuse_twice
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,9 +42,17 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "  ers identify run1.csv --datasheet servo.toml --plant mujoco --json"
         ),
     )
-    parser.add_argument(
-        "recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several"
-    )
+    add_recordings(parser)
+    _add_way(parser)
+    _add_search(parser)
+    add_map(parser)
+    add_out(parser)
+    add_common(parser)
+    parser.set_defaults(run=run)
+
+
+def _add_way(parser: argparse.ArgumentParser) -> None:
+    """By which method, on which plant, from what."""
     parser.add_argument(
         "--method",
         default="ls",
@@ -54,6 +74,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             " scratch)"
         ),
     )
+
+
+def _add_search(parser: argparse.ArgumentParser) -> None:
+    """What is held, where the rest is searched, and for how long."""
     parser.add_argument(
         "--fix",
         type=pair,
@@ -82,27 +106,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument("--timestep", type=number(above=0), metavar="S", help="MuJoCo's step [s] (default 5e-5)")
     parser.add_argument("--polish", action="store_true", help="let ls go on where another method ends")
-    parser.add_argument(
-        "--map",
-        type=pair,
-        action="append",
-        default=[],
-        metavar="name=column",
-        help="take the column as this name, as in t_s=Time; repeatable",
-    )
-    add_out(parser)
-    add_common(parser)
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, write, tell; 0 whatever comes out."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    names, fixed, bounds = (
-        mapping(arguments.map),
-        _values(arguments.fix, "--fix", _value),
-        _values(arguments.bounds, "--bounds", _ends),
-    )
+    names = mapping(arguments.map)
+    fixed, bounds = _values(arguments.fix, "--fix", _value), _values(arguments.bounds, "--bounds", _ends)
     if len(arguments.within) != 2 or not arguments.within[0] < 1 < arguments.within[1]:
         raise InputError(
             f"--within gives {', '.join(f'{x:g}' for x in arguments.within)}, a factor below one and one above it were"
@@ -161,8 +171,6 @@ def _ends(name: str, text: str, option: str) -> tuple[float, float]:
 
 
 def _document(found: Identified, recordings: list[Recording]) -> dict:
-    from ers_mj.commands.trial import versions
-
     return {
         "method": found.settings.method,
         "plant": found.settings.plant,
@@ -200,11 +208,7 @@ def _write(folder: Path, document: dict, found: Identified, progress: Progress) 
     page = identify_page(document, found)
     return write_results(
         folder,
-        {
-            "identify.json": lambda path: write_text(path, as_json(document) + "\n"),
-            "report.html": lambda path: write_text(path, page),
-            "model.toml": lambda path: write_model(path, found.model),
-        },
+        report_writers("identify.json", document, page) | {"model.toml": lambda path: write_model(path, found.model)},
     )
 
 
@@ -219,7 +223,7 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     for name, row in document["parameters"].items():
         value = "not told" if row["value"] is None else f"{row['value']:.5g}"
         low, high = row["ci95"]
-        ends = f"{low:.5g} .. {high:.5g}" if low is not None and not row["fixed"] else "held" if row["fixed"] else ""
+        ends = "held" if row["fixed"] else "" if low is None else f"{low:.5g} .. {high:.5g}"
         sheet = "" if row["datasheet"] is None else f"{row['datasheet']:.5g}"
         lines.append(f"  {name:14}{value:>14}{ends:>30}{sheet:>14}  {row['unit']}")
     lines += [
@@ -232,4 +236,4 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     lines += (
         ["", bold("be careful"), *(f"  {warning}" for warning in document["warnings"])] if document["warnings"] else []
     )
-    return lines + (["", bold("written"), *(f"  {path}" for path in files)] if files else [])
+    return lines + written(files)

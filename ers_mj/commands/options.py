@@ -5,15 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from ers_mj.errors import InputError
 
 DEFAULT_OUT = "ers-out"
-TURN, QUARTER = (
-    360.0,
-    90.0,
-)  # [deg] that no rudder's step or angle goes beyond, and no play, noise or count of its sensor
+OTHER_FORMATS = (".parquet", ".mat", ".h5", ".hdf5", ".npz", ".json", ".toml")
 
 
 def number(least: float | None = None, above: float | None = None, most: float | None = None):
@@ -35,6 +33,11 @@ def number(least: float | None = None, above: float | None = None, most: float |
         return x
 
     return parse
+
+
+swing_deg = number(above=0.0, most=360.0)  # of a rudder's step or sine
+angle_deg = number(least=-360.0, most=360.0)  # where a rudder stands
+small_deg = number(least=0.0, most=90.0)  # of a play, a noise or a count of the sensor
 
 
 def whole(least: int):
@@ -83,6 +86,25 @@ def pair(text: str) -> tuple[str, str]:
     return name, column
 
 
+def add_recordings(parser: argparse.ArgumentParser) -> None:
+    """REC, at least one."""
+    parser.add_argument(
+        "recordings", nargs="+", metavar="REC", help="CSV or Parquet, FILE.parquet#run=17 for one run of several"
+    )
+
+
+def add_map(parser: argparse.ArgumentParser) -> None:
+    """--map."""
+    parser.add_argument(
+        "--map",
+        type=pair,
+        action="append",
+        default=[],
+        metavar="name=column",
+        help="take the column as this name, as in t_s=Time; repeatable",
+    )
+
+
 def add_out(parser: argparse.ArgumentParser) -> None:
     """--out DIR and --force."""
     parser.add_argument("--out", metavar="DIR", help=f"folder for the results (default {DEFAULT_OUT}/)")
@@ -116,6 +138,30 @@ def mapping(pairs: list[tuple[str, str]]) -> dict[str, str]:
         twice = next(name for name, _ in pairs if [n for n, _ in pairs].count(name) > 1)
         raise InputError(f"--map gives {twice} twice, one column was expected")
     return chosen
+
+
+def refuse_unknown(option: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise InputError for a name that does not exist."""
+    for name in names:
+        if name not in known:
+            raise InputError(f"{option}: there is no {name[:40]!r}; there are {', '.join(known)}")
+
+
+def table_file(out: str, force: bool) -> Path:
+    """The CSV file that a recording or an input will go to, checked before any work starts.
+
+    Raises:
+        InputError: it is a folder, is of another format, exists already, or cannot be written.
+    """
+    file = Path(out)
+    if not out or file.is_dir():
+        raise InputError(f"--out {out or 'is empty'}: a file was expected, as in --out rec.csv")
+    if file.suffix.lower() in OTHER_FORMATS:
+        raise InputError(f"{file}: the file name ends in {file.suffix!r}, simulate writes .csv")
+    if file.exists() and not force:
+        raise InputError(f"{file}: exists already, give --force to overwrite it")
+    refuse_unwritable(file)
+    return file
 
 
 def results_folder(out: str | None, force: bool, as_json: bool) -> Path | None:

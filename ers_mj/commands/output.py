@@ -8,12 +8,10 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ers_mj.errors import InputError
-
-BAR = 24  # characters
 
 
 def plain(x: object) -> object:
@@ -63,6 +61,14 @@ def write_results(folder: Path, writers: Mapping[str, Callable[[Path], None]]) -
     return [folder / name for name in writers]
 
 
+def report_writers(name: str, document: object, page: str) -> dict[str, Callable[[Path], None]]:
+    """For :func:`write_results`: the document under this name, and the page."""
+    return {
+        name: lambda path: write_text(path, as_json(document) + "\n"),
+        "report.html": lambda path: write_text(path, page),
+    }
+
+
 def make_room(path: Path) -> None:
     """Make the folder that a file is to lie in.
 
@@ -101,10 +107,10 @@ class Progress:
     def __call__(self, text: str, fraction: float) -> None:
         if not self.shown:
             return
-        share = min(max(float(fraction), 0.0), 1.0)
-        full = round(BAR * share)
+        share, bar = min(max(float(fraction), 0.0), 1.0), 24  # characters
+        full = round(bar * share)
         width = max(shutil.get_terminal_size().columns - 1, 20)
-        line = f"  {'━' * full}{'╌' * (BAR - full)} {share:4.0%}  {text}"
+        line = f"  {'━' * full}{'╌' * (bar - full)} {share:4.0%}  {text}"
         sys.stderr.write(f"\r\x1b[2K{line[:width]}")
         sys.stderr.flush()
 
@@ -115,6 +121,20 @@ class Progress:
         if self.shown:
             sys.stderr.write("\r\x1b[2K")
             sys.stderr.flush()
+
+
+def versions() -> dict[str, str]:
+    """Of this package and MuJoCo."""
+    import mujoco
+
+    from ers_mj import __version__
+
+    return {"ers-mj": __version__, "mujoco": mujoco.__version__}
+
+
+def written(files: Sequence[Path]) -> list[str]:
+    """The lines that tell which files were written, none where there are none."""
+    return ["", bold("written"), *(f"  {path}" for path in files)] if files else []
 
 
 def bold(text: str) -> str:

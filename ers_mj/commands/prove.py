@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, refuse_unwritable, whole
-from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
+from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, write_results, write_text, written
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
     from ers_mj.proving.conduct import Proof, Task
 
-CASES, STOPPED = 20, 130
+CASES = 20  # of a proof that names no number
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -93,7 +93,7 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
             else "nothing was kept, --out DIR would keep it"
         )
         print(f"ers: stopped; {kept}", file=sys.stderr)
-        return STOPPED
+        return 130
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
     scores = scored(rows) if arguments.real is None else scored_real(rows)
     results = plain(
@@ -101,11 +101,7 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     )
     told = _told(results)
     files = _write(folder, results, rows, told) if keeps else []
-    print(
-        as_json(results)
-        if arguments.json
-        else "\n".join([*told, *(["", bold("written"), *(f"  {path}" for path in files)] if files else [])])
-    )
+    print(as_json(results) if arguments.json else "\n".join([*told, *written(files)]))
     return 0
 
 
@@ -157,11 +153,8 @@ def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> li
     page = proof_page(results, rows, about)
     return write_results(
         folder,
-        {
-            "results.json": lambda path: write_text(path, as_json(results) + "\n"),
-            "report.html": lambda path: write_text(path, page),
-            "summary.txt": lambda path: write_text(path, "\n".join(told) + "\n"),
-        },
+        report_writers("results.json", results, page)
+        | {"summary.txt": lambda path: write_text(path, "\n".join(told) + "\n")},
     )
 
 

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import number, refuse_unwritable, whole
+from ers_mj.commands.options import number, table_file, whole
 from ers_mj.commands.output import as_json, make_room
 from ers_mj.errors import InputError
 
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     import numpy as np
 
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
-OTHER_FORMATS = (".parquet", ".mat", ".h5", ".hdf5", ".npz", ".json", ".toml")
-MOST_SAMPLES = 20_000_000
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -68,7 +66,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write; 0."""
-    out = checked_out(arguments)
+    out = table_file(arguments.out, arguments.force)
     from ers_mj.data.recording import write_recording
     from ers_mj.servo.datasheet import read_datasheet
     from ers_mj.servo.simulation import parse_effect, simulate_recording
@@ -96,19 +94,6 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def checked_out(arguments: argparse.Namespace) -> Path:
-    """The file to write, checked before any work starts."""
-    out = Path(arguments.out)
-    if not arguments.out or out.is_dir():
-        raise InputError(f"--out {arguments.out or 'is empty'}: a file was expected, as in --out rec.csv")
-    if out.suffix.lower() in OTHER_FORMATS:
-        raise InputError(f"{out}: the file name ends in {out.suffix!r}, simulate writes .csv")
-    if out.exists() and not arguments.force:
-        raise InputError(f"{out}: exists already, give --force to overwrite it")
-    refuse_unwritable(out)
-    return out
-
-
 def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
     """Time and voltage, of a name or of a file."""
     import numpy as np
@@ -126,10 +111,10 @@ def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
                 f"--input {file}: there is no such file and no input of that name; there are {', '.join(INPUTS)}"
             )
         return read_input(file)
-    rate, duration = arguments.rate_hz or RATE_HZ, arguments.duration or DURATION
-    if not 2 <= rate * duration <= MOST_SAMPLES:
+    rate, duration, most = arguments.rate_hz or RATE_HZ, arguments.duration or DURATION, 20_000_000
+    if not 2 <= rate * duration <= most:
         raise InputError(
-            f"{duration:g} s at {rate:g} Hz are {rate * duration:.3g} samples, 2 to {MOST_SAMPLES:.0e} were expected"
+            f"{duration:g} s at {rate:g} Hz are {rate * duration:.3g} samples, 2 to {most:.0e} were expected"
         )
     t = np.arange(round(rate * duration)) / rate
     return t, INPUTS[arguments.input](t)

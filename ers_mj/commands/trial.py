@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import QUARTER, TURN, add_common, add_out, number, results_folder, several, whole
-from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
+from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
+from ers_mj.commands.options import (
+    add_common,
+    add_out,
+    angle_deg,
+    number,
+    refuse_unknown,
+    results_folder,
+    several,
+    small_deg,
+    swing_deg,
+    whole,
+)
+from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,7 +28,6 @@ if TYPE_CHECKING:
     from ers_mj.control.trial import Conditions, Trial
     from ers_mj.servo.datasheet import Datasheet
 
-LINKAGES = ("constant", "rod")
 COLUMNS = (
     ("settles [ms]", "settling_time_s", 1e3, ".1f"),
     ("overshoot [%]", "overshoot_pct", 1.0, ".2f"),
@@ -44,6 +54,19 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             " stribeck:dF_s=0.1,v_s=0.2 --json"
         ),
     )
+    _add_what(parser)
+    _add_how(parser)
+    add_plant(parser)
+    _add_sensor(parser)
+    add_laws(parser)
+    _add_scatter(parser)
+    add_out(parser)
+    add_common(parser)
+    parser.set_defaults(run=run)
+
+
+def _add_what(parser: argparse.ArgumentParser) -> None:
+    """Which laws, on which plants, over which references."""
     parser.add_argument(
         "model",
         nargs="?",
@@ -70,12 +93,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="NAME|CSV,...",
         help="step, square, ramp, chirp, or a file with t_s and theta_ref_rad or theta_ref_deg (default step)",
     )
-    parser.add_argument(
-        "--amplitude-deg", type=number(above=0, most=TURN), default=10.0, metavar="X", help="of the cases (default 10)"
-    )
+
+
+def _add_how(parser: argparse.ArgumentParser) -> None:
+    """How far, from where, how fast, with what voltage."""
+    parser.add_argument("--amplitude-deg", type=swing_deg, default=10.0, metavar="X", help="of the cases (default 10)")
     parser.add_argument(
         "--start-deg",
-        type=number(least=-TURN, most=TURN),
+        type=angle_deg,
         default=15.0,
         metavar="X",
         help="where the rudder rests at first (default 15)",
@@ -89,48 +114,28 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--umax-V", dest="umax", type=number(above=0), default=24.0, metavar="X", help="largest voltage (default 24)"
     )
-    parser.add_argument(
-        "--gap", type=number(least=0, most=QUARTER), default=0.0, metavar="DEG", help="play of +-DEG (default 0)"
-    )
-    parser.add_argument("--linkage", choices=LINKAGES, default="constant", help="of MuJoCo's rudder (default constant)")
-    parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME:key=value,...",
-        help="physics to add to the plant, SI; repeatable",
-    )
+
+
+def _add_sensor(parser: argparse.ArgumentParser) -> None:
+    """What the angle is read with."""
     parser.add_argument(
         "--noise-deg",
-        type=number(least=0, most=QUARTER),
+        type=small_deg,
         default=0.0,
         metavar="X",
         help="sensor noise, standard deviation (default 0)",
     )
     parser.add_argument(
         "--quantum-deg",
-        type=number(least=0, most=QUARTER),
+        type=small_deg,
         default=0.0,
         metavar="X",
         help="one count of the sensor (default 0)",
     )
-    parser.add_argument(
-        "--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)"
-    )
-    parser.add_argument(
-        "--filter-ms",
-        type=number(least=0),
-        default=0.5,
-        metavar="X",
-        help="time constant of the speed's filter (default 0.5)",
-    )
-    parser.add_argument(
-        "--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them"
-    )
-    parser.add_argument(
-        "--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)"
-    )
+
+
+def _add_scatter(parser: argparse.ArgumentParser) -> None:
+    """More servos than one."""
     parser.add_argument(
         "--plants",
         type=whole(1),
@@ -145,9 +150,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="X",
         help="largest factor, up or down, of that (default 1.2)",
     )
-    add_out(parser)
-    add_common(parser)
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -156,13 +158,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ers_mj.control.controllers import CONTROLLERS
     from ers_mj.control.paper_claims import headline
     from ers_mj.control.trial import try_out
-    from ers_mj.servo.datasheet import read_datasheet
 
-    controllers = arguments.controller or list(CONTROLLERS)
-    refuse_unknown("--controller", controllers, CONTROLLERS)
+    controllers = chosen_controllers(arguments)
     _refuse_cases(arguments)
-    datasheet = read_datasheet(arguments.model)
-    design = datasheet if arguments.design is None else read_datasheet(arguments.design)
+    datasheet, design = plant_and_design(arguments.model, arguments.design)
     conditions = _conditions(arguments)
     with Progress() as progress:
         trials = try_out(
@@ -197,29 +196,13 @@ def _spreads(
     progress: Progress,
 ) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
-    from ers_mj.control.monte_carlo import scatter
+    from ers_mj.control.monte_carlo import Fleet, scatter
 
     if not arguments.plants:
         return []
-    return scatter(
-        datasheet,
-        controllers,
-        arguments.plant,
-        arguments.case,
-        conditions,
-        count=arguments.plants,
-        spread=arguments.scatter,
-        design=design,
-        jobs=arguments.jobs,
-        progress=progress,
-    )
-
-
-def refuse_unknown(option: str, names: Iterable[str], known: Iterable[str]) -> None:
-    """Raise InputError for a name that does not exist."""
-    for name in names:
-        if name not in known:
-            raise InputError(f"{option}: there is no {name[:40]!r}; there are {', '.join(known)}")
+    fleet = Fleet(datasheet, arguments.plants, arguments.scatter, design)
+    asked = controllers, arguments.plant, arguments.case
+    return scatter(fleet, *asked, conditions, jobs=arguments.jobs, progress=progress)
 
 
 def _refuse_cases(arguments: argparse.Namespace) -> None:
@@ -240,27 +223,14 @@ def _refuse_cases(arguments: argparse.Namespace) -> None:
 
 
 def _conditions(arguments: argparse.Namespace) -> Conditions:
-    from ers_mj.control.controllers import parse_gains, parse_pid
-    from ers_mj.control.trial import Conditions
-    from ers_mj.servo.simulation import parse_effect
-
-    effects = [parse_effect(text) for text in arguments.effect]
-    effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
-    effects += [("sensor_quantisation", {"step": math.radians(arguments.quantum_deg)})] if arguments.quantum_deg else []
-    return Conditions(
-        amplitude=math.radians(arguments.amplitude_deg),
+    quantum = math.radians(arguments.quantum_deg)
+    return conditions_of(
+        arguments,
         start=math.radians(arguments.start_deg),
         rate_hz=arguments.rate_hz or 10_000.0,
-        u_max=arguments.umax,
-        gap=math.radians(arguments.gap),
-        linkage=arguments.linkage,
-        inductance=arguments.inductance == "on",
         noise=math.radians(arguments.noise_deg),
         seed=arguments.seed,
-        filter_s=1e-3 * arguments.filter_ms,
-        gains=parse_gains(arguments.gains),
-        pid=parse_pid(arguments.pid),
-        effects=tuple(effects),
+        effects=[("sensor_quantisation", {"step": quantum})] if quantum else [],
     )
 
 
@@ -280,27 +250,12 @@ def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> li
     return notes
 
 
-def versions() -> dict[str, str]:
-    """Of this package and MuJoCo."""
-    import mujoco
-
-    from ers_mj import __version__
-
-    return {"ers-mj": __version__, "mujoco": mujoco.__version__}
-
-
 def _write(folder: Path, document: dict, trials: list[Trial], spreads: list[Spread], progress: Progress) -> list[Path]:
     from ers_mj.report.trial_report import trial_page
 
     progress("drawing the report", 1.0)
     page = trial_page(document, trials, spreads)
-    return write_results(
-        folder,
-        {
-            "trials.json": lambda path: write_text(path, as_json(document) + "\n"),
-            "report.html": lambda path: write_text(path, page),
-        },
-    )
+    return write_results(folder, report_writers("trials.json", document, page))
 
 
 # -- the trials in lines --------------------------------------------------------------------------------------------
@@ -322,7 +277,7 @@ def _told(document: dict, files: list[Path]) -> list[str]:
                 lines.append(f"  {t['controller']:24}{cells}")
     lines += _spread_lines(document)
     lines += ["", *document["notes"]] if document["notes"] else []
-    return lines + (["", bold("written"), *(f"  {path}" for path in files)] if files else [])
+    return lines + written(files)
 
 
 def _spread_lines(document: dict) -> list[str]:

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import add_jobs_and_json, add_out, number, one_of, results_folder, several
-from ers_mj.commands.output import Progress, as_json, bold, plain, write_results, write_text
+from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
 
 if TYPE_CHECKING:
     from ers_mj.servo.datasheet import Datasheet
     from ers_mj.validation.cases import Validation
 
 LINKAGES, SWITCH = ("constant", "rod"), ("off", "on")
-NAME = 38  # characters of a row's name
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -62,20 +61,19 @@ def run(arguments: argparse.Namespace) -> int:
     folder = results_folder(arguments.out, arguments.force, arguments.json)
     from ers_mj.report.validity import as_document
     from ers_mj.servo.datasheet import read_datasheet
-    from ers_mj.validation.cases import validate
+    from ers_mj.validation.cases import GRID, validate
 
     datasheet = read_datasheet(arguments.datasheet)
     gaps, linkages, inductances, left_out = _asked(arguments, datasheet)
     with Progress() as progress:
-        found = validate(
-            datasheet, gaps, linkages, inductances, maps=not arguments.no_maps, jobs=arguments.jobs, progress=progress
-        )
+        maps = None if arguments.no_maps else GRID
+        found = validate(datasheet, gaps, linkages, inductances, maps=maps, jobs=arguments.jobs, progress=progress)
         document = plain(
             {
                 **as_document(found),
                 "left_out": left_out,
                 "datasheet": datasheet.name or arguments.datasheet,
-                "versions": _versions(),
+                "versions": versions(),
             }
         )
         files = _write(folder, document, found, progress) if folder is not None else []
@@ -97,26 +95,12 @@ def _asked(arguments: argparse.Namespace, datasheet: Datasheet) -> tuple[list, l
     )
 
 
-def _versions() -> dict[str, str]:
-    import mujoco
-
-    from ers_mj import __version__
-
-    return {"ers-mj": __version__, "mujoco": mujoco.__version__}
-
-
 def _write(folder: Path, document: dict, found: Validation, progress: Progress) -> list[Path]:
     from ers_mj.report.validation_report import validation_page
 
     progress("drawing the report", 1.0)
     page = validation_page(found, {"datasheet": document["datasheet"], **document["versions"]})
-    return write_results(
-        folder,
-        {
-            "validation.json": lambda path: write_text(path, as_json(document) + "\n"),
-            "report.html": lambda path: write_text(path, page),
-        },
-    )
+    return write_results(folder, report_writers("validation.json", document, page))
 
 
 # -- the validation in lines ----------------------------------------------------------------------------------------
@@ -129,7 +113,7 @@ def _told(found: Validation, document: dict, files: list[Path]) -> list[str]:
         entries = [e for e in document["where"] if (e["gap_rad"], e["linkage"], e["inductance"]) == key]
         lines += [f"  {e['axis']:10} {e['sentence']}" for e in entries] + [""]
     lines += [f"left out: {sentence}" for sentence in document["left_out"]]
-    return lines + ([bold("written"), *(f"  {path}" for path in files)] if files else [])
+    return lines + written(files)[1:]
 
 
 def _told_table(found: Validation) -> list[str]:
@@ -137,12 +121,12 @@ def _told_table(found: Validation) -> list[str]:
     from ers_mj.report.validity import VALID, degrees
     from ers_mj.validation.cases import spoken
 
-    inputs = list(dict.fromkeys(case.input for case in found.cases))
-    lines = [bold(f"{'RMS deviation; MuJoCo has':{NAME}}" + "".join(f"{name:>11}" for name in inputs))]
+    inputs, wide = list(dict.fromkeys(case.input for case in found.cases)), 38  # characters of a row's name
+    lines = [bold(f"{'RMS deviation; MuJoCo has':{wide}}" + "".join(f"{name:>11}" for name in inputs))]
     for condition in dict.fromkeys(case.condition for case in found.cases):
         cases = {case.input: case for case in found.cases if case.condition == condition}
         cells = [f"{degrees(cases[x].rms)}{'*' if cases[x].rms > VALID * cases[x].motion else ' '}" for x in inputs]
-        lines.append(f"  {spoken(condition):{NAME - 2}}" + "".join(f"{cell:>11}" for cell in cells))
+        lines.append(f"  {spoken(condition):{wide - 2}}" + "".join(f"{cell:>11}" for cell in cells))
     return [
         *lines,
         (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,10 +18,23 @@ if TYPE_CHECKING:
 
 LINKAGES = ("constant", "rod")
 WIDTHS = {".png": 960, ".gif": 480}  # what can be rendered, and how wide [pixels]
-SHAPE = 3 / 4  # height over width
-FPS, DURATION, LONGEST = 20.0, 4.0, 100.0  # [1/s], [s], [s] of a motion
-WIDEST = 4096  # [pixels]
 INPUT = "square"  # what a .gif without input or recording shows: out, home, and the other way
+
+
+@dataclass(frozen=True)
+class Film:
+    """How a motion is shown: pictures a second, its duration and the longest there is [s], the widest picture there is
+    [pixels], and height over width.
+    """
+
+    fps: float = 20.0
+    duration: float = 4.0
+    longest: float = 100.0
+    widest: int = 4096
+    shape: float = 3 / 4
+
+
+FILM = Film()
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -62,9 +76,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--duration",
         type=number(above=0),
-        default=DURATION,
+        default=FILM.duration,
         metavar="S",
-        help=f"shown of the motion [s] (default {DURATION:g})",
+        help=f"shown of the motion [s] (default {FILM.duration:g})",
     )
     parser.add_argument(
         "--render",
@@ -128,7 +142,10 @@ def _refuse_contradictions(arguments: argparse.Namespace) -> None:
     for option, value in (("--linkage", arguments.linkage), ("--gap", arguments.gap)):
         if value is not None and _is_mjcf(arguments.model):
             raise InputError(f"{option} is for a datasheet or a model.toml, {arguments.model} is built already")
-    for option, value, most in (("--duration", arguments.duration, LONGEST), ("--width", arguments.width or 0, WIDEST)):
+    for option, value, most in (
+        ("--duration", arguments.duration, FILM.longest),
+        ("--width", arguments.width or 0, FILM.widest),
+    ):
         if value > most:
             raise InputError(f"{option} {value:g}: at most {most:g} was expected")
 
@@ -161,7 +178,7 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
 
     t = np.arange(1 if name is None else max(2, round(arguments.duration * RATE_HZ) + 1)) / RATE_HZ
     u = np.zeros(1) if name is None else INPUTS[name](t)
-    moments = replay.moments_of(t, FPS, arguments.duration)
+    moments = replay.moments_of(t, FILM.fps, arguments.duration)
     if _is_mjcf(arguments.model):
         return model_file.simulated_file(model_file.read_plant(Path(arguments.model)), t, u, moments)
     plant = replay.plant_of(
@@ -175,7 +192,7 @@ def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
     from ers_mj.servo.datasheet import read_datasheet
     from ers_mj.view import model_file, replay
 
-    moments, unit = replay.moments_of(recording.t, FPS, arguments.duration), recording.output_unit
+    moments, unit = replay.moments_of(recording.t, FILM.fps, arguments.duration), recording.output_unit
     if _is_mjcf(arguments.model):
         return model_file.recorded_file(
             model_file.read_plant(Path(arguments.model)), trace_of(recording, None), moments, unit
@@ -193,12 +210,12 @@ def _render(replay: Replay, out: Path, width: int | None) -> dict:
 
     kind = out.suffix.lower()
     width = width or WIDTHS[kind]
-    height, images = round(SHAPE * width), []
+    height, images = round(FILM.shape * width), []
     with Progress() as progress:
         for image in replay_frames(replay, width, height):
             images.append(image)
             progress("rendering", len(images) / replay.t.size)
-    content = png_bytes(images[0]) if kind == ".png" else gif_bytes(images, FPS)
+    content = png_bytes(images[0]) if kind == ".png" else gif_bytes(images, FILM.fps)
     write_whole(out, content)
     return {"render": str(out), "width": width, "height": height, "bytes": len(content)}
 
@@ -208,7 +225,7 @@ def _summary(arguments: argparse.Namespace, replay: Replay) -> dict:
         "model": arguments.model,
         "replay": arguments.replay,
         "frames": int(replay.t.size),
-        "fps": FPS,
+        "fps": FILM.fps,
         "from_s": float(replay.t[0]),
         "to_s": float(replay.t[-1]),
         "output_unit": replay.output_unit,

@@ -22,10 +22,6 @@ from ers_mj.errors import InputError
 if TYPE_CHECKING:
     from ers_mj.online.moving_horizon import Estimate
 
-PIECE, POLL = 1 << 16, 0.05  # bytes read at once, and [s] between looks at a file that does not grow
-REDRAW = 0.1  # [s] between screens
-HISTORY, EVENTS = 400, 6  # estimates and events that the screen remembers
-
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add this command to the command line."""
@@ -92,23 +88,23 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _pieces(source: str, once: bool) -> Iterator[str]:
-    """Text as it arrives; an empty piece where nothing has come for a while."""
+def _pieces(source: str, once: bool, size: int = 1 << 16, pause: float = 0.05) -> Iterator[str]:
+    """Text as it arrives, at most `size` bytes at once; an empty piece where nothing has come for `pause` [s]."""
     decoder = codecs.getincrementaldecoder("utf-8")(errors="strict")
     handle, follow = (sys.stdin.fileno(), False) if source == "-" else (os.open(source, os.O_RDONLY), not once)
     try:
         while True:
-            if source == "-" and not select.select([handle], [], [], POLL)[0]:
+            if source == "-" and not select.select([handle], [], [], pause)[0]:
                 yield ""
                 continue
-            piece = os.read(handle, PIECE)
+            piece = os.read(handle, size)
             if not piece and not follow:
                 yield "\n"
                 return
             if not piece:
                 if os.fstat(handle).st_size < os.lseek(handle, 0, os.SEEK_CUR):
                     raise InputError(f"{source}: has become shorter while it was read, a file that grows was expected")
-                time.sleep(POLL)
+                time.sleep(pause)
             yield decoder.decode(piece)
     except UnicodeDecodeError:
         raise InputError(f"{source}: is not text in UTF-8, lines of CSV were expected") from None
@@ -123,13 +119,15 @@ def _estimates(stream, pieces: Iterator[str], datasheet, show) -> Iterator[Estim
     """Estimates of a stream; the first ones once it has moved for long enough."""
     import numpy as np
 
-    from ers_mj.online.moving_horizon import OPENING, UNKNOWN_OPENING, Tracker, is_moving, opening
+    from ers_mj.online.horizon import HORIZON
+    from ers_mj.online.moving_horizon import Tracker, is_moving, opening
 
-    begun, needed, tracker = (np.zeros(0),) * 3, UNKNOWN_OPENING if datasheet is None else OPENING, None
+    begun, tracker = (np.zeros(0),) * 3, None
+    needed = HORIZON.unknown_opening if datasheet is None else HORIZON.opening
     for piece in pieces:
         samples = stream.feed(piece)
         if tracker is None:
-            begun = tuple(np.append(a, b) for a, b in zip(begun, samples))
+            begun = tuple(np.append(a, b) for a, b in zip(begun, samples, strict=True))
             if not begun[0].size or begun[0][-1] - begun[0][0] < needed or not is_moving(*begun[1:]):
                 show.wait(begun[0])
                 begun = (
@@ -197,12 +195,12 @@ class _Machine(_Lines):
 
 
 class _Screen(_Lines):
-    """For a terminal: one screen, drawn anew in its place."""
+    """For a terminal: one screen, drawn anew in its place, at most ten times a second."""
 
     def __init__(self, name: str):
         super().__init__(0.0)
         self._name, self._drawn, self._height = name, -float("inf"), 0
-        self._history, self._events = deque(maxlen=HISTORY), deque(maxlen=EVENTS)
+        self._history, self._events = deque(maxlen=400), deque(maxlen=6)
         self._first: dict[str, float] = {}
 
     def wait(self, t) -> None:
@@ -225,7 +223,7 @@ class _Screen(_Lines):
 
     def _draw(self, lines: list[str], force: bool) -> None:
         self._lines = lines
-        if force or time.monotonic() - self._drawn > REDRAW:
+        if force or time.monotonic() - self._drawn > 0.1:
             up = f"\x1b[{self._height}A" if self._height else ""
             sys.stdout.write(up + "".join(f"\x1b[2K{line}\n" for line in lines) + "\x1b[J")
             sys.stdout.flush()

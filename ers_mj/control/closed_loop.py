@@ -1,7 +1,8 @@
 """A controller and a plant in a loop, sample by sample.
 
     reference, measurement -> controller -> saturation -> plant for one sample -> sensor -> measurement
- The measurement is taken just before the voltage changes, and the voltage that follows from it acts from the same
+
+The measurement is taken just before the voltage changes, and the voltage that follows from it acts from the same
 instant on; a dead time is an effect (``input_delay``) of the plant.
 """
 
@@ -20,7 +21,6 @@ from ers_mj.effects import BY_NAME
 
 AFTER_NOISE = ("sensor_quantisation", "sensor_dropout")
 LOST = 4.0 * math.pi  # [rad] from the start beyond which a loop is given up as unstable
-MEMORY = 12.0  # time constants of a sensor's lag that its window holds
 
 
 class Sampled(Protocol):
@@ -99,7 +99,8 @@ class Sensor:
         return float(self._read[self._held[k]])
 
     def _lagged(self, p: np.ndarray, k: int) -> float:
-        h, late = float(self._t[1] - self._t[0]), MEMORY * p[0] + (p[1] if np.isfinite(p[1]) else 0.0)
+        h, memory = float(self._t[1] - self._t[0]), 12.0  # time constants of the lag that its window holds
+        late = memory * p[0] + (p[1] if np.isfinite(p[1]) else 0.0)
         begin = max(0, k - 2 - int(late / h))
         if k == 0:
             return float(self._truth[0])

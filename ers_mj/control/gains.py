@@ -19,12 +19,31 @@ from ers_mj.control.controllers.finite_time import sig
 from ers_mj.errors import InputError
 
 REMARK = "of no use in practice: the loop settles in milliseconds, the proof's inequalities give away the rest"
-SLOWEST, FASTEST = 1.0, 2000.0  # [1/s] k_2 between which the search looks
-RATIO = 400.0 / 38.0  # k_3 / k_2 of Eq. (40), kept by the search
-MARGIN = 0.02  # share of k_1, k_2 and l k_3 that m_1, m_2 and m_3 are to keep
-STARTS = 12
-COARSE, FINE = 23, 8  # values of k_2 tried, and halvings of the last interval
 Settle = Callable[[Gains], float | None]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Where and how long gains are searched.
+
+    Attributes:
+        slowest, fastest: k_2 between which the search looks [1/s].
+        ratio: k_3 / k_2, that of Eq. (40).
+        coarse, fine: values of k_2 that are tried, and halvings of the last interval.
+        starts: of the search for l and gamma.
+        margin: share of k_1, k_2 and l k_3 that m_1, m_2 and m_3 are to keep.
+    """
+
+    slowest: float = 1.0
+    fastest: float = 2000.0
+    ratio: float = 400.0 / 38.0
+    coarse: int = 23
+    fine: int = 8
+    starts: int = 12
+    margin: float = 0.02
+
+
+REACH = Reach()
 
 
 # -- the conditions ------------------------------------------------------------------------------------------------
@@ -68,15 +87,10 @@ def m_2(gains: Gains) -> float:
 
 def m_3(gains: Gains) -> float:
     """Eq. (35), as printed."""
-    q, k_1, l, (_, _, g3, g4, g5, g6, g7) = (
-        float(gains.q),
-        gains.k_1,
-        gains.l,
-        gains.gamma,
-    )  # noqa: E741  the paper's letter
+    q, k_1, (_, _, g3, g4, g5, g6, g7) = float(gains.q), gains.k_1, gains.gamma
     two, (M_1, M_2, M_3) = 2.0 ** (2.0 - 2.0 * q), products(gains)
     return (
-        l * gains.k_3
+        gains.l * gains.k_3
         - g3 ** (-(2.0 - q) / (2.0 * q - 1.0)) * two * (2.0 * q - 1.0) / (1.0 + q)
         - (g4**-q + g5**-q * k_1) * two * k_1 ** (1.0 / q) * _coupling(gains) / (1.0 + q)
         - _coupling(gains) / q * (M_1 + (g6**-q * M_2 + g7**-q * M_3) / (1.0 + q))
@@ -147,12 +161,12 @@ def search(settling: float, settle: Settle, gains: Gains = Gains(), seed: int = 
     """
 
     def timed(k_2: float) -> tuple[float, Gains]:
-        trial = _rounded(replace(gains, k_2=k_2, k_3=RATIO * k_2))
+        trial = _rounded(replace(gains, k_2=k_2, k_3=REACH.ratio * k_2))
         time = settle(trial)
         return (math.inf if time is None else time), trial
 
     low, tried = None, []
-    for k_2 in np.geomspace(SLOWEST, FASTEST, COARSE).tolist():
+    for k_2 in np.geomspace(REACH.slowest, REACH.fastest, REACH.coarse).tolist():
         tried.append(timed(k_2))
         if tried[-1][0] <= settling:
             break
@@ -160,9 +174,9 @@ def search(settling: float, settle: Settle, gains: Gains = Gains(), seed: int = 
     else:
         quickest = min(time for time, _ in tried)
         what = f"the quickest take {1e3 * quickest:.3g} ms" if math.isfinite(quickest) else "none settles at all"
-        raise InputError(f"no gains up to k_2 = {FASTEST:g} settle within {1e3 * settling:.3g} ms, {what}")
+        raise InputError(f"no gains up to k_2 = {REACH.fastest:g} settle within {1e3 * settling:.3g} ms, {what}")
     best, high = tried[-1], k_2
-    for _ in range(FINE if low is not None else 0):
+    for _ in range(REACH.fine if low is not None else 0):
         middle = math.sqrt(low * high)
         found = timed(middle)
         if found[0] <= settling:
@@ -189,7 +203,7 @@ def freed(gains: Gains, seed: int = 0) -> Gains:
     """The same q and k with those l and gamma that leave the smallest of m_1/k_1, m_2/k_2 and m_3/(l k_3) largest."""
 
     def with_(z: np.ndarray) -> Gains:
-        l, *gamma = np.exp(np.clip(z, -40.0, 20.0)).tolist()  # noqa: E741
+        l, *gamma = np.exp(np.clip(z, -40.0, 20.0)).tolist()
         return replace(gains, l=l, gamma=tuple(gamma))
 
     def worst(z: np.ndarray) -> float:
@@ -200,7 +214,7 @@ def freed(gains: Gains, seed: int = 0) -> Gains:
     random = np.random.default_rng(seed)
     start = np.log([gains.l * (38.0 / gains.k_2), *gains.gamma])
     best, least = gains, worst(np.log([gains.l, *gains.gamma]))
-    for k in range(STARTS):
+    for k in range(REACH.starts):
         z0 = start + (random.normal(0.0, 1.0, start.size) if k else 0.0)
         found = minimize(
             worst,
@@ -210,6 +224,6 @@ def freed(gains: Gains, seed: int = 0) -> Gains:
         )
         if found.fun < least:
             best, least = with_(found.x), float(found.fun)
-        if least < -MARGIN:
+        if least < -REACH.margin:
             break
     return best

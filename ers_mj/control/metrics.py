@@ -10,9 +10,6 @@ import numpy as np
 
 from ers_mj.control.closed_loop import Run
 
-SETTLED = 0.02  # share of a step's height, or of the reference's amplitude, within which the rudder has settled
-TAIL = 0.2  # share of the time over which the steady-state error is taken
-
 
 @dataclass(frozen=True)
 class Measures:
@@ -58,7 +55,7 @@ def measured(run: Run, u_max: float, ampere: float | None) -> Measures:
         return Measures(*[None] * 10, stable=False)
     r, u = run.reference, run.u
     error = run.theta - r.theta
-    tail = slice(int((1.0 - TAIL) * r.t.size), None)
+    tail = slice(int((1.0 - 0.2) * r.t.size), None)
     return Measures(
         settling_time_s=settling_time(run),
         overshoot_pct=overshoot(run),
@@ -85,9 +82,9 @@ def _spans(run: Run) -> list[tuple[int, int, float]]:
 
 def settling_time(run: Run) -> float | None:
     """[s]; None where the error is still too large at the end of a span, or the reference never moves."""
-    r, longest = run.reference, None
+    r, longest, settled = run.reference, None, 0.02  # share of the span's height
     for begin, end, height in _spans(run):
-        outside = np.flatnonzero(np.abs(run.theta[begin:end] - r.theta[begin:end]) > SETTLED * abs(height))
+        outside = np.flatnonzero(np.abs(run.theta[begin:end] - r.theta[begin:end]) > settled * abs(height))
         if height == 0 or (outside.size and outside[-1] == end - begin - 1):
             return None
         longest = max(longest or 0.0, float((outside[-1] + 1 if outside.size else 0) / r.rate_hz))

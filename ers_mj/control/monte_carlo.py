@@ -1,7 +1,7 @@
 """Trials on many servos: parameters and effects scattered about a datasheet's, the controllers knowing the datasheet
 alone.
 
-datasheet, spread, seed -> servos -> trials of each -> distribution of every measure
+fleet (datasheet, count, spread), seed -> servos -> trials of each -> distribution of every measure
 """
 
 from __future__ import annotations
@@ -76,6 +76,18 @@ class Spread:
         }
 
 
+@dataclass(frozen=True)
+class Fleet:
+    """``count`` servos like the datasheet's, every factor within 1/spread and spread; the controllers know ``design``,
+    the datasheet itself where that is None.
+    """
+
+    datasheet: Datasheet
+    count: int
+    spread: float
+    design: Datasheet | None = None
+
+
 def scattered(
     datasheet: Datasheet, effects: EffectSettings, spread: float, random: np.random.Generator
 ) -> tuple[Datasheet, EffectSettings]:
@@ -85,7 +97,7 @@ def scattered(
     Effects beside the datasheet's are scattered alike. An effect without a size of its own is scattered in its first
     parameter, within its bounds.
     """
-    factor = lambda: float(spread ** random.uniform(-1.0, 1.0))  # noqa: E731
+    factor = lambda: float(spread ** random.uniform(-1.0, 1.0))
     sheet = replace(
         datasheet,
         parameters={k: x * (factor() if k in SCATTERED else 1.0) for k, x in datasheet.parameters.items()},
@@ -108,47 +120,40 @@ def _resized(name: str, values: Mapping[str, float], factor: float) -> dict[str,
 
 
 def scatter(
-    datasheet: Datasheet,
+    fleet: Fleet,
     controllers: Sequence[str],
     plants: Sequence[str],
     cases: Sequence[str],
     conditions: Conditions,
     *,
-    count: int,
-    spread: float,
-    design: Datasheet | None = None,
     jobs: int = 1,
     progress: Progress = lambda text, fraction: None,
 ) -> list[Spread]:
-    """Try all combinations on ``count`` servos, on ``jobs`` cores, which do not change the result. Servo k has the
-    noise of seed + k.
+    """Try all combinations on every servo of a fleet, on ``jobs`` cores, which do not change the result. Servo k has
+    the noise of seed + k.
 
     Raises:
         InputError: as :func:`ers_mj.control.trial.try_out`.
     """
-    tasks = [
-        (datasheet, tuple(controllers), tuple(plants), tuple(cases), conditions, design or datasheet, spread, k)
-        for k in range(count)
-    ]
+    count, wanted = fleet.count, (tuple(controllers), tuple(plants), tuple(cases))
     found: list[dict[Key, Measures] | None] = [None] * count
     if jobs <= 1:
-        for k, task in enumerate(tasks):
+        for k in range(count):
             progress(f"servo {k + 1} of {count}", k / count)
-            found[k] = _one(task)
+            found[k] = _one(fleet, k, wanted, conditions)
     else:
         with ProcessPoolExecutor(min(jobs, count)) as pool:
-            waiting = {pool.submit(_one, task): k for k, task in enumerate(tasks)}
+            waiting = {pool.submit(_one, fleet, k, wanted, conditions): k for k in range(count)}
             for done, future in enumerate(as_completed(waiting), start=1):
                 found[waiting[future]] = future.result()
                 progress(f"servo {done} of {count}", done / count)
     return [Spread(*key, tuple(measures[key] for measures in found)) for key in found[0]]
 
 
-def _one(task) -> dict[Key, Measures]:
-    """All trials of one servo: {(controller, plant, case): measures}."""
-    datasheet, controllers, plants, cases, conditions, design, spread, k = task
-    sheet, effects = scattered(datasheet, conditions.effects, spread, np.random.default_rng([conditions.seed, k]))
-    trials = try_out(
-        sheet, controllers, plants, cases, replace(conditions, effects=effects, seed=conditions.seed + k), design=design
-    )
+def _one(fleet: Fleet, k: int, wanted: tuple[Sequence[str], ...], conditions: Conditions) -> dict[Key, Measures]:
+    """All trials of servo k: {(controller, plant, case): measures}."""
+    random = np.random.default_rng([conditions.seed, k])
+    sheet, effects = scattered(fleet.datasheet, conditions.effects, fleet.spread, random)
+    its_own = replace(conditions, effects=effects, seed=conditions.seed + k)
+    trials = try_out(sheet, *wanted, its_own, design=fleet.design or fleet.datasheet)
     return {(t.controller, t.plant, t.case): t.measures for t in trials}

@@ -13,12 +13,19 @@ from ers_mj.control.metrics import Measures
 from ers_mj.control.trial import Trial
 
 LAW, FAIR, RIVALS = "ftrc", "pid-ff", ("pid", "hinf")
-SOON, LITTLE, BETTER, STEADIER = (
-    0.1,
-    3.0,
-    0.7,
-    0.5,
-)  # [s], [%], shares: the paper's bars of settling, overshoot, accuracy, steady-state error
+
+
+@dataclass(frozen=True)
+class Bars:
+    """The paper's: settling [s] and overshoot [%] below these, error and steady-state error less by these shares."""
+
+    settling: float = 0.1
+    overshoot: float = 3.0
+    better: float = 0.7
+    steadier: float = 0.5
+
+
+BARS = Bars()
 
 
 @dataclass(frozen=True)
@@ -83,17 +90,17 @@ def _of(case: str, ran: Mapping[str, Measures]) -> Iterator[tuple[str, str, bool
     law = ran[LAW]
     if case in ("step", "square"):
         settles = "it never settles" if law.settling_time_s is None else f"{1e3 * law.settling_time_s:.1f} ms"
-        yield "settles within 100 ms", settles, law.settling_time_s is not None and law.settling_time_s < SOON
-        yield "overshoots by less than 3 %", f"{law.overshoot_pct:.2f} %", law.overshoot_pct < LITTLE
+        yield "settles within 100 ms", settles, law.settling_time_s is not None and law.settling_time_s < BARS.settling
+        yield "overshoots by less than 3 %", f"{law.overshoot_pct:.2f} %", law.overshoot_pct < BARS.overshoot
     for name in RIVALS:
         if name in ran:
             yield (
                 f"error at least 70 % below that of {name}",
                 _against(law, ran[name]),
-                law.rmse_rad <= (1.0 - BETTER) * ran[name].rmse_rad,
+                law.rmse_rad <= (1.0 - BARS.better) * ran[name].rmse_rad,
             )
             if case in ("square", "ramp"):
-                less = law.steady_state_error_rad <= (1.0 - STEADIER) * ran[name].steady_state_error_rad
+                less = law.steady_state_error_rad <= (1.0 - BARS.steadier) * ran[name].steady_state_error_rad
                 yield (
                     f"steady-state error at least 50 % below that of {name}",
                     _against(law, ran[name], "steady_state_error_rad"),

@@ -1,5 +1,6 @@
 """What a servo is asked to follow: the paper's cases, and a user's own from a file.
- Each is a function of time from 0 and gives angle, speed and acceleration; where the angle jumps both derivatives are
+
+Each is a function of time from 0 and gives angle, speed and acceleration; where the angle jumps both derivatives are
 those beside the jump, as no drive could follow more.
 """
 
@@ -17,12 +18,20 @@ from ers_mj.control.controllers import Servo
 from ers_mj.data.tables import listed, numbers, parse_table, read_content
 from ers_mj.errors import InputError
 
-STEP_S, SQUARE_S, RAMP_S, CHIRP_S = 2.0, 2.0, 2.0, 5.0
-SQUARE_HZ, RAMP_HZ = 1.0, 0.5
-CHIRP_FROM_HZ, CHIRP_TO_HZ = 1.0, 20.0
 ANGLES = {"theta_ref_rad": 1.0, "theta_ref_deg": math.radians(1.0)}
-MOST_SAMPLES = 2_000_000
-FASTEST_HZ, FURTHEST = 1e6, 1000.0  # sample rate and angle [rad] up to which a file is taken for a reference
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Of a reference: samples, sample rate [Hz] and angle [rad]."""
+
+    fewest: int = 100
+    most: int = 2_000_000
+    rate_hz: float = 1e6
+    angle: float = 1000.0
+
+
+BOUNDS = Bounds()
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,32 +62,32 @@ def step(t):
     return np.ones(t.size), _still(t), _still(t)
 
 
-def square(t):
+def square(t, hz=1.0):
     """+1 and -1 in turn, half a second each (the paper's Case 1)."""
-    return 1.0 - 2.0 * (np.floor(2.0 * SQUARE_HZ * t + 1e-9) % 2), _still(t), _still(t)
+    return 1.0 - 2.0 * (np.floor(2.0 * hz * t + 1e-9) % 2), _still(t), _still(t)
 
 
-def ramp(t):
+def ramp(t, hz=0.5):
     """A triangle that begins at 0 and rises: constant speed, reversed at +1 and -1 (Case 2)."""
-    turns = RAMP_HZ * t
+    turns = hz * t
     falling = np.floor(2.0 * turns + 0.5 + 1e-9) % 2
-    return 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * turns)), 4.0 * RAMP_HZ * (1.0 - 2.0 * falling), _still(t)
+    return 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * turns)), 4.0 * hz * (1.0 - 2.0 * falling), _still(t)
 
 
-def chirp(t):
+def chirp(t, from_hz=1.0, to_hz=20.0, duration=5.0):
     """A sine from 1 to 20 Hz, linear in time (Case 3)."""
-    sweep = 2.0 * np.pi * (CHIRP_TO_HZ - CHIRP_FROM_HZ) / CHIRP_S
-    phase = 2.0 * np.pi * CHIRP_FROM_HZ * t + 0.5 * sweep * t**2
-    rate = 2.0 * np.pi * CHIRP_FROM_HZ + sweep * t
+    sweep = 2.0 * np.pi * (to_hz - from_hz) / duration
+    phase = 2.0 * np.pi * from_hz * t + 0.5 * sweep * t**2
+    rate = 2.0 * np.pi * from_hz + sweep * t
     return np.sin(phase), rate * np.cos(phase), sweep * np.cos(phase) - rate**2 * np.sin(phase)
 
 
 CASES: Mapping[str, tuple[Callable, float]] = {
-    "step": (step, STEP_S),
-    "square": (square, SQUARE_S),
-    "ramp": (ramp, RAMP_S),
-    "chirp": (chirp, CHIRP_S),
-}
+    "step": (step, 2.0),
+    "square": (square, 2.0),
+    "ramp": (ramp, 2.0),
+    "chirp": (chirp, 5.0),
+}  # shape of amplitude 1, and duration [s]
 
 
 def named(name: str, amplitude: float, start: float, rate_hz: float) -> Reference:
@@ -89,8 +98,10 @@ def named(name: str, amplitude: float, start: float, rate_hz: float) -> Referenc
     """
     shape, duration = CASES[name]
     n = round(duration * rate_hz)
-    if not 100 <= n <= MOST_SAMPLES:
-        raise InputError(f"{duration:g} s at {rate_hz:g} Hz are {n} samples, 100 to {MOST_SAMPLES} were expected")
+    if not BOUNDS.fewest <= n <= BOUNDS.most:
+        raise InputError(
+            f"{duration:g} s at {rate_hz:g} Hz are {n} samples, {BOUNDS.fewest} to {BOUNDS.most} were expected"
+        )
     t = np.arange(n) / rate_hz
     theta, omega, alpha = (amplitude * x for x in shape(t))
     jumps = (0, *np.flatnonzero(np.diff(theta)) + 1) if name in ("step", "square") else ()
@@ -134,8 +145,8 @@ def servo_speed(servo: Servo, u_max: float) -> float:
 
 
 def _refuse_holes(t: np.ndarray, theta: np.ndarray, name: str) -> None:
-    if not 100 <= t.size <= MOST_SAMPLES:
-        raise InputError(f"{name}: has {t.size} samples, 100 to {MOST_SAMPLES} were expected")
+    if not BOUNDS.fewest <= t.size <= BOUNDS.most:
+        raise InputError(f"{name}: has {t.size} samples, {BOUNDS.fewest} to {BOUNDS.most} were expected")
     for label, x in (("t_s", t), ("the reference", theta)):
         if not np.isfinite(x).all():
             raise InputError(
@@ -145,9 +156,11 @@ def _refuse_holes(t: np.ndarray, theta: np.ndarray, name: str) -> None:
     h = np.diff(t)
     if h.min() <= 0 or np.ptp(h) > 0.01 * h.mean():
         raise InputError(f"{name}: its times are not evenly spaced, a loop runs at one sample rate")
-    if h.mean() < 1.0 / FASTEST_HZ:
-        raise InputError(f"{name}: its samples are {h.mean():.3g} s apart, {1.0 / FASTEST_HZ:g} s or more was expected")
-    if np.abs(theta).max() > FURTHEST:
+    if h.mean() < 1.0 / BOUNDS.rate_hz:
         raise InputError(
-            f"{name}: its reference reaches {np.abs(theta).max():.3g} rad, {FURTHEST:g} rad at most was expected"
+            f"{name}: its samples are {h.mean():.3g} s apart, {1.0 / BOUNDS.rate_hz:g} s or more was expected"
+        )
+    if np.abs(theta).max() > BOUNDS.angle:
+        raise InputError(
+            f"{name}: its reference reaches {np.abs(theta).max():.3g} rad, {BOUNDS.angle:g} rad at most was expected"
         )

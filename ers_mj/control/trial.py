@@ -1,6 +1,7 @@
 """Trials: every controller on every plant over every reference, under the same conditions.
- datasheet -> plant, sampled;  datasheet (or another) -> Servo -> controller;  reference -> closed loop -> run ->
-measures
+
+datasheet -> plant, sampled;  datasheet (or another) -> Servo -> controller
+reference -> closed loop -> run -> measures
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ from ers_mj.servo.simulation import EffectSettings, Plant, build_plant
 
 Progress = Callable[[str, float], None]
 PLANTS = ("reduced", "mujoco")
-MOST_LATE = 1_000_000  # samples of dead time that a loop keeps
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def sampled(plant: Plant, rate_hz: float, start: tuple[float, float]) -> Sampled
     Raises:
         InputError: its command is late by too many samples.
     """
-    refuse_late(plant, rate_hz, MOST_LATE)
+    refuse_late(plant, rate_hz, 1_000_000)
     if isinstance(plant, ReducedModel):
         from ers_mj.plants.sampled_reduced import SampledReduced
 

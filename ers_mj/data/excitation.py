@@ -1,6 +1,7 @@
 """What a rig can be asked to do next: open-loop inputs within the limits that its recordings show, each rebuilt from a
 few numbers.
- An excitation is a dictionary {"kind", parameters of that kind, "amplitude", "offset", "peak_u", "duration_s",
+
+An excitation is a dictionary {"kind", parameters of that kind, "amplitude", "offset", "peak_u", "duration_s",
 "lead_s", "rate_hz", "start"}; its input is u(t) = offset + amplitude * wave(t - lead_s), with |wave| <= 1 and ``start``
 the output at which the rig should rest before. During the lead nothing acts, so that the state in which a recording
 begins does not depend on its explanation.
@@ -16,19 +17,27 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 
-MARGIN = 0.05  # of the travel seen, by which a simulated motion may leave it at either end
-ONE_SIDED = 0.05  # of the peak: an input that goes no further below zero is taken for one that must not
-SHORTEST, LONGEST = 2.0, 10.0  # [s] of a recording that is asked for
+
+@dataclass(frozen=True)
+class Asking:
+    """What an input is held to."""
+
+    margin: float = 0.05  # of the travel seen, by which a simulated motion may leave it at either end
+    one_sided: float = 0.05  # of the peak: an input that goes no further below zero is taken for one that must not
+    shortest: float = 2.0  # [s] of a recording that is asked for
+    longest: float = 10.0  # [s] of one
+    lead: float = 0.1  # [s], or lead_samples where these are longer: twice what an initial state is taken from
+    lead_samples: int = 20  # before the wave begins
+    top: float = 0.2  # of the sample rate: the highest frequency
+    least_level: float = 0.3  # of a graded wave's first cycle
+
+
+ASKING = Asking()
+
 SHARES, GENTLE = (
     (1.0, 0.65, 0.35),
     (0.2, 0.1, 0.05),
 )  # of the input's range: those tried first, and where all of them leave the travel
-LEAD, LEAD_SAMPLES = (
-    0.1,
-    20,
-)  # [s] and samples, whichever is longer, before the wave begins: twice what an initial state is taken from
-TOP = 0.2  # of the sample rate: the highest frequency that is asked for
-LEAST_LEVEL = 0.3  # of a graded wave's first cycle
 LEVELS = np.array(
     [1, 0, -1, 0.5, -0.75, 0, 0.75, -0.5, 0, 1, -1, 0.25, 0, -0.25, 0.5, -0.5]
 )  # of the steps, in their order
@@ -54,16 +63,24 @@ class Limits:
         low, high = (float(end([end(t.y[t.valid]) for t in traces])) for end in (np.min, np.max))
         low_u, high_u = min(float(np.min(t.u)) for t in traces), max(float(np.max(t.u)) for t in traces)
         peak = max(-low_u, high_u)
-        if low_u < -ONE_SIDED * peak and high_u > ONE_SIDED * peak:
+        if low_u < -ASKING.one_sided * peak and high_u > ASKING.one_sided * peak:
             low_u, high_u = -peak, peak
         start = float(np.median([t.start[0] for t in traces])) if has_home else 0.5 * (low + high)
         rate = 1.0 / float(np.median([t.sample_time for t in traces]))
         duration = float(np.median([t.t[-1] - t.t[0] for t in traces]))
-        return Limits(low_u, high_u, low, high, round(rate, 6), round(min(max(duration, SHORTEST), LONGEST), 1), start)
+        return Limits(
+            low_u,
+            high_u,
+            low,
+            high,
+            round(rate, 6),
+            round(min(max(duration, ASKING.shortest), ASKING.longest), 1),
+            start,
+        )
 
     def holds(self, theta: np.ndarray) -> bool:
         """Whether a motion (N,) stays within the travel and its margin."""
-        margin = MARGIN * (self.high - self.low)
+        margin = ASKING.margin * (self.high - self.low)
         return bool(
             np.all(np.isfinite(theta)) and theta.min() >= self.low - margin and theta.max() <= self.high + margin
         )
@@ -136,9 +153,9 @@ def _turn(t: np.ndarray, period: float) -> np.ndarray:
 
 
 def _grade(t: np.ndarray, duration: float, period: float) -> np.ndarray:
-    """A level for each period (N,), growing evenly from LEAST_LEVEL to 1 in the last that is whole."""
+    """A level for each period (N,), growing evenly from ASKING.least_level to 1 in the last that is whole."""
     last = max(int(duration / period + 1e-9) - 1, 1)
-    return LEAST_LEVEL + (1 - LEAST_LEVEL) * np.minimum(_count(t, period) / last, 1.0)
+    return ASKING.least_level + (1 - ASKING.least_level) * np.minimum(_count(t, period) / last, 1.0)
 
 
 # -- excitations ------------------------------------------------------------------------------------------------------
@@ -160,25 +177,29 @@ def signal(excitation: Mapping) -> tuple[np.ndarray, np.ndarray]:
 
 def shapes(limits: Limits) -> list[dict]:
     """What may be tried: slow and fast, smooth and abrupt, as far as sample rate and duration allow."""
-    top = TOP * limits.rate_hz
-    rise = sorted({min(f, top) for f in (5.0, 20.0, 50.0, top)})
-    out = [{"kind": "multisine", "from_hz": 0.5, "to_hz": f, "sines": 24} for f in rise if f > 2.0]
-    out += [{"kind": "multisine", "from_hz": 10.0, "to_hz": top, "sines": 24}] if top > 40.0 else []
-    out += [
-        {"kind": "chirp", "from_hz": low, "to_hz": f}
-        for low, f in ((0.5, 8.0), (1.0, 30.0), (5.0, top))
-        if low < f <= top
-    ]
-    out += [{"kind": "square", "period_s": s} for s in (1.0, 0.3, 0.08)]
-    out += [{"kind": "triangle", "period_s": s} for s in (4.0, 1.5)]
-    out += [{"kind": "steps", "hold_s": s} for s in (0.3, 0.1)]
-    out += [{"kind": "push_and_release", "push_s": p, "rest_s": r} for p, r in ((0.3, 0.7), (0.1, 0.4))]
     least = 4.0 / limits.rate_hz
     return [
         s
-        for s in out
+        for s in [*_sweeps(ASKING.top * limits.rate_hz), *_pulses()]
         if all(v >= least for k, v in s.items() if k.endswith("_s")) and s.get("period_s", 0.0) <= limits.duration
     ]
+
+
+def _sweeps(top: float) -> list[dict]:
+    """Multisines and chirps up to ``top`` [Hz]."""
+    rise = sorted({min(f, top) for f in (5.0, 20.0, 50.0, top)})
+    out = [{"kind": "multisine", "from_hz": 0.5, "to_hz": f, "sines": 24} for f in rise if f > 2.0]
+    out += [{"kind": "multisine", "from_hz": 10.0, "to_hz": top, "sines": 24}] if top > 40.0 else []
+    chirps = ((0.5, 8.0), (1.0, 30.0), (5.0, top))
+    return out + [{"kind": "chirp", "from_hz": low, "to_hz": f} for low, f in chirps if low < f <= top]
+
+
+def _pulses() -> list[dict]:
+    """Squares, triangles, steps, pushes."""
+    out = [{"kind": "square", "period_s": s} for s in (1.0, 0.3, 0.08)]
+    out += [{"kind": "triangle", "period_s": s} for s in (4.0, 1.5)]
+    out += [{"kind": "steps", "hold_s": s} for s in (0.3, 0.1)]
+    return out + [{"kind": "push_and_release", "push_s": p, "rest_s": r} for p, r in ((0.3, 0.7), (0.1, 0.4))]
 
 
 def excitations(limits: Limits, shares: Sequence[float] = SHARES) -> list[list[dict]]:
@@ -193,7 +214,7 @@ def excitations(limits: Limits, shares: Sequence[float] = SHARES) -> list[list[d
             "offset": middle,
             "peak_u": abs(middle) + amplitude,
             "duration_s": limits.duration,
-            "lead_s": max(LEAD, LEAD_SAMPLES / limits.rate_hz),
+            "lead_s": max(ASKING.lead, ASKING.lead_samples / limits.rate_hz),
             "rate_hz": limits.rate_hz,
             "start": limits.start,
         }

@@ -2,12 +2,14 @@
 
     recording -> period of the input -> lines (periodic, as a multisine) or local polynomials (any other) -> Response;
     Response, model -> Gap
- A periodic input excites some lines of the recording's spectrum and no others. At an excited line stands the best
+
+A periodic input excites some lines of the recording's spectrum and no others. At an excited line stands the best
 linear approximation; lines between the harmonics of the period hold noise and the decay of the first state; harmonics
 that are not excited hold the distortion besides. The decay is smooth over the lines, so that a parabola through the
 quiet neighbours takes it off (Pintelon and Schoukens, System Identification, 2nd ed., chapters 4 and 7). Of one period
 alone noise and distortion are told together.
- Any other input excites neighbouring lines alike. About a line k the response and the decay are both taken as parabolas
+
+Any other input excites neighbouring lines alike. About a line k the response and the decay are both taken as parabolas
 over r = -n..n (local polynomial method, ibid., chapter 7), fitted to Y[k + r] = (G + G_1 r + G_2 r^2) U[k + r] + T +
 T_1 r + T_2 r^2, which neither leaks nor smears a sweep as averaged segments do.
 """
@@ -23,21 +25,37 @@ import numpy as np
 from ers_mj.data.recording import Recording
 from ers_mj.errors import InputError
 
-SAME = 1e-6  # share of the energy by which two periods of the input may differ
-QUIET, EXCITED = 1e-6, 1e-4  # share of the strongest line's power: most of an unexcited line, least of an excited one
-FEW = 0.25  # share of all lines up to the highest excited one that a single period may excite and still be a multisine
-LEAST_PERIOD = 50  # samples
-NEIGHBOURS = 10  # quiet lines from which decay and noise are taken
-FIRST, LEAST_HALF, MOST_HALF, WIDTH = (
-    2,
-    8,
-    60,
-    1 / 6,
-)  # lowest line; lines on either side of a local fit, at least, at most, and in shares of the frequency
-# times what even excitation would leave of a line's uncertainty (2.25 of a parabola), beyond which a local fit only
-# extrapolates
-LEVERAGE = 6.0
-EXACT = 0.03  # relative gap up to which nothing is missing: what leakage leaves of an exact response
+
+@dataclass(frozen=True)
+class Lines:
+    """How the lines of a periodic input are told from what lies between them."""
+
+    same: float = 1e-6  # share of the energy by which two periods of the input may differ
+    quiet: float = 1e-6  # share of the strongest line's power: most of an unexcited line
+    excited: float = 1e-4  # the same: least of an excited one
+    # share of all lines up to the highest excited one that one period may excite and still be a multisine
+    few: float = 0.25
+    least_period: int = 50  # samples
+    neighbours: int = 10  # quiet lines from which decay and noise are taken
+
+
+LINES = Lines()
+
+
+@dataclass(frozen=True)
+class LocalFits:
+    """How local polynomials are laid over the lines of any other input."""
+
+    first: int = 2  # lowest line
+    least_half: int = 8  # lines on either side, at least
+    most_half: int = 60  # at most
+    width: float = 1 / 6  # in shares of the frequency
+    # times what even excitation leaves of a line's uncertainty (2.25 of a parabola): more extrapolates
+    leverage: float = 6.0
+
+
+LOCAL = LocalFits()
+
 SURE = 0.95  # coherence from which a line counts
 
 
@@ -133,29 +151,31 @@ def find_period(u: np.ndarray) -> int | None:
     spectrum = np.fft.rfft(u, 2 * n)
     products = np.fft.irfft(np.abs(spectrum) ** 2)[:n]  # sum of u[k] u[k + lag]
     energy = np.concatenate([[0.0], np.cumsum(u**2)])
-    lags = np.arange(LEAST_PERIOD, n - max(n // 20, LEAST_PERIOD))
+    lags = np.arange(LINES.least_period, n - max(n // 20, LINES.least_period))
     if not lags.size:
         return None
     both = energy[n - lags] + energy[n] - energy[lags]
-    same = lags[both - 2.0 * products[lags] <= SAME * both]
+    same = lags[both - 2.0 * products[lags] <= LINES.same * both]
     return int(same[0]) if same.size else None
 
 
 def _is_sparse(u: np.ndarray) -> bool:
     """Whether the spectrum of u (N,) is a few lines and nothing between them."""
     power = np.abs(np.fft.rfft(u)) ** 2
-    excited = power > EXCITED * power.max()
-    return bool((power[~excited] < QUIET * power.max()).all() and excited.sum() <= FEW * np.flatnonzero(excited)[-1])
+    excited = power > LINES.excited * power.max()
+    return bool(
+        (power[~excited] < LINES.quiet * power.max()).all() and excited.sum() <= LINES.few * np.flatnonzero(excited)[-1]
+    )
 
 
 def _of_lines(recording: Recording, u: np.ndarray, y: np.ndarray, periods: int) -> Response:
     n = u.size
     U, Y = 2.0 * np.fft.rfft(u) / n, 2.0 * np.fft.rfft(y) / n
     power = np.abs(U) ** 2
-    lines = np.flatnonzero(power > EXCITED * power.max())
+    lines = np.flatnonzero(power > LINES.excited * power.max())
     lines = lines[(lines > 0) & (lines < n // 2)]
     harmonic = np.arange(U.size) % periods == 0
-    quiet = np.flatnonzero(~harmonic if periods > 1 else power <= EXCITED * power.max())
+    quiet = np.flatnonzero(~harmonic if periods > 1 else power <= LINES.excited * power.max())
     idle = np.setdiff1d(np.flatnonzero(harmonic), lines) if periods > 1 else np.empty(0, int)
     quiet, idle = quiet[quiet > 0], idle[idle > 0]
     true, spread = _cleaned(Y, lines, quiet)
@@ -196,10 +216,10 @@ def _cleaned(Y: np.ndarray, lines: np.ndarray, quiet: np.ndarray) -> tuple[np.nd
 
 
 def _nearest(lines: np.ndarray, k: int) -> slice:
-    """Which NEIGHBOURS of the sorted lines are nearest to k, of both sides alike."""
-    at, half = np.searchsorted(lines, k), NEIGHBOURS // 2
-    begin = min(max(at - half, 0), max(lines.size - NEIGHBOURS, 0))
-    return slice(begin, begin + NEIGHBOURS)
+    """Which LINES.neighbours of the sorted lines are nearest to k, of both sides alike."""
+    at, half = np.searchsorted(lines, k), LINES.neighbours // 2
+    begin = min(max(at - half, 0), max(lines.size - LINES.neighbours, 0))
+    return slice(begin, begin + LINES.neighbours)
 
 
 def _of_neighbours(recording: Recording, u: np.ndarray, y: np.ndarray) -> Response:
@@ -208,15 +228,15 @@ def _of_neighbours(recording: Recording, u: np.ndarray, y: np.ndarray) -> Respon
     """
     h, u, y = recording.sample_time, u[:-1], np.diff(y)
     U, Y = 2.0 * np.fft.rfft(u) / u.size, 2.0 * np.fft.rfft(y) / u.size
-    least, found, k = EXCITED * np.max(np.abs(U) ** 2), [], FIRST
-    while k < U.size - LEAST_HALF:
-        half = round(min(max(LEAST_HALF, WIDTH * k), MOST_HALF))
+    least, found, k = LINES.excited * np.max(np.abs(U) ** 2), [], LOCAL.first
+    while k < U.size - LOCAL.least_half:
+        half = round(min(max(LOCAL.least_half, LOCAL.width * k), LOCAL.most_half))
         begin = min(max(k - half, 1), max(U.size - 2 * half - 1, 1))
         near = np.arange(begin, min(begin + 2 * half + 1, U.size))
         power = float(np.mean(np.abs(U[near]) ** 2))
         if power > least and near.size > 6:
             g, variance, rest = _local(U[near], Y[near], (near - k) / half, math.sqrt(power))
-            if variance * power * near.size <= LEVERAGE:
+            if variance * power * near.size <= LOCAL.leverage:
                 found.append((k, g, variance * rest, rest, power))
         k += half // 2
     if not found:
@@ -268,7 +288,9 @@ def gap(response: Response, model: np.ndarray) -> Gap | None:
     ratio = model[k] / response.g[k]
     db, deg = 20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))
     off = np.abs(ratio - 1.0) ** 2
-    linear = bool(off.mean() > 4.0 * np.mean(response.error[k] ** 2) + EXACT**2)
+    linear = bool(
+        off.mean() > 4.0 * np.mean(response.error[k] ** 2) + 0.03**2
+    )  # 3 %: what leakage leaves of an exact response
     band = shortest_band(response.f_hz[k], off)
     what = (
         "more than noise and distortion leave open, its linear part is off"

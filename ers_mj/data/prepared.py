@@ -15,14 +15,31 @@ from ers_mj.data.sensor_faults import at_extreme, converter_step, frozen_spans, 
 from ers_mj.decisions.policy import POLICY
 
 BLOCK = 0.25  # [s]
-START = 0.05  # [s] of a record that its initial state is taken from, or START_SAMPLES, whichever is longer
-START_SAMPLES = 10
-FEWEST_SEEN = 6  # samples that a start is told from
-KNOWN = 0.8  # share of the samples that a further sensor must have seen
-LEAST_SAG = 0.005  # of the supply, from which it varies
-MOST = 0.5  # of the noise's power, from which a converter makes most of it
-FIRST = 2  # changes by which a speed at the start must show
-SURE_SPEED = 3.0  # standard deviations within which a speed at the start may lie
+START = 0.05  # [s] of a record that its initial state is taken from, or BEGINNING.samples, whichever is longer
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """What a start is told from, where no model is known."""
+
+    samples: int = 10  # or those of START seconds, whichever is longer
+    fewest_seen: int = 6  # samples
+    first: int = 2  # changes by which a speed must show
+    sure: float = 3.0  # standard deviations within which a speed may lie
+
+
+BEGINNING = Beginning()
+
+
+@dataclass(frozen=True)
+class Beside:
+    """When a further column of a recording counts."""
+
+    known: float = 0.8  # share of its samples that must be there
+    least_sag: float = 0.005  # of the supply, from which it varies
+
+
+BESIDE = Beside()
 
 
 @dataclass(frozen=True)
@@ -34,6 +51,25 @@ class Channel:
     kind: str
     values: np.ndarray
     sigma: float
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """What a recording holds, (N,) each: time, input, output, where the output is valid, whether the drive was on, and
+    a known load as an acceleration; the last two None where nothing is known.
+    """
+
+    t: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+    valid: np.ndarray
+    enable: np.ndarray | None = None
+    load: np.ndarray | None = None
+
+    @staticmethod
+    def empty(t: np.ndarray, u: np.ndarray) -> Signals:
+        """Of a recording that does not exist yet."""
+        return Signals(t, u, np.zeros(t.size), np.ones(t.size, bool))
 
 
 @dataclass(frozen=True)
@@ -66,7 +102,7 @@ class Trace:
     @property
     def is_coarse(self) -> bool:
         """Whether the converter makes most of the noise."""
-        return self.quantum**2 / 12 > MOST * self.sigma**2
+        return self.quantum**2 / 12 > 0.5 * self.sigma**2
 
     @cached_property
     def sample_time(self) -> float:
@@ -81,20 +117,10 @@ class Trace:
     def part(self, begin: int, end: int) -> Trace:
         """Samples begin..end as a trace of their own."""
         cut = slice(begin, end)
-        pick = lambda a: None if a is None else a[cut]  # noqa: E731
-        made = make_trace(
-            self.name,
-            self.t[cut],
-            self.u[cut],
-            self.y[cut],
-            self.valid[cut],
-            pick(self.enable),
-            pick(self.load),
-            self.sigma,
-            self.quantum,
-        )
+        pick = lambda a: None if a is None else a[cut]
+        kept = Signals(*(pick(a) for a in (self.t, self.u, self.y, self.valid, self.enable, self.load)))
         return replace(
-            made,
+            make_trace(self.name, kept, self.sigma, self.quantum),
             channels=tuple(replace(c, values=c.values[cut]) for c in self.channels),
             supply=pick(self.supply),
             converter=self.converter,
@@ -105,7 +131,7 @@ class Trace:
         if stride <= 1:
             return self
         some, begins = slice(None, None, stride), np.arange(0, self.t.size, stride)
-        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])  # noqa: E731
+        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])
         mean = np.add.reduceat(self.u, begins) / np.diff(np.append(begins, self.t.size))
         block = self.block[some]
         return replace(
@@ -129,9 +155,8 @@ class Trace:
         valid = self.valid.copy()
         for span in spans:
             valid[span] = False
-        made = make_trace(
-            self.name, self.t, self.u, self.y, valid, self.enable, self.load, self.sigma, self.quantum, self.start
-        )
+        signals = Signals(self.t, self.u, self.y, valid, self.enable, self.load)
+        made = make_trace(self.name, signals, self.sigma, self.quantum, self.start)
         return replace(
             made, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans)
         )
@@ -153,7 +178,7 @@ class Trace:
 
     @property
     def sure_noise(self) -> float:
-        """The noise in what a reading surely tells (see evaluation.Score)."""
+        """The noise in what a reading surely tells (see cross_validation.Score)."""
         return self.sigma if self.converter is None else self.converter.sure_noise
 
     def weighed(self, theta: np.ndarray) -> np.ndarray:
@@ -185,9 +210,8 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
         stuck += [s for s in found if not at_extreme(y, s) and not _meets(s, stuck)]
     stuck += [s for s in leapt_spans(y, recording.quantum, sigma) if not _meets(s, stuck)]
     lost = (*spikes(np.where(recording.valid, y, np.nan), sigma), *stuck)
-    trace = make_trace(
-        recording.name, recording.t, recording.u, y, recording.valid, recording.enable, load, sigma, recording.quantum
-    )
+    signals = Signals(recording.t, recording.u, y, recording.valid, recording.enable, load)
+    trace = make_trace(recording.name, signals, sigma, recording.quantum)
     trace = trace.without(lost)
     return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid), supply=_supply(recording))
 
@@ -208,11 +232,11 @@ def _supply(recording: Recording) -> np.ndarray | None:
     """The measured supply [V] (N,), a missing sample between its neighbours; None where hardly any is known or it does
     not vary.
     """
-    if recording.vin is None or (known := np.isfinite(recording.vin)).mean() < KNOWN:
+    if recording.vin is None or (known := np.isfinite(recording.vin)).mean() < BESIDE.known:
         return None
     supply = np.interp(recording.t, recording.t[known], recording.vin[known])
     low, level, high = np.quantile(supply, (0.02, 0.5, 0.98))
-    return supply if low > 0.0 and high - low > LEAST_SAG * level else None
+    return supply if low > 0.0 and high - low > BESIDE.least_sag * level else None
 
 
 def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
@@ -226,7 +250,7 @@ def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
         if values is None or recording.output_unit != "rad" and kind != "current":
             continue
         known = np.isfinite(values)
-        if known.mean() < KNOWN or np.ptp(values[known]) == 0:
+        if known.mean() < BESIDE.known or np.ptp(values[known]) == 0:
             continue
         if kind == "speed" and not _integrates(recording, values):
             continue
@@ -258,15 +282,17 @@ def _integrates(recording: Recording, omega: np.ndarray) -> bool:
     return bool(miss.size) and float(np.sqrt(np.mean(miss**2))) < 3.0 * noise
 
 
-def make_trace(name, t, u, y, valid, enable, load, sigma, quantum, start: tuple[float, float] | None = None) -> Trace:
+def make_trace(
+    name: str, s: Signals, sigma: float, quantum: float = 0.0, start: tuple[float, float] | None = None
+) -> Trace:
     """A trace with its blocks of BLOCK seconds and its initial state, where that is not known as the samples show
     it.
     """
+    t = s.t
     block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
-    counts = np.bincount(block[valid], minlength=block[-1] + 1).astype(float)
-    trace = Trace(
-        name, t, u, np.where(valid, y, np.nan), valid, enable, load, sigma, quantum, start or (0.0, 0.0), block, counts
-    )
+    counts = np.bincount(block[s.valid], minlength=block[-1] + 1).astype(float)
+    y = np.where(s.valid, s.y, np.nan)
+    trace = Trace(name, t, s.u, y, s.valid, s.enable, s.load, sigma, quantum, start or (0.0, 0.0), block, counts)
     return trace if start else replace(trace, start=_started(trace))
 
 
@@ -280,7 +306,7 @@ def _started(trace: Trace) -> tuple[float, float]:
 
 def start_samples(t: np.ndarray) -> int:
     """Number of samples that an initial state is taken from: 50 ms or 10 samples, whichever is longer."""
-    return min(max(START_SAMPLES, int(np.searchsorted(t, t[0] + START))), t.size)
+    return min(max(BEGINNING.samples, int(np.searchsorted(t, t[0] + START))), t.size)
 
 
 def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float]:
@@ -293,15 +319,15 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
     """
     known = np.isfinite(y)
     t, y = t[known] - t[0], y[known]
-    if t.size < FEWEST_SEEN:
+    if t.size < BEGINNING.fewest_seen:
         return 0.0, 0.0
     found = []
-    for n in {max(t.size // part, FEWEST_SEEN) for part in (1, 2, 4, 8)}:
+    for n in {max(t.size // part, BEGINNING.fewest_seen) for part in (1, 2, 4, 8)}:
         for degree in range(1, min(n - 3, 6)):
             design = np.vander(t[:n] / t[n - 1], degree + 1, increasing=True)
             coefficient, *_ = np.linalg.lstsq(design, y[:n], rcond=None)
             missed = math.sqrt(float(np.sum((y[:n] - design @ coefficient) ** 2)) / (n - degree - 1)) / sigma
-            reach = SURE_SPEED * max(missed, 1.0) * sigma * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+            reach = BEGINNING.sure * max(missed, 1.0) * sigma * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
             found.append(
                 (missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1])
             )
@@ -309,8 +335,8 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
     low, high = (
         pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:])
     )
-    along, seen = np.sign(low) * (y - y[0]), SURE_SPEED * math.sqrt(2.0) * sigma
-    thrown = -np.min(along[1 : 1 + FIRST]) > seen or -along[-1] > seen >= np.max(along)
+    along, seen = np.sign(low) * (y - y[0]), BEGINNING.sure * math.sqrt(2.0) * sigma
+    thrown = -np.min(along[1 : 1 + BEGINNING.first]) > seen or -along[-1] > seen >= np.max(along)
     return (0.0, 0.0) if low <= 0.0 <= high or thrown else (float(low), float(high))
 
 

@@ -1,47 +1,72 @@
 """What a signal shows of the instrument that took it: held spans, noise, and the step of its converter."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-NEIGHBOURS = 20  # samples on either side of a held span that say how the signal usually moves
-SHORTEST_HELD = 5  # samples
-FEWEST_LEVELS = 3  # distinct values below which no lattice can be told
-FEWEST_REVISITED = 0.05  # share of the distinct values that a converter shows twice or more
-COARSE = 200  # levels of travel below which even a decimal grid acts as a converter
-JUMP, CALM_CHANGES, LONGEST_EXCURSION = (
-    8.0,
-    6,
-    50,
-)  # noise levels of a jump; changes on either side that are usual; samples
-# of a step by which a gap may miss a multiple of it: a coarse converter behind a fine one of a seventh of its step
-# misses by that
-ON_LATTICE = 0.18
-ONE_STEP = 0.3  # of a step by which gaps of one step, seen through a finer converter, may differ
-LEAP = (
-    3.5,
-    6.0,
-    1.5,
-    # grid steps, noise levels beyond the usual change, and usual changes that the catching up after a held span must
-    # exceed at least
-)
-LEAP_SIDES, LEAP_WAY = (
-    4,
-    (0.5, 2.0),
-)  # samples before and after that tell the speed, and the share of the way made at it that the leap may be
-DITHER, COLOURED = (
-    0.35,
-    3.0,
-    # of a step, from which noise moves the reading wherever within a step it lies; how much longer coloured noise may
-    # let it stay
-)
-FEWEST_TURNS = 5  # of the reading within NEIGHBOURS, as noise makes them and motion does not
-# steps between any two neighbouring levels, from which a lattice that all are on is chance, or a converter behind
-FINER = 8
+
+@dataclass(frozen=True)
+class Holds:
+    """When repeats of a reading are no chance."""
+
+    neighbours: int = 20  # samples on either side of a held span that say how the signal usually moves
+    shortest: int = 5  # samples
+    dither: float = 0.35  # of a step, from which noise moves the reading wherever within a step it lies
+    coloured: float = 3.0  # how much longer coloured noise may let it stay
+    fewest_turns: int = 5  # of the reading within neighbours, as noise makes them and motion does not
+
+
+HOLDS = Holds()
+
+
+@dataclass(frozen=True)
+class Leaps:
+    """When the change after a span is the catching up of one that was held."""
+
+    # grid steps, noise levels beyond the usual change, and usual changes that it must exceed
+    least: tuple[float, float, float] = (3.5, 6.0, 1.5)
+    sides: int = 4  # samples before and after that tell the speed
+    way: tuple[float, float] = (0.5, 2.0)  # share of the way made at that speed that it may be
+
+
+LEAPS = Leaps()
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """When the levels of a reading lie on the lattice of a converter."""
+
+    fewest_levels: int = 3  # distinct values below which no lattice can be told
+    fewest_revisited: float = 0.05  # share of the distinct values that a converter shows twice or more
+    coarse: int = 200  # levels of travel below which even a decimal grid acts as a converter
+    # of a step, by which a gap may miss a multiple: a converter behind of a seventh of the step misses that
+    near: float = 0.18
+    one_step: float = 0.3  # of a step, by which gaps of one step, seen through a finer converter, may differ
+    finer: int = 8  # steps between any two neighbours, from which a lattice is chance, or that of a converter behind
+    # times the smallest gap between rounded levels up to which one is one step of the converter ahead
+    within: float = 1.75
+    # steps up to which gaps are counted, one after the other, to know the step ahead
+    reaches: tuple[float, ...] = (2.5, 5.0, 10.0, 20.0)
+    # of the gaps between levels: where a step may show
+    quantiles: tuple[float, ...] = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)
+
+
+LATTICE = Lattice()
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """When a reading leaves its course and comes back."""
+
+    least: float = 8.0  # noise levels of a jump
+    calm: int = 6  # changes on either side that are usual
+    longest: int = 50  # samples
+
+
+JUMPS = Jumps()
+
 FLOAT32 = float(np.finfo(np.float32).eps)
-WITHIN = 1.75  # times the smallest gap between rounded levels up to which a gap is one step of the converter ahead
-REACHES = 2.5, 5.0, 10.0, 20.0  # steps up to which gaps are counted, one after the other, to know the step ahead
-LATTICE_QUANTILES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the gaps between levels: where a step may show
 
 
 def frozen_spans(y: np.ndarray, grid: float) -> list[slice]:
@@ -54,21 +79,21 @@ def frozen_spans(y: np.ndarray, grid: float) -> list[slice]:
         return []
     by_chance = 0.3 if grid else 1 / len(y)  # a grid below the noise repeats up to 28 % of the samples at rest
     repeats = np.clip(np.mean(np.diff(y) == 0), by_chance, 0.9)
-    shortest = max(SHORTEST_HELD, int(np.ceil(2 * np.log(len(y)) / -np.log(repeats))))
+    shortest = max(HOLDS.shortest, int(np.ceil(2 * np.log(len(y)) / -np.log(repeats))))
     return [s for s in held_spans(y, shortest) if _dithered(y, s)]
 
 
 def unmoved_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
-    """Repeats of y (N,) longer than noise of DITHER steps and more, ``sigma`` with the converter's own, leaves a
+    """Repeats of y (N,) longer than noise of HOLDS.dither steps and more, ``sigma`` with the converter's own, leaves a
     reading alone, if it is less than a step, and just before or after which the reading goes to and fro: a rudder at
     rest may be quieter than a moving one.
     """
     noise = math.sqrt(max(sigma**2 - grid**2 / 12.0, 0.0))
-    if not DITHER * grid < noise < grid:
+    if not HOLDS.dither * grid < noise < grid:
         return []
     repeats = math.erf(grid / (math.sqrt(8.0) * noise))  # in the middle of a step
-    shortest = math.ceil(COLOURED * 2.0 * math.log(len(y)) / -math.log(repeats))
-    return [s for s in held_spans(y, shortest) if max(map(_turns, _around(y, s))) >= FEWEST_TURNS]
+    shortest = math.ceil(HOLDS.coloured * 2.0 * math.log(len(y)) / -math.log(repeats))
+    return [s for s in held_spans(y, shortest) if max(map(_turns, _around(y, s))) >= HOLDS.fewest_turns]
 
 
 def _turns(changes: np.ndarray) -> int:
@@ -84,23 +109,23 @@ def leapt_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
     """
     out = []
     for s in held_spans(y, 3):
-        first, last = s.start - LEAP_SIDES, s.stop + LEAP_SIDES
+        first, last = s.start - LEAPS.sides, s.stop + LEAPS.sides
         if first < 0 or last >= y.size:
             continue
         leap, before, after = (
             y[s.stop] - y[s.stop - 1],
-            (y[s.start] - y[first]) / LEAP_SIDES,
-            (y[last] - y[s.stop]) / LEAP_SIDES,
+            (y[s.start] - y[first]) / LEAPS.sides,
+            (y[last] - y[s.stop]) / LEAPS.sides,
         )
         way = (s.stop - s.start) * 0.5 * (before + after)
         usual = max(abs(before), abs(after))
-        least = max(LEAP[0] * grid, LEAP[1] * sigma + usual, LEAP[2] * usual)
-        if abs(leap) > least and before * after > 0 and LEAP_WAY[0] < leap / way < LEAP_WAY[1]:
+        least = max(LEAPS.least[0] * grid, LEAPS.least[1] * sigma + usual, LEAPS.least[2] * usual)
+        if abs(leap) > least and before * after > 0 and LEAPS.way[0] < leap / way < LEAPS.way[1]:
             out.append(slice(s.start + 1, s.stop))
     return out
 
 
-def held_spans(x: np.ndarray, shortest: int = SHORTEST_HELD) -> list[slice]:
+def held_spans(x: np.ndarray, shortest: int = HOLDS.shortest) -> list[slice]:
     """Runs of at least `shortest` equal samples."""
     starts = np.flatnonzero(np.r_[True, np.diff(x) != 0])
     stops = np.r_[starts[1:], len(x)]
@@ -114,7 +139,9 @@ def at_extreme(x: np.ndarray, span: slice) -> bool:
 
 def _around(x: np.ndarray, span: slice) -> tuple[np.ndarray, np.ndarray]:
     """The changes from sample to sample just before and just after a span."""
-    return np.diff(x[max(0, span.start - NEIGHBOURS) : span.start]), np.diff(x[span.stop : span.stop + NEIGHBOURS])
+    return np.diff(x[max(0, span.start - HOLDS.neighbours) : span.start]), np.diff(
+        x[span.stop : span.stop + HOLDS.neighbours]
+    )
 
 
 def varied(x: np.ndarray, span: slice) -> bool:
@@ -141,18 +168,18 @@ def converter_step(y: np.ndarray) -> float:
     """The step of the lattice that y (N,) lies on, in y's unit; 0.0 when there is none.
 
     The differences between neighbouring distinct values must be whole multiples of one step, exactly or, where values
-    were rounded in print or by a second converter, within ON_LATTICE of it. The decimal grid of the print is a lattice
-    too: it counts only where the travel has fewer than 200 of its steps, for then it hides as much as a converter
-    would. Pass values in the unit they were printed in.
+    were rounded in print or by a second converter, nearly (LATTICE.near of it). The decimal grid of the print is a
+    lattice too: it counts only where the travel has fewer than 200 of its steps, for then it hides as much as a
+    converter would. Pass values in the unit they were printed in.
     """
     levels, counts = np.unique(y[np.isfinite(y)], return_counts=True)
-    if len(levels) < FEWEST_LEVELS or np.mean(counts > 1) < FEWEST_REVISITED:
+    if len(levels) < LATTICE.fewest_levels or np.mean(counts > 1) < LATTICE.fewest_revisited:
         return 0.0
     grain = decimal_grain(levels)
     multiple = np.gcd.reduce(np.rint(np.diff(levels) / grain).astype(np.int64)) if grain else 1
-    if multiple > 1 and np.diff(levels).min() < FINER * multiple * grain:
+    if multiple > 1 and np.diff(levels).min() < LATTICE.finer * multiple * grain:
         return _ahead(levels, multiple * grain) or float(multiple * grain)
-    return _rounded_lattice(levels, grain) or (grain if np.ptp(levels) < COARSE * grain else 0.0)
+    return _rounded_lattice(levels, grain) or (grain if np.ptp(levels) < LATTICE.coarse * grain else 0.0)
 
 
 def decimal_grain(levels: np.ndarray) -> float:
@@ -165,14 +192,14 @@ def decimal_grain(levels: np.ndarray) -> float:
 
 
 def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
-    """The largest step that nine in ten differences of the levels are multiples of, within ON_LATTICE; what two kinds
+    """The largest step that nine in ten differences of the levels are multiples of, within LATTICE.near; what two kinds
     of gap differ by may be it as well.
     """
     finest = 8 * max(grain, FLOAT32 * np.abs(levels).max())
     gaps = np.diff(levels)
     gaps = gaps[gaps > finest / 8]
     usual = np.append(
-        np.quantile(gaps, LATTICE_QUANTILES), np.max(gaps[gaps < WITHIN * np.min(gaps)])
+        np.quantile(gaps, LATTICE.quantiles), np.max(gaps[gaps < LATTICE.within * np.min(gaps)])
     )  # the rarer kind, too, where there are two
     begun = {*usual, *np.abs(usual[:, None] - usual).ravel()}
     steps = [_refined(gaps, step) for step in begun if step >= finest]
@@ -187,10 +214,10 @@ def _ahead(levels: np.ndarray, step: float) -> float:
     """
     gaps = np.diff(levels)
     gaps = gaps[gaps > 0.5 * step]
-    if not step or gaps.size < FEWEST_LEVELS or gaps.min() < 1.5 * step:
+    if not step or gaps.size < LATTICE.fewest_levels or gaps.min() < 1.5 * step:
         return 0.0
-    coarse = float(np.mean(gaps[gaps < WITHIN * gaps.min()]))
-    for reach in REACHES:  # the longer a gap, the better must the step be known to count it
+    coarse = float(np.mean(gaps[gaps < LATTICE.within * gaps.min()]))
+    for reach in LATTICE.reaches:  # the longer a gap, the better must the step be known to count it
         few = gaps[gaps < reach * coarse]
         coarse = float(np.sum(few) / np.sum(np.rint(few / coarse)))
     counts = np.cumsum(np.rint(gaps / coarse))
@@ -200,14 +227,14 @@ def _ahead(levels: np.ndarray, step: float) -> float:
 
 
 def _on_lattice(gaps: np.ndarray, step: float) -> np.ndarray:
-    return np.abs(gaps / step - np.rint(gaps / step)) < ON_LATTICE
+    return np.abs(gaps / step - np.rint(gaps / step)) < LATTICE.near
 
 
 def _refined(gaps: np.ndarray, step: float) -> float:
     """The step by least squares over the gaps that are multiples of it, begun with the mean of those that may be one
     step.
     """
-    alike = gaps[np.abs(gaps - step) < ONE_STEP * step]
+    alike = gaps[np.abs(gaps - step) < LATTICE.one_step * step]
     step = float(np.mean(alike)) if alike.size else float(step)
     gaps = gaps[_on_lattice(gaps, step)]
     multiples = np.rint(gaps / step)
@@ -226,7 +253,7 @@ def spikes(y: np.ndarray, sigma: float) -> list[slice]:
 
 
 def excursions(
-    y: np.ndarray, sigma: float, times: float = JUMP, usual: float = 0.98, longest: int = LONGEST_EXCURSION
+    y: np.ndarray, sigma: float, times: float = JUMPS.least, usual: float = 0.98, longest: int = JUMPS.longest
 ) -> list[slice]:
     """Spans of at most ``longest`` samples in which y (N,) jumps away from its course and back again.
 
@@ -236,9 +263,9 @@ def excursions(
     """
     known = np.flatnonzero(np.isfinite(y))
     change = np.diff(y[known])
-    if change.size < 2 * NEIGHBOURS:
+    if change.size < 2 * HOLDS.neighbours:
         return []
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(change, CALM_CHANGES, mode="edge"), 2 * CALM_CHANGES + 1)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(change, JUMPS.calm, mode="edge"), 2 * JUMPS.calm + 1)
     jump = change - np.median(around, axis=1)
     least = times * max(sigma, float(np.quantile(np.abs(jump), usual)))
     large = np.flatnonzero(np.abs(jump) > least)

@@ -1,7 +1,8 @@
 """Text that arrives in pieces, in a recording's CSV format -> samples of time, input and output, checked as they come.
 
     pieces of text -> whole lines -> header: columns by role -> rows: numbers -> (t, u, y)
- The columns are a recording's (see recording.COLUMNS) with its units; whatever else a line holds is ignored. A missing
+
+The columns are a recording's (see columns.COLUMNS) with its units; whatever else a line holds is ignored. A missing
 output is NaN, a missing input the one before.
 """
 
@@ -12,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ers_mj.data.recording import COLUMNS, choose_columns
+from ers_mj.data.columns import COLUMNS, choose_columns
 from ers_mj.data.tables import BLANK
 from ers_mj.errors import InputError
 

@@ -32,7 +32,7 @@ class Backlash(Transmission):
         Parameter("f_contact", "frequency", "contact's natural frequency", lower=40.0, upper=1000.0, absent=120.0),
         Parameter("zeta", "ratio", "contact's damping ratio", lower=0.05, upper=2.0, absent=0.2),
     )
-    tries, tangible = 3, False
+    tries, tangible, is_play = 3, False, True
 
     def starts(self, scales):
         contact = min(120.0, 0.5 / scales.sample_time)

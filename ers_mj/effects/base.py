@@ -9,8 +9,9 @@ is carried as an acceleration [output unit / s^2] and only turned into N m for t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Callable, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dtbsv
@@ -197,11 +198,10 @@ class Effect:
     redundant: ClassVar[int] = (
         0  # of its numbers, how many only stand in for the baseline's own, so that they explain nothing more
     )
-    curves: ClassVar[
-        str
-        # the effect of which it is a form that changes along the travel by what its size tells, so that either may be
-        # the better one
-    ] = ""
+    curves: ClassVar[str] = (
+        # the effect of which it is a form that changes along the travel by what its size tells: either may be better
+        ""
+    )
     wave: ClassVar[tuple[tuple[int, ...], int] | None] = (
         None  # amplitudes (of which a start has one) and phase: the screening finds both from two quarter periods
     )
@@ -231,6 +231,9 @@ class Effect:
         # it from the rudder
         False
     )
+    is_play: ClassVar[bool] = False  # a slack between motor and rudder, which a plant has once
+    after_noise: ClassVar[bool] = False  # a sensor's converter or wire: it acts on what is read, noise and all
+    holds: ClassVar[bool] = False  # a wire that brings an earlier reading again
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
@@ -318,6 +321,20 @@ class Effect:
     def fed(self, p: np.ndarray, u: np.ndarray, supply: np.ndarray) -> np.ndarray:
         """What the drive makes of the command u (N,) from a measured supply [V] (N,)."""
         return u
+
+    def dead_time(self, p: np.ndarray) -> float:
+        """By how much the command reaches the motor late [s]."""
+        return 0.0
+
+    def remembers(self, p: np.ndarray) -> tuple[float, float]:
+        """(time constant, dead time) [s] of a reading that hangs on more than the output at the same time."""
+        return 0.0, 0.0
+
+    def supply_left(
+        self, p: np.ndarray, c: Coefficients, t: np.ndarray, motion: np.ndarray, j: np.ndarray
+    ) -> np.ndarray | float:
+        """Share (N,) of the supply that is left along a motion (N, 4) of drive acceleration j (N,)."""
+        return 1.0
 
     def measure(self, p: np.ndarray, t: np.ndarray, y: np.ndarray) -> np.ndarray:
         """What the sensor reads (N,) at times t (N,) of the true output y (N,)."""

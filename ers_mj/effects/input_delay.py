@@ -18,5 +18,8 @@ class InputDelay(Drive):
     def starts(self, scales):
         return [np.array([2 * scales.sample_time])]
 
+    def dead_time(self, p):
+        return float(p[0])
+
     def coefficients(self, p, c):
         return c._replace(delay=c.delay + p[0])

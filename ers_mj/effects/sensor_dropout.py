@@ -13,7 +13,7 @@ class SensorDropout(Sensor):
     name = "sensor_dropout"
     sentence = "the sensor drops out {rate} times a second, for {duration} on average"
     mjcf = "none: readings are held after the simulation"
-    tangible = False
+    tangible, after_noise, holds = False, True, True
     parameters = (
         Parameter("rate", "frequency", "dropouts in a second"),
         Parameter("duration", "time", "mean length of a dropout"),

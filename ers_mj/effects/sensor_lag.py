@@ -32,6 +32,9 @@ class SensorLag(Sensor):
             else []
         )
 
+    def remembers(self, p):
+        return p[0], p[1] if np.isfinite(p[1]) else 0.0
+
     def measure(self, p, t, y):
         if np.isfinite(p[1]):
             y = np.interp(t - p[1], t, y)

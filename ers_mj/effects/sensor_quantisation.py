@@ -11,7 +11,7 @@ class SensorQuantisation(Sensor):
     name = "sensor_quantisation"
     sentence = "the sensor counts in steps of {step}"
     mjcf = "none: the reading is rounded after the simulation"
-    tangible = False
+    tangible, after_noise = False, True
     parameters = (Parameter("step", "position", "one count of the sensor"),)
 
     def starts(self, scales):

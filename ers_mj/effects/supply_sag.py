@@ -94,6 +94,9 @@ class SupplySag(Drive):
             np.append(1.0, decay - (1.0 - decay) * back[:-1]), np.append(0.0, (1.0 - decay) * most[:-1])
         )
 
+    def supply_left(self, p, c, t, motion, j):
+        return self.winding(p, c, t, motion, j) / np.where(j == 0.0, 1.0, j)
+
     def describe(self, values):
         if values["measured"] != "none":
             return (

@@ -47,7 +47,7 @@ def _rows(trace: Trace, window: float, still: float):
     index = index[moving & inside]
     if index.shape[0] < 8:
         return None
-    take = lambda f, v: (v[index] * f).sum(axis=1) * h  # noqa: E731
+    take = lambda f, v: (v[index] * f).sum(axis=1) * h
     columns = np.column_stack(
         [
             take(slope, y),

@@ -1,310 +1,53 @@
 """The input that pins wanted parameters best: optimal design by the Fisher information of the event-exact model.
 
-    model, limits of a rig -> inputs (excitation.py) -> information of each -> the best, refined -> mixtures of several
-    -> the most promising, refitted
- With Jacobian J (N, k) of the residuals [sigma] the covariance of the fitted numbers z is C = (J^T J)^-1, that of
-wanted numbers with gradients G is G C G^T. D-optimal: least determinant; A-optimal: least trace. Slopes are differences
-of the exact simulation, since a weak number is what is left of a column after all others are taken off it, and tangents
-are good to a few per cent only. Where stick and slip nearly fork, an input promises a precision that holds within a
-hair's breadth of the model's numbers; so the slopes are secants along the axes of C, as long as the standard deviations
-that they promise, and the TRIMMED share of the blocks of time that tell most counts no more than the others.
+model, limits of a rig -> inputs (excitation.py) -> information of each (question.py) -> the best, refined
+-> mixtures of several -> the most promising, refitted
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.data.excitation import GENTLE, MARGIN, SHARES, TOP, Limits, excitations, signal
-from ers_mj.data.prepared import Channel, Trace, make_trace
+from ers_mj.data.excitation import ASKING, GENTLE, SHARES, Limits, excitations, signal
 from ers_mj.errors import InputError
-from ers_mj.estimation.fit import SQUARES, descend, fit
-from ers_mj.estimation.jacobian import jacobian_of
-from ers_mj.estimation.known_model import model_of
-from ers_mj.estimation.objective import residuals, run_of
-from ers_mj.experiment_design.discriminating_inputs import VAGUE
+from ers_mj.experiment_design.question import Plan, Question, inverse
 from ers_mj.plants.inputs import DURATION, INPUTS
-from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.model import OBSERVER_RATE, Model
 
-BLOCK, FEWEST_BLOCKS = 0.25, 8  # [s] of a recording in which information is counted, and blocks at least
-SECANTS = 2  # times that the slopes are taken anew, over steps of a standard deviation
-TRIMMED = 0.1  # share of the blocks, those that tell most, that are not counted on
-REFINED, ROUNDS, LEAST_GAIN = (
-    5,
-    6,
-    0.01,
-)  # inputs that are refined, rounds, and share of a spread that a round must gain
+UNSEEN = 1.0  # standard deviation of a logarithm from which a number does not show
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How far the search goes."""
+
+    refined: int = 5  # inputs that are refined
+    rounds: int = 6
+    least_gain: float = 0.01  # share of a spread that a round must gain
+    parts: int = 3  # inputs in a mixture at most
+    shortest_part: float = 1.0  # [s] of each at least
+    checked: int = 5  # plans that are refitted
+    refits: int = 10  # how often each
+
+
+EFFORT = Effort()
+REFINED = ("amplitude", "sines", "period_s", "hold_s", "push_s", "rest_s")  # numbers beside frequencies
 FACTORS: Mapping[str, tuple[float, ...]] = {
     "amplitude": (0.85, 1.15),
     "sines": (0.6, 1.6),
 }  # of a number, in one step of the refinement
 FACTOR = (1 / 1.35, 1.35)  # of a frequency or a time
-PARTS, SHORTEST_PART = 3, 1.0  # inputs in a mixture at most, and [s] of each at least
-UNSEEN = 1.0  # standard deviation of a logarithm from which a number does not show
-CHECKED, REFITS, OFF = (
-    5,
-    10,
-    0.01,
-)  # plans that are refitted, how often each, and from how far (standard deviation of z)
-REFIT_STEPS, REFIT_TOLERANCE = 60, 1e-9  # of the least squares that end a refit, in C at SQUARES
-GRADIENT = 1e-5  # step in z of a wanted number's gradient
-TOLD: Mapping[str, tuple[str, Callable[[Mapping[str, float]], float]]] = {  # meaning, and value of what may be wanted
-    "a_1": ("k_s/J", lambda v: v["a_1"]),
-    "a_2": ("damping of Eq. (6)", lambda v: v["a_2"]),
-    "b": ("n K_t/(J R)", lambda v: v["b"]),
-    "c_1": ("T_LH/J", lambda v: v["c_1"]),
-    "c_2": ("F_c/J", lambda v: v["c_2"]),
-    "theta_0": ("home", lambda v: v["theta_0"]),
-    "tau_e": ("L/R", lambda v: v["tau_e"]),
-    "B": ("B/J", lambda v: v["a_2"] * (1 - v["emf_share"])),
-    "K_e": ("n K_e", lambda v: v["a_2"] * v["emf_share"] / v["b"]),
-    "K_t": ("n K_t/J", lambda v: v["ampere"]),
-    "R": ("R", lambda v: v["ampere"] / v["b"]),
-}
-NEEDS = {
-    "tau_e": "tau_e",
-    "B": "emf_share",
-    "K_e": "emf_share",
-    "K_t": "ampere",
-    "R": "ampere",
-}  # the number that must be free
-
-
-@dataclass(frozen=True)
-class Rig:
-    """What can be asked of a rig: its limits, the noise of the angle [rad], and that of the current [A] where it is
-    measured.
-    """
-
-    limits: Limits
-    sigma: float
-    current_sigma: float | None = None
-
-    @staticmethod
-    def of(
-        home: float,
-        u_max: float,
-        travel: float,
-        duration: float,
-        rate_hz: float,
-        sigma: float,
-        current_sigma: float | None = None,
-    ) -> Rig:
-        """A rig that bears +-u_max [V] and +-travel [rad] about its home."""
-        inside = travel / (1 + 2 * MARGIN)
-        return Rig(Limits(-u_max, u_max, home - inside, home + inside, rate_hz, duration, home), sigma, current_sigma)
-
-    @property
-    def t(self) -> np.ndarray:
-        """Sample times (N,) [s]."""
-        return np.arange(round(self.limits.duration * self.limits.rate_hz)) / self.limits.rate_hz
-
-
-@dataclass(frozen=True)
-class Plan:
-    """An input u (N,) [V], the parts that it is made of, and the standard deviations that it leaves of the wanted
-    numbers (of logarithms; of theta_0 in rad).
-
-    ``spread`` is promised by the information, ``found`` the RMS error of REFITS refits to simulated recordings, once
-    they were made.
-    """
-
-    u: np.ndarray
-    parts: tuple[dict, ...]
-    spread: Mapping[str, float]
-    cost: float
-    found: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Question:
-    """What is wanted of a model on a rig: names of TOLD, by the criterion "D" or "A", in which each is weighed by its
-    ``known`` spread (q,).
-    """
-
-    model: Model
-    rig: Rig
-    wanted: tuple[str, ...]
-    criterion: str = "A"
-    known: tuple[float, ...] = ()
-
-    @staticmethod
-    def of(
-        datasheet: Datasheet, rig: Rig, wanted: Sequence[str] = (), criterion: str = "A", inductance: bool = True
-    ) -> Question:
-        """All that can be told, where nothing is named.
-
-        Raises:
-            InputError: a name that does not exist, or that these sensors cannot tell.
-        """
-        probe = _empty(rig, np.zeros(rig.t.size))
-        probe = replace(
-            probe,
-            y=np.linspace(rig.limits.low, rig.limits.high, probe.t.size),
-            u=np.full(probe.t.size, rig.limits.high_u),
-        )
-        model = model_of(datasheet, [probe], True, inductance=inductance, current=rig.current_sigma is not None)
-        can = tuple(n for n in TOLD if NEEDS.get(n, n) in model.free)
-        for name in wanted:
-            if name not in TOLD:
-                raise InputError(f"--for: there is no {name[:40]!r}; there are {', '.join(TOLD)}")
-            if name not in can:
-                remedy = (
-                    "" if rig.current_sigma is not None else "; measuring the current would help (--current-noise-A)"
-                )
-                raise InputError(
-                    f"--for {name}: this model and these sensors cannot tell it, they can tell {', '.join(can)}{remedy}"
-                )
-        free = tuple(n for n in can if n not in ("R", "a_2" if "B" in can else ""))
-        question = Question(model, rig, tuple(wanted) or free, criterion)
-        if criterion == "D" and np.linalg.matrix_rank(question.gradients) < len(question.wanted):
-            raise InputError(
-                f"--for {','.join(wanted)}: these depend on each other, leave one out (or ask for --criterion A)"
-            )
-        return question
-
-    @cached_property
-    def gradients(self) -> np.ndarray:
-        """Gradients (q, k) of the wanted numbers' logarithms (of theta_0 itself) by z, over what is ``known`` of
-        them.
-        """
-        layout = self.model.layout()
-        z, rows = self.model.vector(layout), []
-        for name, known in zip(self.wanted, self.known or np.ones(len(self.wanted))):
-            value = lambda z, name=name: TOLD[name][1](self.model.at(layout, z).values)  # noqa: E731
-            size = known * (1.0 if name == "theta_0" else value(z))
-            rows.append(
-                [
-                    (value(z + GRADIENT * row) - value(z - GRADIENT * row)) / (2 * GRADIENT * size)
-                    for row in np.eye(z.size)
-                ]
-            )
-        return np.array(rows)
-
-    def information(self, u: np.ndarray, within: bool = True) -> np.ndarray | None:
-        """J^T J of each block (B, k, k) of a recording under u (N,) [V]; None where the motion leaves the travel and
-        has to stay ``within``.
-        """
-        trace = self._recording(u)
-        if not np.all(np.isfinite(trace.y)) or (within and not self.rig.limits.holds(trace.y)):
-            return None
-        layout = self.model.layout()
-        z = self.model.vector(layout)
-        jacobian = jacobian_of(run_of(self.model, [trace], OBSERVER_RATE), [trace], OBSERVER_RATE, by_tangents=False)
-        for _ in range(SECANTS):
-            size, axes = np.linalg.eigh(_inverse(self._trimmed(self._blocks(jacobian))))
-            reach = axes * np.sqrt(size)
-            ends = [
-                [
-                    np.nan_to_num(
-                        residuals(self.model.at(layout, z + way * row), [trace], OBSERVER_RATE), posinf=0.0, neginf=0.0
-                    )
-                    for way in (-1, 1)
-                ]
-                for row in reach.T
-            ]
-            jacobian = np.column_stack([0.5 * (after - before) for before, after in ends]) @ np.linalg.inv(reach)
-        return self._blocks(jacobian)
-
-    def _recording(self, u: np.ndarray) -> Trace:
-        """What the rig's sensors would show under u (N,), without noise."""
-        trace, channels = _empty(self.rig, u), ()
-        plant, run = self.model.staged(trace, 0, 0.0, None)
-        theta, motion = plant.outputs(trace.t, trace.u, **run)
-        if self.rig.current_sigma is not None:
-            channels = (
-                Channel(
-                    "current", plant.current(trace.t, motion) / self.model.values["ampere"], self.rig.current_sigma
-                ),
-            )
-        return replace(trace, y=theta, channels=channels)
-
-    def _blocks(self, jacobian: np.ndarray) -> np.ndarray:
-        """J^T J (B, k, k) of the blocks of all channels."""
-        count = max(round(self.rig.limits.duration / BLOCK), FEWEST_BLOCKS)
-        columns = np.split(jacobian, len(jacobian) // self.rig.t.size)
-        return sum(np.array([part.T @ part for part in np.array_split(c, count)]) for c in columns)
-
-    def _trimmed(self, blocks: np.ndarray) -> np.ndarray:
-        """The blocks' information (k, k) in all, where those that tell most of what is wanted count as the others."""
-        g, total = self.gradients, blocks.sum(axis=0)
-        for _ in range(2):
-            lead = g @ _inverse(total)
-            weight = np.linalg.inv(lead @ g.T) if self.criterion == "D" else np.eye(len(g))
-            shares = np.array([np.trace(weight @ lead @ b @ lead.T) for b in blocks])
-            kept = np.argsort(shares)[: math.ceil((1 - TRIMMED) * len(blocks))]
-            total = blocks[kept].sum(axis=0) * len(blocks) / kept.size
-        return total
-
-    def judged(self, blocks: np.ndarray) -> tuple[np.ndarray, float]:
-        """Covariance (q, q) of the wanted numbers by the blocks' information (B, k, k), trimmed, and the criterion's
-        cost, in logarithms of a spread.
-        """
-        covariance = self.gradients @ _inverse(self._trimmed(blocks)) @ self.gradients.T
-        return covariance, self.cost(covariance)
-
-    def cost(self, covariance: np.ndarray) -> float:
-        """Mean logarithm of the spreads' ellipsoid (D), or logarithm of the root mean square spread (A)."""
-        if self.criterion == "D":
-            return 0.5 * float(np.linalg.slogdet(covariance)[1]) / len(covariance)
-        return 0.5 * math.log(float(np.trace(covariance)) / len(covariance))
-
-    def plan(self, u: np.ndarray, parts: Sequence[Mapping] = (), within: bool = True) -> Plan | None:
-        """What an input promises; None where it leaves the travel."""
-        blocks = self.information(u, within)
-        if blocks is None:
-            return None
-        covariance, cost = self.judged(blocks)
-        spread = np.sqrt(np.diag(covariance)) * (self.known or 1.0)
-        return Plan(u, tuple(dict(p) for p in parts), dict(zip(self.wanted, spread.tolist())), cost)
-
-    def errors(self, u: np.ndarray, seed: int) -> np.ndarray:
-        """Errors (q,) of the wanted numbers after a fit to one simulated recording, noise included, from numbers that
-        are off by OFF.
-
-        The package's fit, then least squares.
-        """
-        random, trace, layout = np.random.default_rng(seed), self._recording(u), self.model.layout()
-        channels = tuple(replace(c, values=c.values + c.sigma * random.standard_normal(u.size)) for c in trace.channels)
-        trace = replace(trace, y=trace.y + trace.sigma * random.standard_normal(u.size), channels=channels)
-        start = self.model.at(layout, self.model.vector(layout) + OFF * random.standard_normal(len(layout)))
-        found = descend(fit(start, [trace]).model, [trace], OBSERVER_RATE, SQUARES, REFIT_STEPS, REFIT_TOLERANCE).model
-        pairs = [(name, TOLD[name][1](found.values), TOLD[name][1](self.model.values)) for name in self.wanted]
-        return np.array([a - b if name == "theta_0" else math.log(a / b) for name, a, b in pairs])
-
-    def checked(self, plan: Plan) -> Plan:
-        """The plan with what refits find."""
-        rms = np.sqrt(np.mean([self.errors(plan.u, seed) ** 2 for seed in range(REFITS)], axis=0))
-        return replace(plan, found=dict(zip(self.wanted, rms.tolist())))
-
-    def compared(self, known: Plan) -> Question:
-        """The same, each spread over what another plan leaves of it."""
-        return replace(self, known=tuple(known.spread[name] for name in self.wanted))
 
 
 def reference(question: Question, name: str = "multisine") -> Plan:
     """What the named input promises and refits find, cut off at the rig's voltage; it may leave the travel."""
     limits = question.rig.limits
-    peak = min(_peak(name), limits.high_u)
-    part = {
-        "kind": "named",
-        "name": name,
-        "amplitude": peak,
-        "offset": 0.0,
-        "peak_u": peak,
-        "duration_s": limits.duration,
-        "lead_s": 0.0,
-        "rate_hz": limits.rate_hz,
-        "start": limits.start,
-    }
-    return question.checked(
-        question.plan(np.clip(INPUTS[name](question.rig.t), limits.low_u, limits.high_u), [part], within=False)
-    )
+    part = _named_at(name, min(_peak(name), limits.high_u), limits)
+    u = np.clip(INPUTS[name](question.rig.t), limits.low_u, limits.high_u)
+    return question.checked(question.plan(u, [part], within=False), EFFORT.refits)
 
 
 def planned(
@@ -318,6 +61,28 @@ def planned(
         InputError: every input that was tried leaves the travel.
     """
     question = question.compared(before)
+    order = _distinct(_tried(question, progress))
+    _refuse_unseen(order[0].spread)
+    refined = []
+    for k, start in enumerate(order[: EFFORT.refined]):
+        progress("refining the best", 0.4 + 0.3 * k / len(order[: EFFORT.refined]))
+        refined.append(_refined(question, start))
+    found = _distinct([*refined, *order])
+    kinds = {p.parts[0]["kind"]: p for p in reversed(found)}
+    promising = [
+        *sorted(_mixtures(question, found), key=lambda p: p.cost)[:1],
+        *sorted(kinds.values(), key=lambda p: p.cost),
+    ][: EFFORT.checked]
+    checked = []
+    for k, plan in enumerate(promising):
+        progress("refitting under the best", 0.7 + 0.3 * k / EFFORT.checked)
+        checked.append(question.checked(plan, EFFORT.refits))
+    is_allowed = question.plan(before.u) is not None
+    return min([*checked, *([before] if is_allowed else [])], key=lambda p: _worse(p, before))
+
+
+def _tried(question: Question, progress: Callable[[str, float], None]) -> list[Plan]:
+    """What each input promises that stays in the travel, at gentle shares of the voltage where none does."""
     limits, tried = question.rig.limits, []
     for shares in (SHARES, GENTLE):
         rows = [*excitations(limits, shares), *_named(limits, shares)]
@@ -325,35 +90,20 @@ def planned(
             progress("trying inputs", 0.4 * k / len(rows))
             tried += [found for e in row if (found := question.plan(built(e), [e])) is not None]
         if tried:
-            break
-    if not tried:
-        raise InputError(
-            f"every input that was tried leaves the travel of {math.degrees(limits.low):.4g} .."
-            f" {math.degrees(limits.high):.4g} deg: more travel or less voltage was expected"
-        )
-    order = _distinct(tried)
-    if all(x > UNSEEN for name, x in order[0].spread.items() if name != "theta_0" or len(order[0].spread) == 1):
+            return tried
+    raise InputError(
+        f"every input that was tried leaves the travel of {math.degrees(limits.low):.4g} .."
+        f" {math.degrees(limits.high):.4g} deg: more travel or less voltage was expected"
+    )
+
+
+def _refuse_unseen(spread: Mapping[str, float]) -> None:
+    """Raise InputError where even the best input shows nothing of what is wanted."""
+    if all(x > UNSEEN for name, x in spread.items() if name != "theta_0" or len(spread) == 1):
         raise InputError(
             "no input within these limits moves the servo so that anything of what is wanted shows: more voltage or"
             " travel was expected"
         )
-    best = order[:REFINED]
-    refined = []
-    for k, start in enumerate(best):
-        progress("refining the best", 0.4 + 0.3 * k / len(best))
-        refined.append(_refined(question, start))
-    found = _distinct([*refined, *order])
-    kinds = {p.parts[0]["kind"]: p for p in reversed(found)}
-    promising = [
-        *sorted(_mixtures(question, found), key=lambda p: p.cost)[:1],
-        *sorted(kinds.values(), key=lambda p: p.cost),
-    ][:CHECKED]
-    checked = []
-    for k, plan in enumerate(promising):
-        progress("refitting under the best", 0.7 + 0.3 * k / CHECKED)
-        checked.append(question.checked(plan))
-    is_allowed = question.plan(before.u) is not None
-    return min([*checked, *([before] if is_allowed else [])], key=lambda p: _worse(p, before))
 
 
 def _worse(plan: Plan, before: Plan) -> float:
@@ -390,82 +140,81 @@ def _named(limits: Limits, shares: Sequence[float]) -> list[list[dict]]:
     """The package's named inputs at their own amplitude and at every share of the rig's."""
     half = 0.5 * (limits.high_u - limits.low_u)
     return [
-        [
-            {
-                "kind": "named",
-                "name": name,
-                "amplitude": x,
-                "offset": 0.0,
-                "peak_u": x,
-                "duration_s": limits.duration,
-                "lead_s": 0.0,
-                "rate_hz": limits.rate_hz,
-                "start": limits.start,
-            }
-            for x in sorted({min(_peak(name), half), *(share * half for share in shares)})
-        ]
+        [_named_at(name, x, limits) for x in sorted({min(_peak(name), half), *(share * half for share in shares)})]
         for name in INPUTS
     ]
 
 
+def _named_at(name: str, amplitude: float, limits: Limits) -> dict:
+    """A named input as an excitation."""
+    return {
+        "kind": "named",
+        "name": name,
+        "amplitude": amplitude,
+        "offset": 0.0,
+        "peak_u": amplitude,
+        "duration_s": limits.duration,
+        "lead_s": 0.0,
+        "rate_hz": limits.rate_hz,
+        "start": limits.start,
+    }
+
+
 def _refined(question: Question, plan: Plan) -> Plan:
     """The plan with its numbers changed one at a time, as long as that pays."""
-    for _ in range(ROUNDS):
+    for _ in range(EFFORT.rounds):
         found = [
             p
             for e in _neighbours(plan.parts[0], question.rig.limits)
             if (p := question.plan(built(e), [e])) is not None
         ]
         better = min(found, key=lambda p: p.cost, default=plan)
-        if better.cost > plan.cost - LEAST_GAIN:
+        if better.cost > plan.cost - EFFORT.least_gain:
             break
         plan = better
     return plan
 
 
 def _neighbours(excitation: Mapping, limits: Limits) -> Iterator[dict]:
-    half = 0.5 * (limits.high_u - limits.low_u)
-    for key, x in excitation.items():
-        if (
-            key not in ("amplitude", "sines")
-            and not (key.endswith("_hz") and key != "rate_hz")
-            and key not in ("period_s", "hold_s", "push_s", "rest_s")
-        ):
-            continue
+    """The excitation with one of its numbers a step up or down."""
+    for key in [k for k in excitation if k in REFINED or (k.endswith("_hz") and k != "rate_hz")]:
         for factor in FACTORS.get(key, FACTOR):
-            new = float(f"{x * factor:.3g}")
-            if key == "amplitude":
-                new = min(new, half)
-            elif key == "sines":
-                new = max(round(new), 2)
-            elif key.endswith("_hz"):
-                new = min(max(new, 1.0 / limits.duration), TOP * limits.rate_hz)
-            else:
-                new = min(max(new, 4.0 / limits.rate_hz), limits.duration)
+            new = _within(key, float(f"{excitation[key] * factor:.3g}"), limits)
             changed = {**excitation, key: new}
-            if new != x and changed.get("from_hz", 0.0) < changed.get("to_hz", math.inf):
+            if new != excitation[key] and changed.get("from_hz", 0.0) < changed.get("to_hz", math.inf):
                 yield {**changed, "peak_u": abs(changed["offset"]) + changed["amplitude"]}
+
+
+def _within(key: str, new: float, limits: Limits) -> float:
+    """A number of an excitation within what the rig bears."""
+    if key == "amplitude":
+        return min(new, 0.5 * (limits.high_u - limits.low_u))
+    if key == "sines":
+        return max(round(new), 2)
+    if key.endswith("_hz"):
+        return min(max(new, 1.0 / limits.duration), ASKING.top * limits.rate_hz)
+    return min(max(new, 4.0 / limits.rate_hz), limits.duration)
 
 
 def _mixtures(question: Question, plans: Sequence[Plan]) -> list[Plan]:
     """Several inputs one after the other, in the shares of time that the multiplicative algorithm of optimal design
     gives them.
     """
-    chosen = _distinct(plans)[: 4 * PARTS]
+    chosen = _distinct(plans)[: 4 * EFFORT.parts]
     information = [question.information(p.u).sum(axis=0) for p in chosen]
     weight, g = np.full(len(chosen), 1.0 / len(chosen)), question.gradients
     for _ in range(300):
-        lead = g @ _inverse(np.tensordot(weight, information, 1))
+        lead = g @ inverse(np.tensordot(weight, information, 1))
         inner = np.linalg.inv(lead @ g.T) if question.criterion == "D" else np.eye(len(g))
         slope = np.array([np.trace(inner @ lead @ f @ lead.T) for f in information])
         weight = weight * np.sqrt(slope / (weight @ slope))
         weight = weight / weight.sum()
     out, duration = [], question.rig.limits.duration
-    for count in range(2, PARTS + 1):
+    for count in range(2, EFFORT.parts + 1):
         best = np.argsort(-weight)[:count]
         seconds = np.round(duration * weight[best] / weight[best].sum(), 1)
         seconds[0] += duration - seconds.sum()
-        if len(chosen) < count or seconds.min() < SHORTEST_PART:
+        if len(chosen) < count or seconds.min() < EFFORT.shortest_part:
             continue
         parts = [{**chosen[k].parts[0], "duration_s": float(s)} for k, s in zip(best, seconds)]
         u = np.concatenate([built(e) for e in parts])
@@ -480,14 +229,3 @@ def _distinct(plans: Sequence[Plan]) -> list[Plan]:
     for p in sorted(plans, key=lambda p: p.cost):
         kinds.setdefault(tuple(v for k, v in p.parts[0].items() if k not in ("amplitude", "peak_u")), p)
     return list(kinds.values())
-
-
-def _inverse(information: np.ndarray) -> np.ndarray:
-    """Covariance of z where VAGUE is all that is known beforehand."""
-    return np.linalg.inv(information + np.eye(len(information)) / VAGUE**2)
-
-
-def _empty(rig: Rig, u: np.ndarray) -> Trace:
-    t = rig.t
-    trace = make_trace("plan", t, u, np.zeros(t.size), np.ones(t.size, bool), None, None, rig.sigma, 0.0)
-    return replace(trace, start=(rig.limits.start, 0.0))

@@ -230,7 +230,7 @@ def _rows(
                 if all(p for p, q in zip(known, powers) if q)
                 else None
             )
-            product = lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0]))  # noqa: E731
+            product = lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0]))
             rows.append(row(label, product, _unit(unknowns.names, powers, y, u), told, unknowns.names[k]))
     return rows
 

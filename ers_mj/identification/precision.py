@@ -1,5 +1,6 @@
 """How sure fitted numbers are: Fisher's information, resampled blocks, and the profile of what is weak.
- sensitivities J (N, r), residuals e (N,), both in sigmas -> covariance (r, r) -> 95 % half-width of anything that
+
+sensitivities J (N, r), residuals e (N,), both in sigmas -> covariance (r, r) -> 95 % half-width of anything that
 follows from the numbers
 """
 

@@ -1,6 +1,7 @@
 """What the data can tell at all: the rank of the sensitivities, and the combinations that are left where it falls
 short.
- Sensitivities are simulated slopes by the logarithm of each letter, so that an exponent is a number: where a null
+
+Sensitivities are simulated slopes by the logarithm of each letter, so that an exponent is a number: where a null
 vector v of them has whole entries, prod p_i^{v_i s} changes nothing, and with one letter (the pivot) of each null
 vector held, every other one stands for the combination p_i / prod pivot_j^{v_ji}.
 """

@@ -1,5 +1,6 @@
 """A play or a shaft beside a bristle: two bodies by fixed steps, every force taken in the middle of the step.
- State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead.
+
+State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead.
 Its friction is k z + d exp(-(w / w_d)^2) z', its bend goes the way of Dahl's exactly under a speed that is constant
 over the step. What gives like a spring needs no event; what is left of set-valued terms, the motor side's dry friction
 and the preload's corner, is solved for with the speeds at the end of the step, as in Moreau's time
@@ -11,7 +12,6 @@ of second order where nothing switches; dampers are implicit.
 from __future__ import annotations
 
 import math
-
 from typing import NamedTuple
 
 import numpy as np
@@ -175,7 +175,7 @@ def _bristle_damping(c, w, z, level):
     if c.d_bristle <= 0.0:
         return 0.0
     left = max(1.0 - math.copysign(1.0, w) * c.k_bristle * z / level, 0.0)
-    return c.d_bristle * (left if c.dahl == 1.0 else left ** c.dahl) * math.exp(-((w / c.fade) ** 2))
+    return c.d_bristle * (left if c.dahl == 1.0 else left**c.dahl) * math.exp(-((w / c.fade) ** 2))
 
 
 @inline

@@ -1,5 +1,6 @@
-"""The flow over a whole segment of a sample as one precomputed map. What laws add enters it as a force that is a parabola
-in time, through three evaluations (an exponential integrator); what a shaft that hardens adds goes the same way.
+"""The flow over a whole segment of a sample as one precomputed map. What laws add enters it as a force that is a
+parabola in time, through three evaluations (an exponential integrator); what a shaft that hardens adds goes the same
+way.
 """
 
 from __future__ import annotations
@@ -46,9 +47,9 @@ def _one(k):
 
 @unit(types.void(MAPS, I, C, M, F, F, F, L))
 def fill_map(e, n, c, m, tau, a_emf, h, driven):
-    """The exact map over h in a mode with side 0: e[n] (5, 17), columns x (5), constant, drive, side, force on the rudder
-    1, s, s^2 (s = t/h), the same of a force between the two bodies where their shaft hardens, and of one on the motor
-    where it is ``driven`` by laws.
+    """The exact map over h in a mode with side 0: e[n] (5, 17), columns x (5), constant, drive, side, force on the
+    rudder 1, s, s^2 (s = t/h), the same of a force between the two bodies where their shaft hardens, and of one on the
+    motor where it is ``driven`` by laws.
     """
     zero = State(0.0, 0.0, 0.0, 0.0, 0.0)
     base = linear(c, zero, m, 0.0, tau, a_emf, h, 1.0, 0.0, 0.0)
@@ -116,7 +117,11 @@ def _row(e, n, i, x, drive, side, f):
 def _mapped_one(e, n, x, drive, side, f):
     """The state of one body after a map, under the force f (3,), a parabola of s from 0 to 1."""
     return State(
-        _row(e, n, 0, x, drive, side, f), _row(e, n, 1, x, drive, side, f), _row(e, n, 2, x, drive, side, f), x.theta_m, x.w_m
+        _row(e, n, 0, x, drive, side, f),
+        _row(e, n, 1, x, drive, side, f),
+        _row(e, n, 2, x, drive, side, f),
+        x.theta_m,
+        x.w_m,
     )
 
 
@@ -152,9 +157,7 @@ def _mapped_parted(e, n, x, drive, side, f, q, r):
     z = _mapped_two(e, n, x, drive, side, f)
     (t_q, t_r), (w_q, w_r), (j_q, j_r) = _pushed(e, n, 0, q, r), _pushed(e, n, 1, q, r), _pushed(e, n, 2, q, r)
     (tm_q, tm_r), (wm_q, wm_r) = _pushed(e, n, 3, q, r), _pushed(e, n, 4, q, r)
-    return State(
-        z.theta + t_q + t_r, z.w + w_q + w_r, z.j + j_q + j_r, z.theta_m + tm_q + tm_r, z.w_m + wm_q + wm_r
-    )
+    return State(z.theta + t_q + t_r, z.w + w_q + w_r, z.j + j_q + j_r, z.theta_m + tm_q + tm_r, z.w_m + wm_q + wm_r)
 
 
 @inline
@@ -207,7 +210,9 @@ def _parted_segment(e, n, c, t, x, m, drive, load, h):
 def _bristle_segment(e, n, c, t, x, m, drive, load, h):
     """The same on a bristle bent to the full that slips under laws."""
     begin = load + extra(c, load, t, x, m.s)
-    middle = load + extra(c, load, t + 0.5 * h, _mapped_two(e, n + MODES_APART, x, drive, m.side, _constant(begin)), m.s)
+    middle = load + extra(
+        c, load, t + 0.5 * h, _mapped_two(e, n + MODES_APART, x, drive, m.side, _constant(begin)), m.s
+    )
     z = _mapped_two(e, n, x, drive, m.side, _rising(begin, middle))
     end = load + extra(c, load, t + h, z, m.s)
     return _mapped_two(e, n, x, drive, m.side, _parabola(begin, middle, end))

@@ -1,5 +1,5 @@
-"""The compiled integrator of Eq. (1)/(5): through a recording sample by sample, smooth flow between events, every switch
-of a Sgn located exactly.
+"""The compiled integrator of Eq. (1)/(5): through a recording sample by sample, smooth flow between events, every
+switch of a Sgn located exactly.
 
 Where nothing happens, a precomputed map takes a whole segment of a sample (see maps); where its end says that something
 may have, the segment is gone through by events (see ``advance``).
@@ -16,7 +16,18 @@ from ers_mj.effects.base import LEAST_IRON
 from ers_mj.plants.checks import is_calm, is_clean, is_steady, is_still, turns
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import CUTS, corner_speed, cut, law_step, longest_step
-from ers_mj.plants.events import BREAKAWAY, CONTACT, CROSSING, ORDER, REVERSAL, STOP, breakaway, locate, switch, violation
+from ers_mj.plants.events import (
+    BREAKAWAY,
+    CONTACT,
+    CROSSING,
+    ORDER,
+    REVERSAL,
+    STOP,
+    breakaway,
+    locate,
+    switch,
+    violation,
+)
 from ers_mj.plants.flow import flow
 from ers_mj.plants.forces import derivative
 from ers_mj.plants.laws import remember
@@ -268,9 +279,7 @@ def _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, s
         if now.is_usual and now.closed and m.stop == 0:
             e, step = (maps.late, cuts.last) if cuts.fresh[i] == 1 else (maps.early, cuts.ends[0])
             is_last = i == cuts.ends.size - 1
-            done, x, extra, resting = _segment(
-                e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips
-            )
+            done, x, extra, resting = _segment(e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips)
             if done:
                 continue
         extra = np.nan
@@ -311,9 +320,7 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
             done, x = _leap(maps, c, now, cuts.h0, x, m)
             if done:
                 continue
-        x, m, extra, resting, events = _through_segments(
-            maps, c, now, cuts, x, m, h_max, corner, extra, resting, slips
-        )
+        x, m, extra, resting, events = _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, slips)
         budget -= events
         if not is_bounded(x) or budget < 0:
             out[k + 1 :, :] = np.nan

@@ -95,4 +95,3 @@ def _run(a_1, a_mech, a_emf, b, c_1, c_2, theta_0, tau, threshold, t, u, substep
             through = min(max(through, motor - threshold), motor + threshold)
             w = _speed(1.0 + h * (a_mech + h * a_1), w + h * (through - a_1 * phi), -phi / h, h * c_2, h * c_1)
             phi += h * w
-

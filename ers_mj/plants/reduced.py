@@ -236,7 +236,23 @@ class ReducedModel:
             du, here = (other._arriving(t, u) - arriving) * scale, followed if instant else y
             plants = laid_out(c, on, p), laid_out(c_2, on_2, p_2)
             tangent(
-                t, arriving, du, enable, load, here, dy, path, maps, slopes, gain, every, *plants, dc, differ, scale, change
+                t,
+                arriving,
+                du,
+                enable,
+                load,
+                here,
+                dy,
+                path,
+                maps,
+                slopes,
+                gain,
+                every,
+                *plants,
+                dc,
+                differ,
+                scale,
+                change,
             )
             change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
             out.append(change)

@@ -44,9 +44,7 @@ def hold(t, h0, before, now, plant, refine, x, m):
     remember(c, z.theta, z.w, z.j, z.theta_m, z.w_m, h0)
     for i in range(cuts.ends.size):
         drive = c.b * (now if cuts.fresh[i] == 1 else before)
-        z, mode, _ = advance(
-            c, t + start, z, mode, drive, c.tau_e, c.a_emf, cuts.ends[i] - start, h_max, corner
-        )
+        z, mode, _ = advance(c, t + start, z, mode, drive, c.tau_e, c.a_emf, cuts.ends[i] - start, h_max, corner)
         start = cuts.ends[i]
         if not is_bounded(z):
             z = State(np.nan, np.nan, np.nan, np.nan, np.nan)

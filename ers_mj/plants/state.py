@@ -125,7 +125,9 @@ def is_bounded(x):
 
 @inline
 def with_drive(c, x, drive, tau, a_emf):
-    """The state whose drive acceleration is at once what the drive makes of its speed, where no inductance delays it."""
+    """The state whose drive acceleration is at once what the drive makes of its speed, where no inductance delays
+    it.
+    """
     if tau > 0:
         return x
     return State(x.theta, x.w, drive - a_emf * drive_speed(c, x), x.theta_m, x.w_m)

@@ -65,9 +65,7 @@ def prepare(t, load, path, plant, maps, slopes):
         READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, F, I, VECTOR, VECTOR, VECTOR, L, F, TABLE
     )
 )
-def tangent(
-    t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, plant, plant_2, change, differ, scale, out
-):
+def tangent(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, plant, plant_2, change, differ, scale, out):
     """Fill out (N, >= 3) with the change of (theta, w, j) per unit of the change that made plant_2 of plant (see
     laws.laid_out), times ``scale``.
 

@@ -96,13 +96,7 @@ def _stepped(c, slopes, i, x, a, b, d, bent, pull, rate, emf, force, bends, lets
     drawn, back = _drawn(d, pull, rate, emf, part)
     spring, share = c.a_1 - slopes[i, 0], 1.0 + slopes[i, 2]
     b_m = (b / part + force - spring * a + share * drawn - k * bent_0 - damping * (bent_0 - bent) / part) / (
-        1.0 / part
-        + spring * part
-        + viscous
-        - slopes[i, 1]
-        - share * back
-        + k * per_speed
-        + damping * per_speed / part
+        1.0 / part + spring * part + viscous - slopes[i, 1] - share * back + k * per_speed + damping * per_speed / part
     )
     d = drawn + back * b_m if rate <= 0 else d + (drawn + back * b_m - d) / AHEAD
     return a + h * b_m, b + (b_m - b) / AHEAD, d, bent + (bent_0 + per_speed * b_m - bent) / AHEAD

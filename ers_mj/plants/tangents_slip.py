@@ -1,10 +1,10 @@
 """The change of a motion that sticks and slips. Where the mode changes inside a sample:
 
-    slip ends        the speed's change ends with it, the angle's stays
-    slip begins      the force balance is zero there: nothing jumps
-    w passes zero    b is stretched by the accelerations' ratio, after over before
-    theta_0 crossed  the preload's jump strikes earlier or later: b loses 2 c_1 (a - d theta_0) / |w|
-    caught at theta_0    the angle follows it, from when the preload can stop the rudder within a sample
+slip ends        the speed's change ends with it, the angle's stays
+slip begins      the force balance is zero there: nothing jumps
+w passes zero    b is stretched by the accelerations' ratio, after over before
+theta_0 crossed  the preload's jump strikes earlier or later: b loses 2 c_1 (a - d theta_0) / |w|
+caught at theta_0    the angle follows it, from when the preload can stop the rudder within a sample
 """
 
 from __future__ import annotations
@@ -194,9 +194,7 @@ class Known(NamedTuple):
     towards: int
 
 
-@unit(
-    types.void(READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, F, I, C, C, C, L, F, TABLE)
-)
+@unit(types.void(READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, F, I, C, C, C, L, F, TABLE))
 def along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, c_2, dc, differ, scale, out):
     """See tangents.tangent; ``dc`` is the change of c per unit."""
     h, n = t[1] - t[0], t.size

@@ -40,7 +40,7 @@ class Asker:
         with tempfile.TemporaryDirectory(prefix="ers-blind-") as folder:
             for path in case.iterdir():
                 shutil.copy(path, folder)
-            cost, text, complaint = self._run(Path(folder))
+            cost, text, complaint = self.run(Path(folder))
         if self.stopped:
             return None
         document, error = None, None
@@ -60,7 +60,8 @@ class Asker:
             )
         return {**bound, **cost, "error": error, "document": document}
 
-    def _run(self, folder: Path) -> tuple[dict, str, str]:
+    def run(self, folder: Path) -> tuple[dict, str, str]:
+        """(what it cost, what it printed, what it complained of) of a diagnosis in this folder."""
         recordings = sorted(
             (p.name for p in folder.iterdir() if p.name.startswith("rec")), key=lambda name: (len(name), name)
         )

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.proving.catalogue import LISTED, OUTSIDE
-from ers_mj.proving.laws import DEG, TABLE_1
-from ers_mj.proving.quick import Run
+from ers_mj.proving.plant import DEG, TABLE_1
 from ers_mj.proving.recorder import record
+from ers_mj.proving.sampling import Run, Setup
 from ers_mj.proving.servo import draw_servo
 from ers_mj.proving.sizing import ALIKE, TWO_MASS, Ruler, pooled, refit
 from ers_mj.proving.strength import clutter, conceal
@@ -66,9 +66,35 @@ def _several(rng: np.random.Generator) -> tuple[str, ...]:
             return tuple(sorted(names))
 
 
+@dataclass(frozen=True)
+class Made:
+    """A case as it was recorded: the drawn servo, its linkage, MuJoCo's step [s], what is concealed in it on purpose
+    and what is too faint to count, its recordings, and what the refitted effect-free model leaves of each [sigma].
+    """
+
+    servo: dict
+    linkage: str
+    step: float
+    concealed: list[dict]
+    faint: list[dict]
+    runs: list[Run]
+    left: list[float]
+
+
 def make(plan: Plan, seed: int) -> tuple[dict[str, str], dict]:
     """({file name: text} that is handed out, the truth) of one case; it does not depend on the others."""
     rng = np.random.default_rng([seed, 1, plan.index])
+    made = _made(plan, rng)
+    sensor = made.servo["sensor"]
+    files = {"datasheet.toml": _datasheet(sensor["sample_rate_hz"])}
+    files |= {
+        f"rec{k + 1}.csv": _csv(r, x, sensor, rng) for k, (r, x) in enumerate(zip(made.servo["records"], made.runs))
+    }
+    return files, _truth(plan, seed, made)
+
+
+def _made(plan: Plan, rng: np.random.Generator) -> Made:
+    """The servo drawn, the effects sized in it, the recordings made."""
     servo = draw_servo(rng, 0.0, RATES, WEIGHTS)
     linkage = "rod" if "variable_ratio" in plan.labels and rng.random() < ROD else "constant"
     ruler, context = Ruler(servo), servo["context"]
@@ -77,7 +103,18 @@ def make(plan: Plan, seed: int) -> tuple[dict[str, str], dict]:
     ]
     faint = clutter(rng, ruler, [*plan.labels, *(TWO_MASS if linkage == "rod" else ())], context)
     step = float(np.exp(rng.uniform(np.log(FINE_STEP), np.log(ROUGH_STEP))))
-    runs = [_recorded(servo, k, [*concealed, *faint], linkage, step) for k in range(len(servo["records"]))]
+    runs = [
+        record(
+            servo["params"],
+            [*concealed, *faint],
+            r["t"],
+            r["u"],
+            setup=Setup.of(servo, k),
+            step=step,
+            linkage=linkage,
+        )
+        for k, r in enumerate(servo["records"])
+    ]
     left = refit(servo, runs, 8)
     if linkage == "rod":
         concealed.append(
@@ -88,43 +125,12 @@ def make(plan: Plan, seed: int) -> tuple[dict[str, str], dict]:
                 "shape": {"form": "rod"},
             }
         )
-    files = {"datasheet.toml": _datasheet(servo["sensor"]["sample_rate_hz"])}
-    files |= {
-        f"rec{k + 1}.csv": _csv(r, x, servo["sensor"], rng) for k, (r, x) in enumerate(zip(servo["records"], runs))
-    }
-    return files, _truth(plan, seed, servo, linkage, step, concealed, faint, runs, left)
+    return Made(servo, linkage, step, concealed, faint, runs, left)
 
 
-def _recorded(servo: dict, number: int, effects: list[dict], linkage: str, step: float) -> Run:
-    r, sensor = servo["records"][number], servo["sensor"]
-    return record(
-        servo["params"],
-        effects,
-        r["t"],
-        r["u"],
-        number=number,
-        step=step,
-        linkage=linkage,
-        noise=r["noise"],
-        adc_step=sensor["adc_step_rad"],
-        controller=servo["controller"] if r["closed_loop"] else None,
-        theta_ref=r["ref"],
-        decimals=4,
-    )
-
-
-def _truth(
-    plan: Plan,
-    seed: int,
-    servo: dict,
-    linkage: str,
-    step: float,
-    concealed: list,
-    faint: list,
-    runs: list[Run],
-    left: list,
-) -> dict:
-    sensor, rest = servo["sensor"], servo["params"]["theta_0"]
+def _truth(plan: Plan, seed: int, made: Made) -> dict:
+    servo = made.servo
+    rest = servo["params"]["theta_0"]
     records = [
         {
             "kind": r["kind"],
@@ -132,21 +138,21 @@ def _truth(
             "duration_s": float(r["t"][-1]),
             "travel_deg": [float((x.true.min() - rest) / DEG), float((x.true.max() - rest) / DEG)],
         }
-        for r, x in zip(servo["records"], runs)
+        for r, x in zip(servo["records"], made.runs)
     ]
     return {
         "case": f"case-{plan.index + 1:03d}",
         "kind": plan.kind,
         "labels": list(plan.labels),
-        "effects": concealed,
-        "clutter": faint,
-        "linkage": linkage,
-        "visibility_after_refit_sigma": pooled(servo, left),
-        "visibility_per_record": left,
+        "effects": made.concealed,
+        "clutter": made.faint,
+        "linkage": made.linkage,
+        "visibility_after_refit_sigma": pooled(servo, made.left),
+        "visibility_per_record": made.left,
         "true_parameters": servo["params"],
         "lumped": lumped(servo["params"]),
-        "mujoco_step_s": step,
-        **sensor,
+        "mujoco_step_s": made.step,
+        **servo["sensor"],
         "controller": servo["controller"],
         "records": records,
         "seed": [seed, plan.index],

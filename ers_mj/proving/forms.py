@@ -9,7 +9,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ers_mj.proving.catalogue import CONTACT, DEAD, HYPERBOLIC, LIMIT, LOAD, RIGID, STRIBECK, Effect, between, choose
+from ers_mj.proving.concealed.base import CONTACT, RIGID, Effect, between, choose
+from ers_mj.proving.concealed.drive import DEAD, LIMIT
+from ers_mj.proving.concealed.friction import HYPERBOLIC, LOAD, STRIBECK
 
 TEXTBOOK: Mapping[str, Callable[[dict], bool]] = {
     "presliding": lambda s: s["delta"] == 1.0 and s["v_d_rad_s"] == 0.0,

@@ -1,7 +1,8 @@
 """The laws of the independent servo: Eq. (1) of the paper with everything that may be concealed in it, compiled.
- All on the rudder side of the gear, angles rad, torques N m, voltages V, currents A, times s. Two simulators read these
+
+All on the rudder side of the gear, angles rad, torques N m, voltages V, currents A, times s. Two simulators read these
 laws, the quick one (quick.py) and MuJoCo's (mechanism.py, recorder.py); neither shares a line with the package that is
-put to the test.
+put to the test. `p` is a record of plant.PLANT, `y` (STATES,) the state.
 """
 
 from __future__ import annotations
@@ -9,47 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-DEG = np.pi / 180.0
+from ers_mj.proving.plant import AGE, APP, APV, BRI, BUS, CUR, FAST, HYS, LAG, MXW, RUN, TEMP, TH, THM, WM, W
 
-TABLE_1 = {
-    "J": 0.0031,
-    "B": 0.0098,
-    "K_t": 0.0175,
-    "K_e": 0.0295,
-    "k_s": 0.0877,
-    "T_LH": 0.46,
-    "F_c": 0.34,
-    "R": 1.55,
-    "L": 0.0016,
-    "theta_0": 0.261799,
-    "n": 22.26,
-}
-"""Table 1 of the paper, SI."""
-
-FIELDS = """J B K_t K_e k_s T_LH F_c R L theta_0 n share_J share_B share_F
-    stri_f stri_v stri_form asym_c asym_v asym_dir load_mu load_form quad_c quad_p pos_a pos_k pos_ph pos_form
-    pre_s0 pre_s1 pre_vd pre_delta
-    two gap con_k con_c con_form ratio_s ratio_form ratio_a ratio_b rip_a rip_k rip_ph rip_h2 cog_a cog_k cog_ph cog_h2
-    sat_V sat_p lim_A lim_form dead_V dead_form delay_s th_R th_tau th_alpha th_beta th_fast sag_R sag_tau sag_V sag_form
-    bias grav grav_ph k3 k3_form stop_hi stop_lo stop_k stop_c stop_form
-    dist_T dist_t0 dist_d dist_form gust_T gust_w gust_ph gust_form
-    lag_s lag_form nl_a nl_P nl_ph nl_form q_step q_form adc_step
-    app_J app_k app_c bw_T bw_x bw_n age_a age_t0 age_D brush_V brush_i angdamp_a angdamp_P tacho_a tacho_ph
-    kt_sat mxw_k mxw_tau run_a run_D L_sat rod""".split()
-PLANT = np.dtype([(name, "f8") for name in FIELDS])
-"""Everything that the compiled code reads, one number a field; zero means absent."""
-
-CONTROLLER = ("KP", "KI", "KD", "TF", "UMAX", "FF_ON", "FF_C", "FF_TLH", "FF_KS", "FF_TH0")
-"""PID on the measured angle [V/rad, V/(rad s), V s/rad, s, V], feed-forward of spring and preload [V/(N m), N m, N
-m/rad, rad].
-"""
-
-TH, W, CUR, THM, WM, BRI, HYS, APP, APV, TEMP, FAST, BUS, LAG, MXW, AGE, RUN = range(16)
-STATES = 16
-
-
-# ---- drive
-# ------------------------------------------------------------------------------------------------------------
+# -- drive -----------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -145,8 +108,7 @@ def current_rate(p, y, u, gain):
     return rate
 
 
-# ---- friction
-# ---------------------------------------------------------------------------------------------------------
+# -- friction --------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -210,8 +172,7 @@ def viscous(p, y, w):
     return b * w
 
 
-# ---- load
-# -------------------------------------------------------------------------------------------------------------
+# -- load ------------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -355,8 +316,7 @@ def inertia(p, x):
     return j + p.J * p.share_J * (r * r - 1.0), 2.0 * p.J * p.share_J * r * slope
 
 
-# ---- the differential inclusion
-# ---------------------------------------------------------------------------------------
+# -- the differential inclusion --------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -387,88 +347,3 @@ def slow_rates(p, y, u, gain, dy):
     dy[MXW] = (y[TH] - p.theta_0 - y[MXW]) / p.mxw_tau if p.mxw_k > 0.0 else 0.0
     dy[AGE] = 1.0 - abs(w) * y[AGE] / p.age_D if p.age_a > 0.0 else 0.0
     dy[RUN] = abs(w)
-
-
-# ---- sensor and controller
-# --------------------------------------------------------------------------------------------
-
-
-@njit(cache=True)
-def bend(p, x):
-    """[rad] error of the sensor at x = theta - theta_0: 1 square, 2 sine, 3 loaded potentiometer."""
-    s = x / p.nl_P
-    if p.nl_form == 1.0:
-        return p.nl_a * s * s
-    if p.nl_form == 2.0:
-        return p.nl_a * (np.sin(2.0 * np.pi * s + p.nl_ph) - np.sin(p.nl_ph))
-    if p.nl_form == 3.0:
-        return p.nl_a * 2.6 * s * (1.0 - s * s) / (1.0 + 0.5 * s * s)
-    return 0.0
-
-
-@njit(cache=True)
-def quantise(p, x):
-    """[rad] 0 to the nearest step, 1 downwards, 2 to the middle of a step."""
-    if p.q_step <= 0.0:
-        return x
-    if p.q_form == 1.0:
-        return np.floor(x / p.q_step) * p.q_step
-    if p.q_form == 2.0:
-        return (np.floor(x / p.q_step) + 0.5) * p.q_step
-    return np.round(x / p.q_step) * p.q_step
-
-
-@njit(cache=True)
-def sensed(p, y, ring, step, late):
-    """[rad] angle behind lag and bend: lag_form 1 first order, 2 pure delay, 3 mean over a window."""
-    angle = y[TH]
-    if p.lag_form == 1.0:
-        angle = y[LAG]
-    elif p.lag_form == 2.0:
-        angle = ring[(step - late) % ring.size]
-    elif p.lag_form == 3.0:
-        angle = ring.mean()
-    return angle + bend(p, angle - p.theta_0)
-
-
-@njit(cache=True)
-def pid(c, memory, target, angle, dt):
-    """[V] PID with filtered derivative, held integral at the limit, optional feed-forward; memory = (integral, slope,
-    last).
-    """
-    error = target - angle
-    memory[1] = (c[3] * memory[1] + c[2] * (error - memory[2])) / (c[3] + dt)
-    memory[2] = error
-    x = target - c[9]
-    u = c[0] * error + memory[0] + memory[1] + c[5] * c[6] * (c[8] * x + c[7] * np.tanh(x / 0.01))
-    if abs(u) < c[4] or u * error < 0.0:
-        memory[0] += c[1] * dt * error
-    return min(max(u, -c[4]), c[4])
-
-
-def plant_of(params):
-    """The compiled code's record for Eq. (1) with `params` (Table 1's letters, SI) and no effect."""
-    plant = np.zeros(1, PLANT)
-    for name, value in {**TABLE_1, **params}.items():
-        field = {"motor_inertia_share": "share_J", "motor_damping_share": "share_B"}.get(name, name)
-        plant[field] = value
-    for name in ("share_J", "share_B"):
-        if plant[name][0] == 0.0:
-            plant[name] = 0.5
-    for name in (
-        "stri_v",
-        "bw_x",
-        "brush_i",
-        "age_t0",
-        "age_D",
-        "run_D",
-        "angdamp_P",
-        "mxw_tau",
-        "nl_P",
-        "quad_p",
-        "pre_delta",
-    ):
-        plant[name] = 1.0
-    plant["stop_hi"], plant["stop_lo"] = 1e9, -1e9
-    plant["sag_V"] = 24.0
-    return plant

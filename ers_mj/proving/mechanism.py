@@ -1,5 +1,6 @@
 """The rudder system of mjcf/ as the generator uses it: bodies, linkage, spring, dry friction and play are MuJoCo's.
- What MuJoCo has no element for is left to `recorder.py`, which sets two torques (on the rotor, on the rudder) and the
+
+What MuJoCo has no element for is left to `recorder.py`, which sets two torques (on the rotor, on the rudder) and the
 levels of dry friction at every step. All numbers come from a record of `laws.PLANT`.
 """
 
@@ -12,7 +13,7 @@ import mujoco
 import numpy as np
 
 from ers_mj.plants.mjcf import read_mjcf
-from ers_mj.proving.laws import TABLE_1
+from ers_mj.proving.plant import TABLE_1
 
 LINKAGES = ("constant", "rod")
 ARM, ROD = 0.01417, 0.042  # [m] rocker arm and rod between its pins, as mjcf/ has them
@@ -59,7 +60,7 @@ def mechanism(plant: np.ndarray, linkage: str, h: float) -> Mechanism:
     laws["k_s"] = 0.0
     laws["rod"] = float(linkage == "rod")
     model = spec.compile()
-    joint = lambda name: int(model.jnt_qposadr[model.joint(name).id])  # noqa: E731
+    joint = lambda name: int(model.jnt_qposadr[model.joint(name).id])
     places = [
         joint("rocker"),
         joint("gap") if two else -1,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from ers_mj.proving.laws import DEG, TABLE_1
+from ers_mj.proving.plant import DEG, TABLE_1
 
 BASELINE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 

@@ -5,7 +5,8 @@ It shares no line and no method with the package. Eq. (1) of the paper, all on t
 
     L i' = v(u) - R i - K_e n w
     J w' = n K_t i - B w - F_c Sgn(w) - k_s (theta - theta_0) - T_LH Sgn(theta - theta_0) + effects
- is stepped with Heun's rule at 5-10 us; Sgn is set-valued. Within a step the instants at which w or theta - theta_0
+
+is stepped with Heun's rule at 5-10 us; Sgn is set-valued. Within a step the instants at which w or theta - theta_0
 pass zero are located and the step is cut there; at rest the inclusion is solved in closed form (the servo stays where
 the torque lies inside the stick band, whose width is F_c + T_LH on theta = theta_0 and F_c elsewhere), so nothing
 creeps. Backlash and shaft compliance split J, B and F_c into a motor side and a rudder side joined by a spring with an
@@ -16,53 +17,18 @@ Angles rad, torques N m, voltages V, currents A, times s. What each effect means
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
-from ers_mj.proving.catalogue import put_effects, samples_of
-from ers_mj.proving.laws import (
-    APP,
-    BRI,
-    BUS,
-    CONTROLLER,
-    CUR,
-    LAG,
-    STATES,
-    TH,
-    THM,
-    WM,
-    W,
-    bristle_rate,
-    current_rate,
-    dry,
-    free_torques,
-    friction_level,
-    inertia,
-    pid,
-    plant_of,
-    quantise,
-    sensed,
-    slow_rates,
-)
+from ers_mj.proving.catalogue import put_effects
+from ers_mj.proving.laws import bristle_rate, current_rate, dry, free_torques, friction_level, inertia, slow_rates
+from ers_mj.proving.plant import APP, BRI, BUS, CUR, LAG, STATES, TH, THM, WM, W, plant_of
+from ers_mj.proving.sampling import ALONE, Run, Setup, take
 
 STAND_S = 0.25
 """[s] how long the servo stands with u = 0 before t = 0."""
 COARSE, FINE, ROUGH = 4e-5, 1e-5, 1e-4
 """[s] steps for sizing, for the recordings, and for what holds no stiff joint (error 2e-5, 1e-6, 1e-4 deg)."""
-
-
-class Run(NamedTuple):
-    """One simulated recording, (samples,) each; `theta` [rad] is measured, `clean` lacks noise and ordinary
-    converter.
-    """
-
-    theta: np.ndarray
-    clean: np.ndarray
-    true: np.ndarray
-    u: np.ndarray
-    i_A: np.ndarray
 
 
 @njit(cache=True)
@@ -172,31 +138,11 @@ def settle(p, y, t):
         y[TH], y[W] = p.theta_0, 0.0
 
 
-# ---- sampling
-# ---------------------------------------------------------------------------------------------------------
-
-
 @njit(cache=True)
-def take(p, y, k, out, ring, step, late, noise, stuck, spike, c, memory, target, u_in, closed, dt, printed):
-    """Write sample k into out (5, samples): measured, clean, true angle, the u [V] from now on, current."""
-    clean = sensed(p, y, ring, step, late)
-    held = out[0, k - 1] if k > 0 else clean
-    held_clean = out[1, k - 1] if k > 0 else clean
-    out[1, k] = held_clean if stuck[k] else quantise(p, clean + spike[k])
-    raw = quantise(p, clean + spike[k] + noise[k])
-    raw = np.round(raw / p.adc_step) * p.adc_step if p.adc_step > 0.0 else raw
-    out[0, k], out[2, k], out[4, k] = (held if stuck[k] else raw), y[TH], y[CUR]
-    if k == 0:
-        memory[2] = target[0] - out[0, 0]
-    u = pid(c, memory, target[k], out[0, k], dt) if closed else u_in[k]
-    out[3, k] = np.round(u * printed) / printed + 0.0 if printed > 0.0 else u
-
-
-@njit(cache=True)
-def march(plant, u_in, target, c, closed, dt, substeps, noise, stuck, spike, gain, stand, printed):
+def march(plant, given, substeps, stand):
     """(5, samples): measured, clean, true angle, u and current at the sample times."""
     p = plant[0]
-    h, samples = dt / substeps, u_in.size
+    h, samples = given.dt / substeps, given.u.size
     out, y, work, memory = np.zeros((5, samples)), np.zeros(STATES), np.zeros((4, STATES)), np.zeros(3)
     y[TH] = y[THM] = y[LAG] = y[APP] = p.theta_0
     y[BUS] = p.sag_V
@@ -205,92 +151,37 @@ def march(plant, u_in, target, c, closed, dt, substeps, noise, stuck, spike, gai
     ring = np.full(window, p.theta_0)
     before = int(round(stand / h))
     step = -before
-    for s in range(before):
+    for _ in range(before):
         advance(p, y, step * h, 0.0, 1.0, h, work)
         step += 1
         ring[step % window] = y[TH]
     for k in range(samples):
-        take(p, y, k, out, ring, step, late, noise, stuck, spike, c, memory, target, u_in, closed, dt, printed)
-        for s in range(substeps):
+        take(p, y, k, out, ring, step, late, given, memory)
+        for _ in range(substeps):
             told = (step - delay) // substeps
-            advance(p, y, step * h, out[3, told] if told >= 0 else 0.0, gain[k], h, work)
+            advance(p, y, step * h, out[3, told] if told >= 0 else 0.0, given.gain[k], h, work)
             step += 1
             ring[step % window] = y[TH]
     return out
 
 
-# ---- the way in
-# -------------------------------------------------------------------------------------------------------
+# -- the way in ------------------------------------------------------------------------------------------------------
 
 
-def simulate(
-    params,
-    effects,
-    t,
-    u,
-    *,
-    record=0,
-    step=1e-5,
-    noise=None,
-    adc_step=0.0,
-    controller=None,
-    theta_ref=None,
-    stand=STAND_S,
-    decimals=None,
-):
-    """A `Run` at the times t [s] (uniform) under u [V] held between samples, or under `controller` (a mapping with the
-    keys CONTROLLER) following `theta_ref` [rad]. `effects`: mappings with label, strength, shape as the truth files
-    have them; `noise` [rad], (samples,), is added to the angle; `decimals` rounds the applied voltage; `step` [s] is
-    the longest step.
+def simulate(params, effects, t, u, *, setup=ALONE, step=1e-5, stand=STAND_S):
+    """A `Run` at the times t [s] (uniform) under u [V] held between samples, or under the controller of ``setup``.
+
+    ``effects``: mappings with label, strength, shape as the truth files have them; ``step`` [s] is the longest step.
     """
     t, samples = np.asarray(t, float), len(t)
     dt = (t[-1] - t[0]) / (samples - 1)
     plant = plant_of(params)
-    plant["adc_step"] = adc_step
-    put_effects(plant, effects, record)
-    stuck, spike, gain = samples_of(effects, record, samples, dt)
-    closed = controller is not None
-    c = np.array([controller[name] for name in CONTROLLER]) if closed else np.zeros(len(CONTROLLER))
-    target = np.asarray(theta_ref, float) if closed else np.zeros(samples)
-    u_in = np.zeros(samples) if closed else np.asarray(u, float)
-    noise = np.zeros(samples) if noise is None else np.asarray(noise, float)
-    out = march(
-        plant,
-        u_in,
-        target,
-        c,
-        closed,
-        dt,
-        max(1, int(np.ceil(dt / step - 1e-9))),
-        noise,
-        stuck,
-        spike,
-        gain,
-        stand,
-        0.0 if decimals is None else 10.0**decimals,
-    )
-    return Run(*out)
-
-
-def own_error(params, t, u, step=1e-5):
-    """[rad] largest change of the effect-free angle when the step is halved: how far this simulator can be trusted."""
-    return float(
-        np.abs(simulate(params, [], t, u, step=step).true - simulate(params, [], t, u, step=0.5 * step).true).max()
-    )
+    plant["adc_step"] = setup.adc_step
+    put_effects(plant, effects, setup.number)
+    given = setup.given(effects, u, samples, dt)
+    return Run(*march(plant, given, max(1, int(np.ceil(dt / step - 1e-9))), stand))
 
 
 def run(servo, record, number, effects, step):
-    """The recording with the effects: closed loops close around the noisy measured angle."""
-    return simulate(
-        servo["params"],
-        effects,
-        record["t"],
-        record["u"],
-        record=number,
-        step=step,
-        noise=record["noise"],
-        adc_step=servo["sensor"]["adc_step_rad"],
-        controller=servo["controller"] if record["closed_loop"] else None,
-        theta_ref=record["ref"],
-        decimals=4,
-    )
+    """The recording with the effects, as the servo's sensor and controller make it."""
+    return simulate(servo["params"], effects, record["t"], record["u"], setup=Setup.of(servo, number), step=step)

@@ -1,6 +1,7 @@
 """Conceals effects in real recordings: EMPS, a throttle valve, a Feetech servo (their README says where they come
 from).
- What is done to the untouched records of a rig, by a sealed seed: the command acts later than it says (input_delay),
+
+What is done to the untouched records of a rig, by a sealed seed: the command acts later than it says (input_delay),
 the reading lags (sensor_lag), is rounded down (sensor_quantisation) or held for a while (sensor_dropout), or a constant
 part of the command goes unrecorded, which is a constant torque (bias_torque). Each rig is also diagnosed as it is: what
 is named there is its own.
@@ -17,7 +18,7 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from ers_mj.errors import InputError
-from ers_mj.proving.catalogue import between, spells
+from ers_mj.proving.concealed.base import between, spells
 from ers_mj.proving.scoring import class_of, scored
 
 RIGS = {"emps": ("u_V", "x_m"), "throttle": ("u_duty_pct", "y_sensor_V"), "sts3215": ("u_V", "theta_rad")}
@@ -112,23 +113,22 @@ def _records(folder: Path, rig: str, rng: np.random.Generator) -> list[dict[str,
     """Columns by name of every record of a rig; of the many of the servo, those of one trajectory and load, the same in
     every case.
     """
-    u, y = RIGS[rig]
-    wanted = ("t_s", u, y, *ALSO)
-    if rig != "sts3215":
-        tables = [pyarrow.csv.read_csv(folder / rig / name) for name in FILES[rig]]
-        return [{c: np.asarray(table[c], float) for c in wanted if c in table.column_names} for table in tables]
-    index = pyarrow.csv.read_csv(folder / rig / "runs_index.csv").to_pydict()
+    wanted = ("t_s", *RIGS[rig], *ALSO)
+    if rig == "sts3215":
+        return _runs(folder / rig, [c for c in wanted if c != "pulse_V"], rng)
+    tables = [pyarrow.csv.read_csv(folder / rig / name) for name in FILES[rig]]
+    return [{c: np.asarray(table[c], float) for c in wanted if c in table.column_names} for table in tables]
+
+
+def _runs(folder: Path, columns: Sequence[str], rng: np.random.Generator) -> list[dict[str, np.ndarray]]:
+    """Three runs at most of one setup, drawn from those without brutal hits and drops."""
+    index = pyarrow.csv.read_csv(folder / "runs_index.csv").to_pydict()
     rows = [k for k, trajectory in enumerate(index["trajectory"]) if trajectory not in ("brutal", "lift_and_drop")]
-    setups = sorted({tuple(index[c][k] for c in ("trajectory", "kp", "mass_kg", "length_m")) for k in rows})
+    setup_of = {k: tuple(index[c][k] for c in ("trajectory", "kp", "mass_kg", "length_m")) for k in rows}
+    setups = sorted(set(setup_of.values()))
     setup = setups[int(rng.integers(len(setups)))]
-    runs = [
-        index["run"][k]
-        for k in rows
-        if tuple(index[c][k] for c in ("trajectory", "kp", "mass_kg", "length_m")) == setup
-    ][:3]
-    table = pyarrow.parquet.read_table(
-        folder / rig / "runs.parquet", columns=["run", *(c for c in wanted if c != "pulse_V")]
-    )
+    runs = [index["run"][k] for k in rows if setup_of[k] == setup][:3]
+    table = pyarrow.parquet.read_table(folder / "runs.parquet", columns=["run", *columns])
     number = np.asarray(table["run"])
     return [{c: np.asarray(table[c], float)[number == run] for c in table.column_names if c != "run"} for run in runs]
 
@@ -213,35 +213,39 @@ def scored_real(rows: Sequence[dict]) -> dict:
     its own.
     """
     own = {r["rig"]: r for r in rows if r["kind"] == UNTOUCHED}
-    told = []
     singles = [r for r in rows if r["kind"] == "single"]
-    for r in singles:
-        alone = own.get(r["rig"], {"named": [], "floor": None})
-        its_own, named = {class_of(n) for n in alone["named"]}, {class_of(n) for n in r["named"]}
-        over = r["size"] / alone["floor"] if r["size"] and alone["floor"] else None
-        told.append(
-            {
-                "case": r["case"],
-                "rig": r["rig"],
-                "concealed": r["labels"][0],
-                "strength": r["strength"],
-                "size_over_floor": over,
-                "named": r["named"],
-                "found": class_of(r["labels"][0]) in named,
-                "was_its_own": class_of(r["labels"][0]) in its_own,
-                "own_kept": sum(c in named for c in its_own),
-                "own": len(its_own),
-                "others": sorted(n for n in r["named"] if class_of(n) not in its_own | {class_of(r["labels"][0])}),
-            }
-        )
+    told = [_beside_its_own(r, own.get(r["rig"], {"named": [], "floor": None})) for r in singles]
     fresh = [x for x in told if not x["was_its_own"]]
     return {
         **scored(singles),
         "cases": len(rows),
         "untouched": len(own),
-        "found": sum(x["found"] for x in told) / len(told) if told else None,
-        "found_new": sum(x["found"] for x in fresh) / len(fresh) if fresh else None,
+        "found": _share_found(told),
+        "found_new": _share_found(fresh),
         "found_new_of": len(fresh),
         "own": {rig: r["named"] for rig, r in own.items()},
         "concealed_in_real": told,
     }
+
+
+def _beside_its_own(row: Mapping, alone: Mapping) -> dict:
+    """What is told of one effect in a rig, beside the answer to the rig ``alone``."""
+    its_own, named = {class_of(n) for n in alone["named"]}, {class_of(n) for n in row["named"]}
+    wanted = class_of(row["labels"][0])
+    return {
+        "case": row["case"],
+        "rig": row["rig"],
+        "concealed": row["labels"][0],
+        "strength": row["strength"],
+        "size_over_floor": row["size"] / alone["floor"] if row["size"] and alone["floor"] else None,
+        "named": row["named"],
+        "found": wanted in named,
+        "was_its_own": wanted in its_own,
+        "own_kept": sum(c in named for c in its_own),
+        "own": len(its_own),
+        "others": sorted(n for n in row["named"] if class_of(n) not in its_own | {wanted}),
+    }
+
+
+def _share_found(told: Sequence[Mapping]) -> float | None:
+    return sum(x["found"] for x in told) / len(told) if told else None

@@ -5,6 +5,7 @@ An answer that failed or ran out of time counts as wrong, and as neither a flag 
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -115,19 +116,12 @@ def right(row: Mapping, same: Callable[[str], object] = class_of) -> bool:
 def scored(rows: Sequence[Mapping]) -> dict:
     """All that the contract asks for, and the counts behind every share."""
     by = {kind: [r for r in rows if r["kind"] == kind] for kind in ("null", "single", SEVERAL, OUTSIDE)}
-    singles, visible = by["single"], [r for r in by["single"] if r["visibility"] >= VISIBLE]
-    concealed, found, spurious = _several(by[SEVERAL])
-    seen = [hit for r in by[SEVERAL] for sigma, hit in _hits(r) if sigma >= VISIBLE]
+    nulls, singles = by["null"], by["single"]
     counted = {
-        "top1": (sum(right(r, str) for r in singles), len(singles)),
-        "top1_class": (sum(map(right, singles)), len(singles)),
-        "top1_class_visible": (sum(map(right, visible)), len(visible)),
-        "false_alarm_rate": (sum(bool(r["named"]) for r in by["null"]), len(by["null"])),
-        "pair_recall": (found, concealed),
-        "pair_recall_visible": (sum(seen), len(seen)),
-        "pair_spurious": (spurious, concealed),
-        "unexplained_recall": (sum(r["significant"] for r in by[OUTSIDE]), len(by[OUTSIDE])),
-        "false_flag_rate": (sum(r["significant"] for r in rows if r["kind"] != OUTSIDE), len(rows) - len(by[OUTSIDE])),
+        **_named(singles),
+        "false_alarm_rate": (sum(bool(r["named"]) for r in nulls), len(nulls)),
+        **_found(by[SEVERAL]),
+        **_flagged(rows, by[OUTSIDE]),
         "subsystem_recall": (sum(r["where"] == [subsystem_of(r["labels"][0])] for r in singles), len(singles)),
     }
     return {
@@ -142,9 +136,46 @@ def scored(rows: Sequence[Mapping]) -> dict:
         "error_over_floor": _over_floor(rows),
         "parameters": _parameters(rows),
         "failures": [f"{r['case']}: {r['error']}" for r in rows if r["error"]],
+        **_costs(rows, by[SEVERAL]),
+    }
+
+
+Counted = dict[str, tuple[int, int]]
+"""Share by name: how many, of how many."""
+
+
+def _named(singles: Sequence[Mapping]) -> Counted:
+    visible = [r for r in singles if r["visibility"] >= VISIBLE]
+    return {
+        "top1": (sum(right(r, str) for r in singles), len(singles)),
+        "top1_class": (sum(map(right, singles)), len(singles)),
+        "top1_class_visible": (sum(map(right, visible)), len(visible)),
+    }
+
+
+def _found(several: Sequence[Mapping]) -> Counted:
+    concealed, found, spurious = _several(several)
+    seen = [hit for r in several for sigma, hit in _hits(r) if sigma >= VISIBLE]
+    return {
+        "pair_recall": (found, concealed),
+        "pair_recall_visible": (sum(seen), len(seen)),
+        "pair_spurious": (spurious, concealed),
+    }
+
+
+def _flagged(rows: Sequence[Mapping], outside: Sequence[Mapping]) -> Counted:
+    """What is flagged as unexplained, rightly and wrongly."""
+    return {
+        "unexplained_recall": (sum(r["significant"] for r in outside), len(outside)),
+        "false_flag_rate": (sum(r["significant"] for r in rows if r["kind"] != OUTSIDE), len(rows) - len(outside)),
+    }
+
+
+def _costs(rows: Sequence[Mapping], several: Sequence[Mapping]) -> dict:
+    return {
         "cpu_s": _spread([r["cpu_s"] for r in rows]),
         "wall_s": _spread([r["wall_s"] for r in rows]),
-        "cpu_s_of_a_pair": _spread([r["cpu_s"] for r in by[SEVERAL] if len(r["labels"]) == 2]),
+        "cpu_s_of_a_pair": _spread([r["cpu_s"] for r in several if len(r["labels"]) == 2]),
         "peak_MiB": max((r["peak_MiB"] for r in rows if r["peak_MiB"] is not None), default=None),
     }
 
@@ -190,7 +221,7 @@ def wilson(k: int, n: int) -> tuple[float, float]:
 def accuracy(singles: Sequence[Mapping]) -> list[dict]:
     """Right by class against visibility, in bins, with Wilson's intervals."""
     out = []
-    for low, high in zip(EDGES, EDGES[1:]):
+    for low, high in itertools.pairwise(EDGES):
         inside = [r for r in singles if low <= r["visibility"] < high]
         k = sum(map(right, inside))
         out += (
@@ -213,7 +244,7 @@ def reliability(rows: Iterable[Mapping]) -> list[dict]:
     """How often what was said with a probability was so: bins of mean probability and share that was right."""
     said = [(p, class_of(name) in {class_of(label) for label in r["labels"]}) for r in rows for name, p in r["beliefs"]]
     out = []
-    for low, high in zip(SURE, SURE[1:]):
+    for low, high in itertools.pairwise(SURE):
         inside = [(p, so) for p, so in said if low <= p < high or (high == 1.0 and p == 1.0)]
         if inside:
             k = sum(so for _, so in inside)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ers_mj.proving.laws import CONTROLLER, DEG, TABLE_1
+from ers_mj.proving.plant import CONTROLLER, DEG, TABLE_1
 from ers_mj.proving.quick import COARSE, ROUGH, run, simulate
+from ers_mj.proving.sampling import Setup
 from ers_mj.proving.waves import WAVES
 
 RATES, WEIGHTS = (500, 1000, 2000), (0.15, 0.7, 0.15)
@@ -95,7 +96,10 @@ def closed_size(params, t, wave, controller, wanted):
     size = 0.5 * wanted
     while size < 25.0 * DEG:
         ref = TABLE_1["theta_0"] + size * wave
-        if np.ptp(simulate(params, [], t, None, controller=controller, theta_ref=ref, step=ROUGH).true) > 0.5 * wanted:
+        if (
+            np.ptp(simulate(params, [], t, None, setup=Setup(controller=controller, theta_ref=ref), step=ROUGH).true)
+            > 0.5 * wanted
+        ):
             break
         size *= 1.4
     return size

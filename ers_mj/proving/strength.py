@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ers_mj.proving.catalogue import CATALOGUE, Effect
+from ers_mj.proving.catalogue import CATALOGUE
+from ers_mj.proving.concealed.base import Effect
 from ers_mj.proving.forms import draw_shape
 from ers_mj.proving.sizing import Ruler
 
@@ -34,7 +35,7 @@ def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) ->
     target = float(np.exp(rng.uniform(np.log(LEAST), np.log(MOST))))
     shape = draw_shape(rng, effect, context)
     low, high = np.log(_lowest(effect, ruler)), np.log(effect.high)
-    as_list = lambda s: [{"label": name, "strength": float(np.exp(s)), "shape": shape}]  # noqa: E731
+    as_list = lambda s: [{"label": name, "strength": float(np.exp(s)), "shape": shape}]
     guess, _ = nearest(lambda s: ruler.projected(as_list(s)), target, 0.5 * (low + high), low, high, TRIES)
     found, left = nearest(lambda s: ruler.refitted(as_list(s)), target, guess, low, high, 3)
     return as_list(found)[0] | {
@@ -83,9 +84,9 @@ def clutter(rng: np.random.Generator, ruler: Ruler, taken: list[str], context: d
         effect = CATALOGUE[str(name)]
         target = float(np.exp(rng.uniform(np.log(FAINTEST), np.log(FAINT))))
         shape = draw_shape(rng, effect, context)
-        as_list = lambda s: [{"label": effect.name, "strength": float(np.exp(s)), "shape": shape}]  # noqa: B023, E731
+        as_list = lambda s: [{"label": effect.name, "strength": float(np.exp(s)), "shape": shape}]  # noqa: B023
         low = np.log(effect.low)
-        found, size = nearest(lambda s: ruler.projected(as_list(s)), target, low, low - 6.0, low + 2.0, 4)
+        found, size = nearest(lambda s: ruler.projected(as_list(s)), target, low, low - 6.0, low + 2.0, 4)  # noqa: B023
         if size < BARELY:
             out.append(as_list(found)[0] | {"strength_name": effect.strength_name, "quick_visibility_sigma": size})
     return out

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 NONE = "—"
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 DEGREES = 180 / math.pi
-FEW_MILLIMETRES = 0.1  # [m] below which lengths are told in mm
 
 
 @dataclass(frozen=True)
@@ -54,10 +53,16 @@ def pretty(unit: str | None) -> str:
     return "" if text == "-" else text.replace("degC", "°C")
 
 
+def noun(output_unit: str) -> str:
+    """What an output of this unit is called."""
+    return {"rad": "angle", "m": "position"}.get(output_unit, "output")
+
+
 def shown(unit: str | None, size: float | None = None) -> Unit:
     """How values of `unit` are shown; `size` [unit] says whether lengths are small."""
+    few_millimetres = 0.1  # [m]
     known = {"rad": Unit("°", DEGREES), "rad/s": Unit("°/s", DEGREES), "pct": Unit("%")}
-    if unit in ("m", "m/s") and size is not None and abs(size) < FEW_MILLIMETRES:
+    if unit in ("m", "m/s") and size is not None and abs(size) < few_millimetres:
         return Unit(unit.replace("m", "mm", 1), 1e3)
     return known.get(unit or "", Unit(pretty(unit)))
 
@@ -71,5 +76,5 @@ def interval(ci: object, unit: Unit, digits: int = 3) -> str:
     """ "0.2 .. 0.4", a dash where there is no interval, an open end where only one is known."""
     if not isinstance(ci, list | tuple) or len(ci) != 2 or all(missing(x) for x in ci):
         return NONE
-    low, high = ci
-    return f"{'…' if missing(low) else unit.bare(low, digits)} … {'' if missing(high) else unit.bare(high, digits)}".strip()
+    low, high = ("" if missing(x) else unit.bare(x, digits) for x in ci)
+    return f"{low or '…'} … {high}".strip()

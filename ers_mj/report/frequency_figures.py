@@ -9,27 +9,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
 from ers_mj.control.frequency.loop import Loop
 from ers_mj.control.frequency.study import Compared, Cycles, PlantView
 from ers_mj.data.frequency_response import SURE
-from ers_mj.report.diagnosis_figures import (
-    AFTER,
-    BEFORE,
-    DISTORTION,
-    FAINT,
-    GRID,
-    INK,
-    MEASURED,
-    SHADE,
-    WIDE,
-    both_widths,
-)
+from ers_mj.report.drawing import both_widths
+from ers_mj.report.style import STYLE
 from ers_mj.report.trial_figures import colour
 
 DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)))  # of the plants, in their order
-MODELS = (BEFORE, AFTER, "#8a6bb8", "#1d4f91")
-NYQUIST, NICHOLS_DEG, NICHOLS_DB = 2.2, (-300.0, 0.0), (-30.0, 40.0)  # what is shown of the plane
+MODELS = (STYLE.before, STYLE.after, "#8a6bb8", "#1d4f91")
 CLOSED_DB = (6.0, 3.0, 1.0)  # contours of |T| in Nichols' plane
 
 
@@ -62,15 +52,15 @@ def _label(loop: Loop, loops: Sequence[Loop]) -> str:
 
 
 def _bode(width: float, lines, what: str, level: float | None) -> Figure:
-    wide = width == WIDE
+    wide = width == STYLE.wide
     figure = Figure(figsize=(width, 5.2), layout="constrained")
     size, phase = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1))
     for f_hz, values, shade, dash, label in lines:
         size.semilogx(f_hz, decibels(values), color=shade, linestyle=dash, label=label)
         phase.semilogx(f_hz, np.degrees(np.unwrap(np.angle(values))), color=shade, linestyle=dash)
     if level is not None:
-        size.axhline(level, color=FAINT, linewidth=0.8)
-        phase.axhline(-180, color=FAINT, linewidth=0.8)
+        size.axhline(level, color=STYLE.faint, linewidth=0.8)
+        phase.axhline(-180, color=STYLE.faint, linewidth=0.8)
     size.set_ylabel(f"{what} [dB{' rad/V' if level is None else ''}]")
     phase.set_ylabel("phase [°]")
     phase.set_xlabel("frequency [Hz]")
@@ -80,9 +70,8 @@ def _bode(width: float, lines, what: str, level: float | None) -> Figure:
     return figure
 
 
-def _turns():
-    from matplotlib.ticker import MultipleLocator
-
+def _turns() -> MultipleLocator:
+    """Ticks of a phase: quarter turns."""
     return MultipleLocator(90)
 
 
@@ -103,36 +92,37 @@ def planes(loops: Sequence[Loop]) -> str:
 
 
 def _planes(loops: Sequence[Loop], width: float) -> Figure:
-    wide = width == WIDE
+    wide = width == STYLE.wide
     figure = Figure(figsize=(width, 4.6 if wide else 8.6), layout="constrained")
     nyquist, nichols = figure.subplots(1, 2) if wide else figure.subplots(2, 1)
     turn = np.linspace(0, 2 * np.pi, 181)
-    nyquist.plot(np.cos(turn), np.sin(turn), color=GRID, linewidth=1.0)
+    nyquist.plot(np.cos(turn), np.sin(turn), color=STYLE.grid, linewidth=1.0)
     weakest = min(loops, key=lambda x: x.disk_margin).disk_margin
     middle, radius = _disk(weakest)
     if radius is not None:
         nyquist.fill(
             middle + radius * np.cos(turn),
             radius * np.sin(turn),
-            color=SHADE,
+            color=STYLE.shade,
             alpha=0.35,
             linewidth=0,
             label="least disk margin",
         )
     for ax in (nyquist, nichols):
-        ax.plot([-1 if ax is nyquist else -180], [0], "+", color=INK, markersize=9)
+        ax.plot([-1 if ax is nyquist else -180], [0], "+", color=STYLE.ink, markersize=9)
     for x in loops:
         nyquist.plot(x.L.real, x.L.imag, color=_shade(x), linestyle=_dash(x, loops), label=_label(x, loops))
         nichols.plot(_phase(x.L), decibels(x.L), color=_shade(x), linestyle=_dash(x, loops))
     for level in CLOSED_DB:
         _contour(nichols, level)
-    nyquist.set_xlim(-NYQUIST, 0.6 * NYQUIST)
-    nyquist.set_ylim(-0.8 * NYQUIST, 0.8 * NYQUIST)
+    reach = 2.2  # of Nyquist's plane, to the left
+    nyquist.set_xlim(-reach, 0.6 * reach)
+    nyquist.set_ylim(-0.8 * reach, 0.8 * reach)
     nyquist.set_aspect("equal")
     nyquist.set_xlabel("real part")
     nyquist.set_ylabel("imaginary part")
-    nichols.set_xlim(*NICHOLS_DEG)
-    nichols.set_ylim(*NICHOLS_DB)
+    nichols.set_xlim(-300.0, 0.0)
+    nichols.set_ylim(-30.0, 40.0)
     nichols.xaxis.set_major_locator(_turns())
     nichols.set_xlabel("phase [°]")
     nichols.set_ylabel("open loop [dB]")
@@ -161,9 +151,11 @@ def _contour(ax, level: float) -> None:
     T = 10.0 ** (level / 20.0) * np.exp(1j * np.linspace(1e-3, 2 * np.pi - 1e-3, 361))
     L = T / (1.0 - T)
     phase = np.degrees(np.angle(L)) % 360.0 - 360.0
-    ax.plot(phase, decibels(L), color=FAINT, linewidth=0.7, linestyle=(0, (2, 2)))
+    ax.plot(phase, decibels(L), color=STYLE.faint, linewidth=0.7, linestyle=(0, (2, 2)))
     top = int(np.argmax(decibels(L)))
-    ax.annotate(f"{level:g} dB", (phase[top], decibels(L)[top]), fontsize=7.5, color=FAINT, ha="center", va="bottom")
+    ax.annotate(
+        f"{level:g} dB", (phase[top], decibels(L)[top]), fontsize=7.5, color=STYLE.faint, ha="center", va="bottom"
+    )
 
 
 def sensitivities(loops: Sequence[Loop]) -> str:
@@ -172,7 +164,7 @@ def sensitivities(loops: Sequence[Loop]) -> str:
 
 
 def _sensitivities(loops: Sequence[Loop], width: float) -> Figure:
-    wide = width == WIDE
+    wide = width == STYLE.wide
     figure = Figure(figsize=(width, 3.6 if wide else 6.0), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True) if wide else figure.subplots(2, 1)
     for ax, name in zip(axes, "ST", strict=True):
@@ -180,7 +172,7 @@ def _sensitivities(loops: Sequence[Loop], width: float) -> Figure:
             ax.semilogx(
                 x.f_hz, decibels(getattr(x, name)), color=_shade(x), linestyle=_dash(x, loops), label=_label(x, loops)
             )
-        ax.axhline(0, color=FAINT, linewidth=0.8)
+        ax.axhline(0, color=STYLE.faint, linewidth=0.8)
         ax.set_ylim(-50, 12)
         ax.margins(x=0)
         ax.set_ylabel(f"|{name}| [dB]")
@@ -220,7 +212,7 @@ def _cycles(found: Cycles, lasting, h: float, width: float) -> Figure:
         ax.plot(
             1e3 * fine,
             np.degrees(lasting.amplitude) * np.sin(2 * np.pi * lasting.f_hz * fine),
-            color=MEASURED,
+            color=STYLE.measured,
             linewidth=2.6,
             zorder=1,
             label="predicted",
@@ -228,7 +220,7 @@ def _cycles(found: Cycles, lasting, h: float, width: float) -> Figure:
     ax.set_xlabel("time [ms]")
     ax.set_ylabel("angle [°]")
     ax.margins(x=0)
-    _legend(figure, ax, width == WIDE)
+    _legend(figure, ax, width == STYLE.wide)
     return figure
 
 
@@ -238,7 +230,7 @@ def recording(compared: Compared) -> str:
 
 
 def _recording(compared: Compared, width: float) -> Figure:
-    r, wide = compared.response, width == WIDE
+    r, wide = compared.response, width == STYLE.wide
     figure = Figure(figsize=(width, 7.4), layout="constrained")
     size, phase, trust, levels = figure.subplots(4, 1, sharex=True, height_ratios=(1.6, 1.2, 0.7, 1.1))
     for k, (name, model) in enumerate(compared.models.items()):
@@ -247,23 +239,27 @@ def _recording(compared: Compared, width: float) -> Figure:
     marks = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     first = next(iter(compared.models.values()))
     turned = np.degrees(np.angle(r.g / first) + np.unwrap(np.angle(first)))  # on the models' branch
-    for part, shade, label in ((r.sure, INK, "recorded, sure"), (~r.sure, "#b9c2cc", "recorded, unsure")):
+    for part, shade, label in ((r.sure, STYLE.ink, "recorded, sure"), (~r.sure, "#b9c2cc", "recorded, unsure")):
         if part.any():
             size.semilogx(r.f_hz[part], decibels(r.g[part]), color=shade, label=label, **marks)
             phase.semilogx(r.f_hz[part], turned[part], color=shade, **marks)
-    trust.semilogx(r.f_hz, r.coherence, color=INK, marker=".", linewidth=0.8)
-    trust.axhline(SURE, color=FAINT, linewidth=0.8, linestyle=(0, (3, 3)))
+    trust.semilogx(r.f_hz, r.coherence, color=STYLE.ink, marker=".", linewidth=0.8)
+    trust.axhline(SURE, color=STYLE.faint, linewidth=0.8, linestyle=(0, (3, 3)))
     trust.set_ylim(0, 1.05)
     unit = math.degrees(1.0)
-    levels.loglog(r.f_hz, unit * r.output, color=INK, marker=".", label="output")
+    levels.loglog(r.f_hz, unit * r.output, color=STYLE.ink, marker=".", label="output")
     levels.loglog(
-        r.f_hz, unit * r.noise, color=MEASURED, marker=".", label="noise and distortion" if r.periods == 1 else "noise"
+        r.f_hz,
+        unit * r.noise,
+        color=STYLE.measured,
+        marker=".",
+        label="noise and distortion" if r.periods == 1 else "noise",
     )
     if np.isfinite(r.distortion).any():
         levels.loglog(
             r.f_hz,
             unit * np.where(r.distortion > 0, r.distortion, np.nan),
-            color=DISTORTION,
+            color=STYLE.distortion,
             marker=".",
             label="distortion",
         )

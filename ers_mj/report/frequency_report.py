@@ -1,6 +1,6 @@
 """The report of `ers frequency`: how much room the loops have, where they cycle, and what recordings say of the models.
- sentence -> loops: table, Bode, Nyquist, Nichols, sensitivities -> plants -> limit cycles -> recordings -> how it was
-made
+
+sentence -> loops: table, Bode, Nyquist, Nichols, sensitivities -> plants -> limit cycles -> recordings
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ import math
 from collections.abc import Mapping
 
 from ers_mj.control.frequency.study import Compared, Study
-from ers_mj.report import diagnosis_figures as figures
 from ers_mj.report import frequency_figures, page
-from ers_mj.report.display import NONE
+from ers_mj.report.display import Unit
 from ers_mj.report.display import figure as digits
+from ers_mj.report.drawing import restart_ids
 
 HEADS = (
     "loop",
@@ -29,7 +29,7 @@ HEADS = (
 
 def frequency_page(document: Mapping, found: Study) -> str:
     """The page as HTML, of what `ers frequency --json` prints and the study behind it."""
-    figures.restart_ids()
+    restart_ids()
     sections = [
         _loops(document, found),
         _plants(document, found),
@@ -44,7 +44,7 @@ def _header(document: Mapping) -> str:
     first = document["loops"][0]
     name = page.text(f"{first['controller']}, {first['plant']}")
     tiles = [
-        (f"{name}: {label}", f'<span class="a">{_with(document[key], unit)}</span>')
+        (f"{name}: {label}", f'<span class="a">{Unit(unit)(document[key])}</span>')
         for label, key, unit in (
             ("gain margin", "gain_margin_db", "dB"),
             ("phase margin", "phase_margin_deg", "°"),
@@ -55,25 +55,21 @@ def _header(document: Mapping) -> str:
     return page.header("consistent", "Loops over frequency", "ers frequency", document["sentence"], tiles)
 
 
-def _with(x: float | None, unit: str) -> str:
-    return NONE if x is None else f"{digits(x, 3)}{'' if unit == '°' else ' '}{unit}".strip()
-
-
 def _loops(document: Mapping, found: Study) -> str:
     rows = []
     for loop in document["loops"]:
-        once = f"{_with(loop['disk_gain_margin_db'], 'dB')}, {_with(loop['disk_phase_margin_deg'], '°')}"
+        once = f"{Unit('dB')(loop['disk_gain_margin_db'])}, {Unit('°')(loop['disk_phase_margin_deg'])}"
         rows.append(
             (
                 (
                     page.text(f"{loop['controller']}, {loop['plant']}"),
-                    _with(loop["gain_margin_db"], "dB"),
-                    _with(loop["phase_margin_deg"], "°"),
-                    _with(loop["gain_crossover_hz"], "Hz"),
+                    Unit("dB")(loop["gain_margin_db"]),
+                    Unit("°")(loop["phase_margin_deg"]),
+                    Unit("Hz")(loop["gain_crossover_hz"]),
                     digits(loop["disk_margin"], 3),
                     once,
                     digits(loop["sensitivity_peak"], 3),
-                    _with(loop["bandwidth_hz"], "Hz"),
+                    Unit("Hz")(loop["bandwidth_hz"]),
                     "" if loop["stable"] else "<b>unstable</b>",
                 ),
                 "",
@@ -150,15 +146,11 @@ def _footer(document: Mapping) -> str:
         f"{c['rate_hz']:g} Hz",
         f"±{c['u_max_V']:g} V",
         f"speed filter {1e3 * c['filter_s']:g} ms",
-        f"play ±{math.degrees(c['gap_rad']):.3g}°",
-        f"{c['linkage']} linkage",
-        f"inductance {'on' if c['inductance'] else 'off'}",
+        *page.rig(c),
         *(f"effect {_effect(effect)}" for effect in c["effects"]),
-        f"plant {document['datasheet']}",
-        f"controllers know {document['design']}",
-        *(f"{name} {value}" for name, value in document["versions"].items()),
+        *page.origin(document),
     ]
-    return f"<footer><p>{' · '.join(page.text(x) for x in told)}</p></footer>"
+    return page.footer(told)
 
 
 def _effect(effect: Mapping) -> str:

@@ -14,11 +14,12 @@ from matplotlib.ticker import NullFormatter
 from ers_mj.data.prepared import Trace
 from ers_mj.identification.answer import Identified
 from ers_mj.identification.precision import Profile
-from ers_mj.report.diagnosis_figures import AFTER, BEFORE, FAINT, INK, MEASURED, WIDE, both_widths, decimate, margins
 from ers_mj.report.display import SUPERSCRIPT, shown
+from ers_mj.report.drawing import both_widths, decimate, margins
+from ers_mj.report.style import STYLE
 
 POINTS = {True: 900, False: 450}
-SHADES = (AFTER, BEFORE, "#1d4f91", "#8a6bb8", "#a83a1e", "#4c8c2b", "#5b6b7b")
+SHADES = (STYLE.after, STYLE.before, "#1d4f91", "#8a6bb8", "#a83a1e", "#4c8c2b", "#5b6b7b")
 
 
 def compared(trace: Trace, predicted: np.ndarray, unit: str) -> str:
@@ -29,20 +30,24 @@ def compared(trace: Trace, predicted: np.ndarray, unit: str) -> str:
 
 
 def _compared(trace: Trace, predicted: np.ndarray, unit: str, width: float) -> Figure:
-    wide, u = width == WIDE, shown(unit)
+    wide, u = width == STYLE.wide, shown(unit)
     figure = Figure(figsize=(width, 4.4))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.8, 1.0))
     margins(figure, top=0.35)
-    above.plot(*decimate(trace.t, u.factor * trace.y, POINTS[wide]), color=MEASURED, linewidth=2.6, label="measured")
+    above.plot(
+        *decimate(trace.t, u.factor * trace.y, POINTS[wide]), color=STYLE.measured, linewidth=2.6, label="measured"
+    )
     above.plot(
         *decimate(trace.t, u.factor * predicted, POINTS[wide]),
-        color=AFTER,
+        color=STYLE.after,
         linewidth=1.1,
         label="identified model, free run",
     )
-    below.plot(*decimate(trace.t, u.factor * (trace.y - predicted), POINTS[wide]), color=INK, linewidth=0.7)
+    below.plot(*decimate(trace.t, u.factor * (trace.y - predicted), POINTS[wide]), color=STYLE.ink, linewidth=0.7)
     for k, edge in enumerate((-2, 2)):
-        below.axhline(edge * u.factor * trace.sigma, color=BEFORE, linewidth=1.0, label=None if k else "noise, ±2σ")
+        below.axhline(
+            edge * u.factor * trace.sigma, color=STYLE.before, linewidth=1.0, label=None if k else "noise, ±2σ"
+        )
     for ax, label in ((above, f"output [{u.label}]"), (below, f"left [{u.label}]")):
         ax.set_ylabel(label)
         ax.margins(x=0)
@@ -95,12 +100,12 @@ def profiles(found: Sequence[Profile]) -> str | None:
 
 
 def _profiles(found: Sequence[Profile], width: float) -> Figure:
-    columns = min(len(found), 3 if width == WIDE else 1)
+    columns = min(len(found), 3 if width == STYLE.wide else 1)
     rows = math.ceil(len(found) / columns)
     figure = Figure(figsize=(width, 2.8 * rows), layout="constrained")
-    for ax, p in zip(figure.subplots(rows, columns, squeeze=False).ravel(), found):
-        ax.plot(p.x, p.rise, color=AFTER, marker="o", markersize=3.5)
-        ax.axhline(p.level, color=FAINT, linewidth=0.8, linestyle=(0, (3, 3)))
+    for ax, p in zip(figure.subplots(rows, columns, squeeze=False).ravel(), found, strict=False):
+        ax.plot(p.x, p.rise, color=STYLE.after, marker="o", markersize=3.5)
+        ax.axhline(p.level, color=STYLE.faint, linewidth=0.8, linestyle=(0, (3, 3)))
         ax.set_ylim(0, 2.5 * p.level)
         ax.set_title(p.name)
         ax.set_xlabel("over the reference")

@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ers_mj.identification.answer import Identified, Row
-from ers_mj.report import diagnosis_figures as figures
 from ers_mj.report import identify_figures, page
 from ers_mj.report.display import NONE, pretty, shown
 from ers_mj.report.display import figure as digits
+from ers_mj.report.drawing import restart_ids
 
 HEADS = ("parameter", ">value", ">95 % interval", ">datasheet", "")
-WEAKEST = 4  # digits of a value
 
 
 def identify_page(document: Mapping, found: Identified) -> str:
     """The page as HTML, of what `ers identify --json` prints and the search behind it."""
-    figures.restart_ids()
+    restart_ids()
     kind = "parameters_only" if found.explains else "unexplained"
     sections = [
         _parameters(found),
@@ -58,7 +57,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     unit = shown(row.unit) if row.name == "theta_0" else None
 
     def number(x):
-        return NONE if x is None else unit.bare(x, WEAKEST) if unit else digits(x, WEAKEST)
+        return NONE if x is None else unit.bare(x, 4) if unit else digits(x, 4)
 
     low, high = row.ci95
     label = unit.label if unit else pretty(row.unit)
@@ -101,4 +100,4 @@ def _footer(document: Mapping) -> str:
         f"{document['wall_s']:.2g} s",
         *(f"{name} {value}" for name, value in document["versions"].items()),
     ]
-    return f"<footer><p>{' · '.join(page.text(x) for x in told)}</p></footer>"
+    return page.footer(told)

@@ -8,11 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from ers_mj.report.diagnosis_figures import AFTER, HEAT, INK, WIDE, both_widths
 from ers_mj.report.display import figure as digits
+from ers_mj.report.drawing import both_widths
+from ers_mj.report.style import HEAT, STYLE
 from ers_mj.validation.cases import ValidityMap
-
-DARK = 0.55  # of the colour scale, from which numbers are white
 
 
 def sine_map(sines: ValidityMap, valid: float) -> str:
@@ -28,7 +27,7 @@ def play_map(play: ValidityMap) -> str:
 
 
 def _sine_map(sines: ValidityMap, valid: float, width: float) -> Figure:
-    wide = width == WIDE
+    wide = width == STYLE.wide
     figure = Figure(figsize=(width, 3.7 if wide else 6.8), layout="constrained")
     axes = figure.subplots(1, 2) if wide else figure.subplots(2, 1)
     good = sines.relative <= valid
@@ -36,14 +35,14 @@ def _sine_map(sines: ValidityMap, valid: float, width: float) -> Figure:
         axes, (np.degrees(sines.rms), 100 * sines.relative), ("rms deviation [°]", "in % of the motion"), strict=True
     ):
         _cells(ax, values, good, [f"{x:.3g}" for x in sines.x], [f"{y:.3g}" for y in sines.y])
-        ax.set_title(title, color=INK, fontweight="bold")
+        ax.set_title(title, color=STYLE.ink, fontweight="bold")
         ax.set_xlabel("frequency [Hz]")
         ax.set_ylabel("amplitude [V]")
     return figure
 
 
 def _play_map(play: ValidityMap, width: float) -> Figure:
-    figure = Figure(figsize=(width if width != WIDE else 0.62 * WIDE, 3.2), layout="constrained")
+    figure = Figure(figsize=(width if width != STYLE.wide else 0.62 * STYLE.wide, 3.2), layout="constrained")
     ax = figure.subplots()
     _cells(
         ax,
@@ -52,7 +51,7 @@ def _play_map(play: ValidityMap, width: float) -> Figure:
         [f"±{np.degrees(x):.3g}" if x else "0" for x in play.x],
         [f"{1e3 * y:.3g}" for y in play.y],
     )
-    ax.set_title("rms deviation [°]", color=INK, fontweight="bold")
+    ax.set_title("rms deviation [°]", color=STYLE.ink, fontweight="bold")
     ax.set_xlabel("inductance L [mH]")
     ax.set_ylabel("play [°]")
     return figure
@@ -68,11 +67,9 @@ def _cells(ax, values: np.ndarray, framed: np.ndarray, rows: Sequence[str], colu
     )
     for (i, j), x in np.ndenumerate(values):
         if np.isfinite(x):
-            ax.text(
-                j, i, digits(x, 2), ha="center", va="center", fontsize=8.5, color="white" if shade[i, j] > DARK else INK
-            )
+            ax.text(j, i, digits(x, 2), ha="center", va="center", fontsize=8.5, color=STYLE.on_heat(shade[i, j]))
         if framed[i, j]:
-            ax.add_patch(Rectangle((j - 0.46, i - 0.46), 0.92, 0.92, fill=False, edgecolor=AFTER, linewidth=1.6))
+            ax.add_patch(Rectangle((j - 0.46, i - 0.46), 0.92, 0.92, fill=False, edgecolor=STYLE.after, linewidth=1.6))
     ax.set_xticks(range(len(columns)), columns)
     ax.set_yticks(range(len(rows)), rows)
     ax.grid(False)

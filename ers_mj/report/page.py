@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -30,6 +31,29 @@ def header(kind: str, verdict: str, small: str, sentence: object, tiles: Iterabl
         f'<header class="{text(kind)}">\n<p class="verdict">{text(verdict)}<small>{text(small)}</small></p>\n'
         f'<h1>{text(sentence)}</h1>\n<div class="tiles">{cells}</div>\n</header>'
     )
+
+
+def footer(told: Iterable[object]) -> str:
+    """What a page ends with: how it was made, in pieces."""
+    return f"<footer><p>{' · '.join(text(x) for x in told)}</p></footer>"
+
+
+def rig(conditions: Mapping) -> list[str]:
+    """The play, the linkage and the inductance of a loop's plant, for a footer."""
+    return [
+        f"play ±{math.degrees(conditions['gap_rad']):.3g}°",
+        f"{conditions['linkage']} linkage",
+        f"inductance {'on' if conditions['inductance'] else 'off'}",
+    ]
+
+
+def origin(document: Mapping) -> list[str]:
+    """The datasheets of a loop's plant and of its controllers, and the versions, for a footer."""
+    return [
+        f"plant {document['datasheet']}",
+        f"controllers know {document['design']}",
+        *(f"{name} {value}" for name, value in document["versions"].items()),
+    ]
 
 
 def text(x: object) -> str:

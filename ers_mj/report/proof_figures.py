@@ -11,11 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ers_mj.proving.scoring import NO_ANSWER, NOTHING, OUTSIDE, UNEXPLAINED, class_of
-from ers_mj.report.diagnosis_figures import AFTER, BEFORE, FAINT, HEAT, INK, WIDE, both_widths
+from ers_mj.report.drawing import both_widths, plain_ticks
+from ers_mj.report.style import HEAT, STYLE
 
 LAST = (NOTHING, UNEXPLAINED, NO_ANSWER)
-DARK = 0.55  # of the colour scale, from which numbers are white
-MOST_SIGMA = 100.0
 
 
 def drawn(results: Mapping, rows: Sequence[Mapping]) -> dict[str, str]:
@@ -52,48 +51,25 @@ def drawn(results: Mapping, rows: Sequence[Mapping]) -> dict[str, str]:
 
 
 def _confusion(table: Mapping[str, Mapping[str, int]], width: float) -> Figure:
-    rows = sorted(table, key=lambda name: (name == OUTSIDE, name == NOTHING, name))
-    named = {name for counts in table.values() for name in counts}
-    columns = sorted(
-        named | {r for r in rows if r not in (OUTSIDE,)},
-        key=lambda name: (name in LAST, LAST.index(name) if name in LAST else 0, name),
-    )
-    columns = [c for c in columns if c in named or width == WIDE]
+    rows, columns = _in_order(table, whole=width == STYLE.wide)
     figure = Figure(figsize=(width, 1.9 + 0.27 * len(rows)), layout="constrained")
     ax = figure.subplots()
     values = np.array([[table[r].get(c, 0) for c in columns] for r in rows], float)
     share = values / values.sum(1, keepdims=True)
-    ax.pcolormesh(
-        range(len(columns)),
-        range(len(rows)),
-        np.ma.masked_equal(share, 0.0),
-        cmap=HEAT,
-        vmin=0,
-        vmax=1,
-        shading="nearest",
-    )
+    cells = {"cmap": HEAT, "vmin": 0, "vmax": 1, "shading": "nearest"}
+    ax.pcolormesh(range(len(columns)), range(len(rows)), np.ma.masked_equal(share, 0.0), **cells)
     for (i, j), count in np.ndenumerate(values):
-        fits = class_of(rows[i]) == class_of(columns[j]) or (rows[i], columns[j]) == (OUTSIDE, UNEXPLAINED)
-        if fits:
+        if _is_right(rows[i], columns[j]):
             ax.plot(
                 [j - 0.5, j + 0.5, j + 0.5, j - 0.5, j - 0.5],
                 [i - 0.5, i - 0.5, i + 0.5, i + 0.5, i - 0.5],
-                color=AFTER,
+                color=STYLE.after,
                 linewidth=1.1,
             )
         if count:
-            ax.text(
-                j,
-                i,
-                f"{count:.0f}",
-                ha="center",
-                va="center",
-                fontsize=8.5,
-                color="white" if share[i, j] > DARK else INK,
-            )
-    ax.set_xticks(
-        range(len(columns)), [c.replace("_", " ") for c in columns], rotation=90, fontsize=8 if width == WIDE else 6.5
-    )
+            ax.text(j, i, f"{count:.0f}", ha="center", va="center", fontsize=8.5, color=STYLE.on_heat(share[i, j]))
+    small = 8 if width == STYLE.wide else 6.5
+    ax.set_xticks(range(len(columns)), [c.replace("_", " ") for c in columns], rotation=90, fontsize=small)
     ax.set_yticks(range(len(rows)), [r.replace("_", " ") for r in rows], fontsize=8)
     ax.set_xlim(-0.55, len(columns) - 0.45)
     ax.set_ylim(len(rows) - 0.45, -0.55)
@@ -103,37 +79,51 @@ def _confusion(table: Mapping[str, Mapping[str, int]], width: float) -> Figure:
     return figure
 
 
+def _in_order(table: Mapping[str, Mapping[str, int]], whole: bool) -> tuple[list[str], list[str]]:
+    """Rows (concealed) and columns (named), what is no effect last; columns that nothing was named by only where there
+    is room for the whole.
+    """
+    rows = sorted(table, key=lambda name: (name == OUTSIDE, name == NOTHING, name))
+    named = {name for counts in table.values() for name in counts}
+    told = named | (set(rows) - {OUTSIDE} if whole else set())
+    return rows, sorted(told, key=lambda name: (name in LAST, LAST.index(name) if name in LAST else 0, name))
+
+
+def _is_right(concealed: str, named: str) -> bool:
+    return class_of(concealed) == class_of(named) or (concealed, named) == (OUTSIDE, UNEXPLAINED)
+
+
 def _accuracy(bins: Sequence[Mapping], rows: Sequence[Mapping], width: float) -> Figure:
+    least, most = 0.02, 100.0  # [sigma] that are drawn
     figure = Figure(figsize=(width, 3.4), layout="constrained")
     ax = figure.subplots()
     for b in bins:
-        low, high = max(b["from_sigma"], 0.02), b["to_sigma"] or MOST_SIGMA
+        low, high = max(b["from_sigma"], least), b["to_sigma"] or most
         middle, share = np.sqrt(low * high), b["right"] / b["of"]
-        ax.plot([low, high], [share, share], color=AFTER, linewidth=2.2, solid_capstyle="butt")
-        ax.plot([middle, middle], b["ci95"], color=AFTER, linewidth=1.2)
+        ax.plot([low, high], [share, share], color=STYLE.after, linewidth=2.2, solid_capstyle="butt")
+        ax.plot([middle, middle], b["ci95"], color=STYLE.after, linewidth=1.2)
         ax.annotate(
             f"{b['right']}/{b['of']}",
             (middle, share),
             xytext=(5, 5 if share < 0.9 else -13),
             textcoords="offset points",
             fontsize=8.5,
-            color=INK,
+            color=STYLE.ink,
         )
     for r in rows:
         if r["kind"] == "single" and np.isfinite(r["visibility"]):
             fits = bool(r["named"]) and class_of(r["named"][0]) == class_of(r["labels"][0])
             ax.plot(
-                [np.clip(r["visibility"], 0.02, MOST_SIGMA)],
+                [np.clip(r["visibility"], least, most)],
                 [1.06 if fits else -0.06],
                 "o",
                 markersize=4,
                 alpha=0.6,
-                color=AFTER if fits else BEFORE,
+                color=STYLE.after if fits else STYLE.before,
             )
     ax.set_xscale("log")
     ticks = [t for t in (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if t >= 0.8 * ax.get_xlim()[0]]
-    ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
-    ax.minorticks_off()
+    plain_ticks(ax, ticks)
     ax.set_ylim(-0.12, 1.12)
     ax.set_yticks(np.arange(0, 1.01, 0.25))
     ax.set_xlabel("left after refit [sigma of the noise]")
@@ -145,11 +135,11 @@ def _reliability(bins: Sequence[Mapping], width: float) -> Figure:
     figure = Figure(figsize=(width, 4.4), layout="constrained")
     ax = figure.subplots()
     ax.set_aspect("equal", anchor="W")
-    ax.plot([0, 1], [0, 1], color=FAINT, linewidth=1.0, linestyle=(0, (3, 3)))
+    ax.plot([0, 1], [0, 1], color=STYLE.faint, linewidth=1.0, linestyle=(0, (3, 3)))
     x, share = [b["probability"] for b in bins], [b["right"] / b["of"] for b in bins]
-    ax.plot(x, share, "o-", color=AFTER, linewidth=1.3)
-    for b, here, p in zip(bins, share, x):
-        ax.plot([p, p], b["ci95"], color=AFTER, linewidth=1.2)
+    ax.plot(x, share, "o-", color=STYLE.after, linewidth=1.3)
+    for b, here, p in zip(bins, share, x, strict=True):
+        ax.plot([p, p], b["ci95"], color=STYLE.after, linewidth=1.2)
         left = p > 0.85
         ax.annotate(
             str(b["of"]),
@@ -157,7 +147,7 @@ def _reliability(bins: Sequence[Mapping], width: float) -> Figure:
             xytext=(-6 if left else 6, -11),
             textcoords="offset points",
             fontsize=8.5,
-            color=INK,
+            color=STYLE.ink,
             ha="right" if left else "left",
         )
     ax.set_xlim(-0.03, 1.03)
@@ -174,13 +164,12 @@ def _histogram(groups: Sequence[tuple[str, Sequence[float]]], label: str, width:
     low, high = 0.95 * every.min(), 1.05 * every.max()
     edges = np.geomspace(low, high, 25)
     for _, values in groups:
-        ax.hist(values, bins=edges, color=AFTER, alpha=0.85)
+        ax.hist(values, bins=edges, color=STYLE.after, alpha=0.85)
     ax.margins(y=0.18)
     _line(ax, float(np.median(every)))
     ax.set_xscale("log")
     ticks = [t for t in (0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 200, 300, 1000) if low <= t <= high]
-    ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
-    ax.minorticks_off()
+    plain_ticks(ax, ticks)
     ax.set_xlabel(label)
     ax.set_ylabel("cases")
     ax.yaxis.get_major_locator().set_params(integer=True)
@@ -188,7 +177,7 @@ def _histogram(groups: Sequence[tuple[str, Sequence[float]]], label: str, width:
 
 
 def _line(ax: Axes, median: float) -> None:
-    ax.axvline(median, color=BEFORE, linewidth=1.2)
+    ax.axvline(median, color=STYLE.before, linewidth=1.2)
     ax.annotate(
         f"median {median:.3g}",
         (median, 1.0),
@@ -196,5 +185,5 @@ def _line(ax: Axes, median: float) -> None:
         xytext=(4, -10),
         textcoords="offset points",
         fontsize=8.5,
-        color=BEFORE,
+        color=STYLE.before,
     )

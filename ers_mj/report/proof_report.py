@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ers_mj.proving.scoring import NOTHING, first
-from ers_mj.report import diagnosis_figures as figures
 from ers_mj.report import page
 from ers_mj.report.display import NONE, missing
 from ers_mj.report.display import figure as digits
+from ers_mj.report.drawing import restart_ids
 from ers_mj.report.proof_figures import drawn
 
 TOLD = {
@@ -72,12 +72,11 @@ def table_of(results: Mapping) -> list[tuple[str, str, str]]:
 
 def proof_page(results: Mapping, rows: Sequence[Mapping], about: Mapping[str, str]) -> str:
     """The page as HTML."""
-    figures.restart_ids()
+    restart_ids()
     shares = page.table(
         ["share", ">cases", ">with 95 % interval"], [((page.text(a), b, c), "") for a, b, c in table_of(results)]
     )
     pictures = "".join(page.figure(svg, page.text(caption)) for caption, svg in drawn(results, rows).items())
-    told = " · ".join(f"{page.text(name)} {page.text(value)}" for name, value in about.items())
     body = "\n".join(
         [
             page.header("consistent", "What the diagnosis can do", "ers prove", headline(results), _tiles(results)),
@@ -92,7 +91,7 @@ def proof_page(results: Mapping, rows: Sequence[Mapping], about: Mapping[str, st
                 "What was concealed, how much of it a refitted model leaves, what was answered.",
                 _cases(rows),
             ),
-            f"<footer><p>{told}</p></footer>",
+            page.footer(f"{name} {value}" for name, value in about.items()),
         ]
     )
     return page.frame("What the diagnosis can do", "consistent", body)

@@ -9,12 +9,13 @@ from matplotlib.figure import Figure
 
 from ers_mj.control.monte_carlo import Spread
 from ers_mj.control.trial import Trial
-from ers_mj.report.diagnosis_figures import AFTER, BEFORE, INK, MEASURED, WIDE, both_widths, decimate
+from ers_mj.report.drawing import both_widths, decimate
+from ers_mj.report.style import STYLE
 
 COLOURS = {
-    "ftrc": AFTER,
+    "ftrc": STYLE.after,
     "ftrc-literal": "#7cc2bb",
-    "pid": BEFORE,
+    "pid": STYLE.before,
     "pid-ff": "#a83a1e",
     "hinf": "#8a6bb8",
     "time-optimal": "#1d4f91",
@@ -22,7 +23,6 @@ COLOURS = {
 MORE = ("#4c8c2b", "#b8336a", "#5b6b7b")
 POINTS = {True: 700, False: 350}
 CLOSE = {"step": (0.0, 0.15), "square": (0.49, 0.64), "ramp": (0.45, 0.6), "chirp": (4.7, 5.0)}  # [s]
-ROOMY = 3.0  # times the median of the largest errors that the error's axis shows
 
 
 def colour(name: str, order: int = 0) -> str:
@@ -54,7 +54,7 @@ def span(trials: Sequence[Trial]) -> tuple[float, float]:
 
 
 def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | None) -> Figure:
-    wide = width == WIDE
+    wide = width == STYLE.wide
     figure = Figure(figsize=(width, 6.0 if wide else 6.4), layout="constrained")
     angle, error, voltage = figure.subplots(3, 1, sharex=True, height_ratios=(1.7, 1.2, 1.2))
     reference = trials[0].run.reference
@@ -62,7 +62,7 @@ def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | N
     t, points = reference.t[inside], POINTS[wide]
     angle.plot(
         *decimate(t, np.degrees(reference.theta[inside]), points),
-        color=MEASURED,
+        color=STYLE.measured,
         linewidth=3.0,
         label="reference",
         zorder=2,
@@ -86,10 +86,10 @@ def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | N
     room = 0.2 * (np.ptp(ends) or 1.0)
     angle.set_ylim(ends.min() - room, ends.max() + room)
     if largest:
-        limit = min(1.05 * max(largest), ROOMY * float(np.median(largest))) or 1.0
+        limit = error_limit(largest) or 1.0
         error.set_ylim(-limit, limit)
     for ax, label in ((angle, "angle [°]"), (error, "error [°]"), (voltage, "voltage [V]")):
-        ax.set_ylabel(label, color=INK)
+        ax.set_ylabel(label, color=STYLE.ink)
         ax.margins(x=0)
     voltage.set_xlabel("time [s]")
     handles, labels = angle.get_legend_handles_labels()
@@ -97,6 +97,11 @@ def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | N
         handles, labels, loc="outside upper left", ncols=7 if wide else 3, handlelength=1.6, columnspacing=1.2
     )
     return figure
+
+
+def error_limit(largest: Sequence[float]) -> float:
+    """How far an axis of errors goes, of the largest error of each law: those that run away leave the picture."""
+    return min(1.05 * max(largest), 3.0 * float(np.median(largest)))
 
 
 def spreads(found: Sequence[Spread]) -> str:
@@ -107,7 +112,7 @@ def spreads(found: Sequence[Spread]) -> str:
 def _spreads(found: Sequence[Spread], width: float) -> Figure:
     groups = list(dict.fromkeys((s.case, s.plant) for s in found))
     rows = len(found) // len(groups)
-    columns = min(len(groups), 2 if width == WIDE else 1)
+    columns = min(len(groups), 2 if width == STYLE.wide else 1)
     lines = -(-len(groups) // columns)
     figure = Figure(figsize=(width, lines * (0.9 + 0.3 * rows)), layout="constrained")
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
@@ -123,6 +128,6 @@ def _spreads(found: Sequence[Spread], width: float) -> Figure:
         ax.set_yticks(range(len(group)), [s.controller for s in group])
         ax.set_ylim(len(group) - 0.4, -0.6)
         ax.set_xscale("log")
-        ax.set_title(f"{case}, {plant} plant", color=INK)
+        ax.set_title(f"{case}, {plant} plant", color=STYLE.ink)
         ax.set_xlabel("RMS error [°]")
     return figure

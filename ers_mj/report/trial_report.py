@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 from ers_mj.control.monte_carlo import Spread
 from ers_mj.control.paper_claims import claims, degrees
 from ers_mj.control.trial import Trial
-from ers_mj.report import diagnosis_figures as figures
 from ers_mj.report import page, trial_figures
-from ers_mj.report.display import NONE
+from ers_mj.report.display import NONE, Unit
 from ers_mj.report.display import figure as digits
+from ers_mj.report.drawing import restart_ids
 
 HEADS = ("controller", ">settles", ">overshoot", ">steady-state error", ">RMSE", ">peak", ">RMS", ">chatter", ">energy")
 VERDICT = {True: "holds", False: "<b>does not hold</b>", None: NONE}
@@ -23,7 +23,7 @@ TITLES = {"step": "Step", "square": "Square (Case 1)", "ramp": "Ramp (Case 2)", 
 
 def trial_page(document: Mapping, trials: Sequence[Trial], spreads: Sequence[Spread] = ()) -> str:
     """The page as HTML, of what `ers trial --json` prints and the runs behind it."""
-    figures.restart_ids()
+    restart_ids()
     groups = dict.fromkeys((t.case, t.plant) for t in trials)
     sections = [
         _claims(trials),
@@ -128,15 +128,11 @@ def _cells(trial: Trial) -> tuple[str, ...]:
         NONE if m.overshoot_pct is None else f"{m.overshoot_pct:.2f} %",
         degrees(m.steady_state_error_rad),
         degrees(m.rmse_rad),
-        _with(m.peak_u_V, "V"),
-        _with(m.rms_u_V, "V"),
-        _with(m.chatter_V, "V"),
-        _with(m.energy_J, "J"),
+        Unit("V")(m.peak_u_V),
+        Unit("V")(m.rms_u_V),
+        Unit("V")(m.chatter_V),
+        Unit("J")(m.energy_J),
     )
-
-
-def _with(x: float | None, unit: str) -> str:
-    return NONE if x is None else f"{digits(x, 3)} {unit}"
 
 
 def _laws(document: Mapping) -> str:
@@ -157,12 +153,8 @@ def _footer(document: Mapping) -> str:
         f"{c['rate_hz']:g} Hz",
         f"±{c['u_max_V']:g} V",
         f"noise {math.degrees(c['noise_rad']):.3g}°",
-        f"play ±{math.degrees(c['gap_rad']):.3g}°",
-        f"{c['linkage']} linkage",
-        f"inductance {'on' if c['inductance'] else 'off'}",
+        *page.rig(c),
         *(f"effect {effect['name']}" for effect in c["effects"]),
-        f"plant {document['datasheet']}",
-        f"controllers know {document['design']}",
-        *(f"{name} {value}" for name, value in document["versions"].items()),
+        *page.origin(document),
     ]
-    return f"<footer><p>{' · '.join(page.text(x) for x in told)}</p></footer>"
+    return page.footer(told)

@@ -10,23 +10,24 @@ from collections.abc import Mapping
 import numpy as np
 
 from ers_mj.diagnosis.evidence import Evidence, RecordView
-from ers_mj.report import diagnosis_figures as figures
 from ers_mj.report import maps, page
 from ers_mj.report.display import NONE
+from ers_mj.report.drawing import restart_ids
+from ers_mj.report.traces import close_up, traces
 from ers_mj.report.validity import VALID, Departure, called, degrees, departures, headline, per_cent
-from ers_mj.validation.cases import MOST_TRAVEL, Case, Validation, rms, spoken
+from ers_mj.validation.cases import GRID, Case, Validation, rms, spoken
 
 NO_EVIDENCE = Evidence((), (), None, float("nan"), "rad", "V")
 
 
 def validation_page(validation: Validation, about: Mapping[str, str]) -> str:
     """The page as HTML; `about` is told in its last lines."""
-    figures.restart_ids()
+    restart_ids()
     found = departures(validation)
     kind = "missing_physics" if found else "consistent"
     sections = [_table(validation), *(_departure(d) for d in found), _play(validation)]
-    told = " · ".join(f"{page.text(name)} {page.text(value)}" for name, value in about.items())
-    body = "\n".join([_header(validation, found, kind), *sections, f"<footer><p>{told}</p></footer>"])
+    footer = page.footer(f"{name} {value}" for name, value in about.items())
+    body = "\n".join([_header(validation, found, kind), *sections, footer])
     return page.frame("Where the reduced model holds", kind, body)
 
 
@@ -81,13 +82,13 @@ def _departure(departure: Departure) -> str:
     labels = ("MuJoCo", "Eq. (6)", "Eq. (6) with the play" if has_play else "Eq. (1)")
     view = RecordView(case.input, False, case.t, case.u, case.mujoco, case.eq_5, _better(case))
     caption = f"The {page.text(case.input)}, where it is furthest off; the span where it does worst, enlarged."
-    drawn = page.figure(figures.traces(view, NO_EVIDENCE, labels))
-    drawn += page.figure(figures.close_up(view, NO_EVIDENCE, labels), caption)
+    drawn = page.figure(traces(view, NO_EVIDENCE, labels))
+    drawn += page.figure(close_up(view, NO_EVIDENCE, labels), caption)
     if departure.sines is not None:
         drawn += page.figure(
             maps.sine_map(departure.sines, VALID),
             f"Sines of 2 s. Framed: within {100 * VALID:.0f} % of the motion. Empty: Eq. (6) would turn more than "
-            f"{np.degrees(MOST_TRAVEL):.0f}° from θ₀, or nothing moves.",
+            f"{np.degrees(GRID.most_travel):.0f}° from θ₀, or nothing moves.",
         )
     title = called(departure.condition)
     return page.section(page.text(title[0].upper() + title[1:]), "", places + drawn)

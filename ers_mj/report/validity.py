@@ -17,7 +17,6 @@ from ers_mj.validation.cases import Case, Condition, Validation, ValidityMap, br
 VALID = 0.05  # of the motion: the deviation up to which Eq. (6) is called valid here
 REST = np.radians(1.0)  # [rad/s] below which the rudder rests
 ANGLES_DEG = (5, 10, 15, 20, 25, 30, 40)  # from theta_0
-APART = 0.1  # by which shares of error and time must differ for an angle to be named
 
 
 @dataclass(frozen=True)
@@ -185,7 +184,7 @@ def _where(cases: Sequence[Case], theta_0: float) -> list[Finding]:
     beyond = [(float(error[away > x].sum() / total), float((away > x).mean()), x) for x in ANGLES_DEG]
     in_error, in_time, angle = max(beyond, key=lambda entry: entry[0] - entry[1])
     words = "{} of the squared error lies beyond {}° from θ₀, in {} of the time."
-    if in_error - in_time < APART:
+    if in_error - in_time < 0.1:  # too near for an angle to be named
         in_error, in_time, angle = min(beyond, key=lambda entry: abs(entry[1] - 0.5))
         words = "Spread over the travel as the time is: {} of the squared error beyond {}° from θ₀, in {} of the time."
     at_rest = float(error[rest].sum() / total), float(rest.mean())

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
 
-from ers_mj.online.moving_horizon import EXPLAINED, Estimate
+from ers_mj.online.horizon import HORIZON
+from ers_mj.online.moving_horizon import Estimate
 from ers_mj.report.display import figure
 
 MEANING = {"a_1": "spring", "a_2": "damping", "b": "drive", "c_1": "preload", "c_2": "friction", "theta_0": "home"}
 BARS = "▁▂▃▄▅▆▇█"
-LEAST_RANGE = 0.02  # share of a value that a whole line of bars spans at least
 BOLD, RED, GREEN, YELLOW, PLAIN = "\x1b[1m", "\x1b[1;31m", "\x1b[32m", "\x1b[33m", "\x1b[0m"
 
 
@@ -116,17 +116,18 @@ def screen(
         half = now.spread[n] * 1.96 * (factor if n == "theta_0" else abs(now.values[n]) * factor)
         since = f"{100 * (now.values[n] / first[n] - 1):+7.1f} %" if n != "theta_0" and first.get(n) else " " * 9
         text = f"  {MEANING[n]:9}{n:8}{figure(now.values[n] * factor, 4):>9} ± {figure(half, 2):<8} {unit:10}{since}  "
-        lines.append((text + _bars([e.values[n] for e in history if e.misfit <= EXPLAINED], width - len(text)))[:width])
+        lines.append(
+            (text + _bars([e.values[n] for e in history if e.misfit <= HORIZON.explained], width - len(text)))[:width]
+        )
     said = [row for event in told for row in wrap(event, width, initial_indent="  ", subsequent_indent="      ")]
     return [*lines, "", *said, "", "  Ctrl-C ends"[:width]]
 
 
 def _bars(values: Sequence[float], width: int) -> str:
+    """A line of bars, the lowest value to the highest or 2 % of a value, whichever is more."""
     values = list(values)[-max(width, 0) :]
     if not values or width <= 0:
         return ""
-    middle, span = (
-        0.5 * (max(values) + min(values)),
-        max(max(values) - min(values), LEAST_RANGE * abs(max(values, key=abs)), 1e-300),
-    )
+    middle = 0.5 * (max(values) + min(values))
+    span = max(max(values) - min(values), 0.02 * abs(max(values, key=abs)), 1e-300)
     return "".join(BARS[min(int((0.5 + (x - middle) / span) * len(BARS)), len(BARS) - 1)] for x in values)

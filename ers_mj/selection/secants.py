@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -273,7 +274,7 @@ def _shares(
     not ``signed`` they are positive.
     """
     weighted = target.root * changes
-    spans = [slice(a, b) for a, b in zip(ends, ends[1:])]
+    spans = [slice(a, b) for a, b in pairwise(ends)]
     known = np.stack([weighted[:, s] @ target.basis[s] for s in spans], axis=1)
     pulls = -np.stack([weighted[:, s] @ target.residual[s] for s in spans], axis=1)
     shares, multiples = np.zeros(len(changes) // waves), np.zeros((len(changes) // waves, len(spans), waves))

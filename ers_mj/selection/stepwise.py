@@ -245,9 +245,10 @@ class _Stepwise:
     def _other_way_round(self, ranked: list[Candidate], bar: acceptance.Bar) -> list[Candidate]:
         """The candidates with those that come of the last round's rivals, while something may still be bought."""
         bench, current = self.bench, self.current
-        if self.rounds and ranked and self._may_sweep():
-            if explained.attainable(current.misfit, bench.counts, bench.tau) >= bar.usual:
-                return other_way_round(bench, current, self.rounds[-1], ranked)
+        if not (self.rounds and ranked and self._may_sweep()):
+            return ranked
+        if explained.attainable(current.misfit, bench.counts, bench.tau) >= bar.usual:
+            return other_way_round(bench, current, self.rounds[-1], ranked)
         return ranked
 
     def _asked(self, ranked: Sequence[Candidate], bar: acceptance.Bar) -> tuple[Candidate | None, str]:

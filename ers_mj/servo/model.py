@@ -9,29 +9,18 @@ from functools import cached_property
 
 import numpy as np
 
-from ers_mj.data.prepared import Channel, Trace
+from ers_mj.data.prepared import Trace
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.base import Parameter, Scales
+from ers_mj.effects.base import Scales
 from ers_mj.plants.effort import Effort
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.servo.free import MOST_TAU as MOST_TAU
+from ers_mj.servo.free import STATES, Free, of_base, of_effects, of_recordings, of_states
 
 OBSERVER_RATE = 5.0  # [1/s]
 OBSERVER_STEP = 0.005  # [s] between corrections of the observer
 BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share", "ampere")
 SIGNED = ("b", "ampere")  # fitted by size, their sign kept
-STATES = ("gain", "offset", "friction_level")
-STATE_PRIOR = (
-    0.2  # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
-)
-NEAR = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
-SMALLEST = 0.5  # a width below this share of the noise cannot be seen, and makes the simulation chatter
-NEAR_BOUND = 1e-3  # of a bound, within which a fitted number rests at it
-LEAST_TAU, MOST_TAU = (
-    0.1,
-    2.0,
-)  # of a datasheet's electrical time constant, between which the baseline's is an ordinary one
-FEWEST_CYCLES = 3  # of a frequency within the longest recording: a slower swing bends to any drift
-CLOCKED = {"phase": 1.0, "time": 0.1}  # scales [rad, s] of signed parameters whose own size says nothing
 
 
 def observer_gain(rate: float, sample_time: float) -> tuple[float, int]:
@@ -42,33 +31,34 @@ def observer_gain(rate: float, sample_time: float) -> tuple[float, int]:
     return 1.0 - math.exp(-rate * every * sample_time), every
 
 
-@dataclass(frozen=True)
-class Free:
-    """One fitted number: where it lives, how it is transformed and bounded."""
-
-    owner: str
-    name: str
-    index: int
-    positive: bool
-    scale: float
-    lower: float
-    upper: float
-    prior: tuple[float, float] | None = None
-    local: bool = False
-
-    @property
-    def key(self) -> tuple[str, str, int]:
-        """What tells this number from every other one, whatever else is fitted."""
-        return self.owner, self.name, self.index // 16 if self.local else self.index if self.owner in STATES else 0
-
-    def ends(self, z: float, half: float) -> tuple[float, float]:
-        """The interval z -+ half of the transformed number, in the number's own unit."""
-        if self.positive:
-            return math.exp(min(z - half, 700)), math.exp(min(z + half, 700))
-        return (z - half) * self.scale, (z + half) * self.scale
-
-
 Columns = Mapping[tuple[str, str, int], np.ndarray]  # of a Jacobian, by the key of what is fitted
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One run of a plant: the motion (N, 4) at times t (N,), its ``ampere`` [output unit/s^2 per A], and the ``scale``
+    at which first-order changes are told.
+    """
+
+    plant: ReducedModel
+    t: np.ndarray
+    motion: np.ndarray
+    scale: float
+    ampere: float
+
+    def change(self, kind: str, shown: np.ndarray, its: ReducedModel, ampere: float, move: np.ndarray) -> np.ndarray:
+        """First-order change (N,), times the scale, of what a further channel shows of one body, from ``shown`` (N,)
+        here towards another plant and its ``ampere``, to which the motion changes by ``move``.
+        """
+        if kind != "current":
+            return move[:, 1 if kind == "speed" else 0]
+        path, scale, here, there = self.motion, self.scale, self.ampere, ampere
+        if self.plant.draws_drive and its.draws_drive:
+            return (
+                move[:, 2] / there + path[:, 2] * (scale / there - scale / here) if here != there else move[:, 2] / here
+            )
+        beside = np.column_stack([path[:, :3] + move[:, :3] / scale, path[:, 3] + move[:, 0] / scale])
+        return (its.current(self.t, beside) / there - shown) * scale
 
 
 @dataclass(frozen=True)
@@ -99,77 +89,14 @@ class Model:
 
     def layout(self) -> list[Free]:
         """Every fitted number."""
-        out = []
         held = {name for effect, _ in self.effects for name in BY_NAME[effect].absorbs}
-        for name in (n for n in self.free if n not in held):
-            positive = name != "theta_0"
-            lower, upper = (1e-9, np.inf)
-            if name == "theta_0":
-                positive, (lower, upper) = False, self._near_travel()
-            if name == "emf_share":
-                lower, upper = 0.02, 0.999
-            if name == "tau_e":
-                lower, upper = self._tau_bounds()
-            prior = (self.priors or {}).get(name)
-            out.append(Free("base", name, 0, positive, self.scales.position, lower, upper, prior))
-        for row, (effect_name, values) in enumerate(self.effects):
-            if effect_name in self.frozen:
-                continue
-            for k, parameter in enumerate(BY_NAME[effect_name].parameters):
-                if (
-                    np.isfinite(values[k])
-                    and parameter.fitted
-                    and not (parameter.per_record and effect_name in (self.local or {}))
-                ):
-                    out.append(self._of_effect(effect_name, parameter, row * 16 + k, values[k]))
-        for effect_name, rows in (self.local or {}).items():
-            if f"{effect_name}, local" in self.frozen:
-                continue
-            for k, parameter in enumerate(p for p in BY_NAME[effect_name].parameters if p.per_record):
-                out += [
-                    self._of_effect(effect_name, parameter, r * 16 + k, v, True)
-                    for r, v in enumerate(rows[:, k])
-                    if np.isfinite(v)
-                ]
-        for state, per_record in (self.states or {}).items():
-            for k in range(1, len(per_record)):
-                multiplies = state != "offset"
-                prior = (0.0, STATE_PRIOR) if multiplies else (0.0, 0.1 * STATE_PRIOR)
-                out.append(
-                    Free(
-                        state,
-                        state,
-                        k,
-                        multiplies,
-                        self.scales.position,
-                        0.2 if multiplies else -np.inf,
-                        5.0 if multiplies else np.inf,
-                        prior,
-                    )
-                )
-        return out
-
-    def _of_effect(self, name: str, parameter: Parameter, index: int, value: float, local: bool = False) -> Free:
-        scale = 1.0 if parameter.positive else CLOCKED.get(parameter.kind, max(abs(value), 1e-12))
-        most = {
-            "frequency": 1.0 / self.scales.sample_time,
-            "period": 2.0 * self.scales.position / BY_NAME[name].fewest_turns,
-        }
-        most = most.get(parameter.name if parameter.kind == "position" else parameter.kind, np.inf)
-        least = {"position": SMALLEST * self.scales.noise, "frequency": FEWEST_CYCLES / self.scales.duration}.get(
-            parameter.kind, 1e-12
-        )
-        lower = least if parameter.positive and parameter.lower <= 0.0 else parameter.lower
-        ends = self._near_travel() if parameter.on_travel else (lower, min(parameter.upper, most))
-        return Free(name, parameter.name, index, parameter.positive, scale, *ends, local=local)
-
-    def _near_travel(self) -> tuple[float, float]:
-        near = NEAR * self.scales.position
-        return self.scales.low - near, self.scales.high + near
-
-    def _tau_bounds(self) -> tuple[float, float]:
-        known = self.scales.tau_e_datasheet
-        return (LEAST_TAU * known, MOST_TAU * known) if known else (1e-6, 1.0)
+        local = self.local or {}
+        return [
+            *of_base([n for n in self.free if n not in held], self.priors or {}, self.scales),
+            *of_effects(self.effects, self.frozen, local, self.scales),
+            *of_recordings(local, self.frozen, self.scales),
+            *of_states(self.states or {}, self.scales),
+        ]
 
     def vector(self, layout: Sequence[Free]) -> np.ndarray:
         """The fitted numbers, transformed (logarithm of positive ones, others over their scale)."""
@@ -191,7 +118,7 @@ class Model:
     def at_bound(self, f: Free) -> bool:
         """Whether a fitted number rests at one of its bounds."""
         return any(
-            math.isclose(abs(self._get(f)) if f.positive else self._get(f), bound, rel_tol=NEAR_BOUND)
+            math.isclose(abs(self._get(f)) if f.positive else self._get(f), bound, rel_tol=1e-3)
             for bound in (f.lower, f.upper)
         )
 
@@ -247,7 +174,7 @@ class Model:
     @property
     def dead_time(self) -> float:
         """By how much the command reaches the motor late [s]."""
-        return float(dict(self.effects)["input_delay"][0]) if "input_delay" in self.names else 0.0
+        return sum((BY_NAME[name].dead_time(values) for name, values in self.effects), 0.0)
 
     def plant(self, record: int = 0, supply: np.ndarray | None = None) -> ReducedModel:
         """The reduced model of one recording (its record state applied), with the supply (N,) that was measured
@@ -339,6 +266,7 @@ class Model:
             plants = [other.plant(k, trace.supply) for other in others]
             moved = plant.tangents(trace.t, trace.u, path, plants, scale, **clock)
             here = self.shown(trace, plant, path)
+            course = Course(plant, trace.t, path, scale, self.values["ampere"])
             slope = trace.converter and trace.converter.slope(
                 trace.y - plant.read(trace.t, path[:, 0]) - self.offset(k)
             )
@@ -348,38 +276,10 @@ class Model:
                 if slope is not None:
                     read *= slope
                 for channel, shown, out in zip(trace.channels, here, beside):
-                    np.divide(
-                        self._shown_change(channel, trace, plant, other, its, path, move, shown, scale),
-                        channel.sigma,
-                        out=out,
-                    )
+                    change = course.change(channel.kind, shown, its, other.values["ampere"], move)
+                    np.divide(change, channel.sigma, out=out)
                 row[trace.unseen] = 0.0
         return changes.T
-
-    def _shown_change(
-        self,
-        channel: Channel,
-        trace: Trace,
-        plant: ReducedModel,
-        other: Model,
-        its: ReducedModel,
-        path: np.ndarray,
-        move: np.ndarray,
-        shown: np.ndarray,
-        scale: float,
-    ) -> np.ndarray:
-        """First-order change (N,) of what a further channel shows of one body towards another model, times ``scale``;
-        ``shown`` is what it shows here.
-        """
-        if channel.kind != "current":
-            return move[:, 1 if channel.kind == "speed" else 0]
-        if plant.draws_drive and its.draws_drive:
-            here, there = self.values["ampere"], other.values["ampere"]
-            return (
-                move[:, 2] / there + path[:, 2] * (scale / there - scale / here) if here != there else move[:, 2] / here
-            )
-        beside = np.column_stack([path[:, :3] + move[:, :3] / scale, path[:, 3] + move[:, 0] / scale])
-        return (its.current(trace.t, beside) / other.values["ampere"] - shown) * scale
 
     def staged(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
         """The plant of a recording, and how it is run along it; ``start`` is the (reading, speed) it begins with, the

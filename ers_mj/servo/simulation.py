@@ -14,6 +14,8 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, Effect, Parameter
 from ers_mj.effects.base import Coefficients
+from ers_mj.effects.input_delay import InputDelay
+from ers_mj.effects.sensor_quantisation import SensorQuantisation
 from ers_mj.errors import InputError
 from ers_mj.plants.play import stiff_play
 from ers_mj.plants.printed_play import PrintedPlay, printed_threshold
@@ -37,7 +39,6 @@ PLAIN_UNIT = {
     "supply": "V",
 }
 FORCE = {"rad": "N m", "m": "N"}
-AFTER_NOISE = ("sensor_quantisation", "sensor_dropout")  # what the converter and the wire do to a noisy signal
 
 EffectSettings = Sequence[tuple[str, Mapping[str, float]]]
 
@@ -105,8 +106,8 @@ def build_plant(
     c = lumped(_values(datasheet, inductance))
     if plant != "mujoco" and linkage != "constant":
         raise InputError(f"the reduced model has the constant linkage only, a {linkage} linkage needs --plant mujoco")
-    if gap and any(name == "backlash" for name, _ in chosen):
-        raise InputError("the play is given twice, as gap and as the effect backlash, once was expected")
+    if gap and (plays := [name for name, _ in chosen if BY_NAME[name].is_play]):
+        raise InputError(f"the play is given twice, as gap and as the effect {plays[0]}, once was expected")
     if play == "printed":
         return _printed(c, plant, chosen, gap)
     if plant == "mujoco":
@@ -193,11 +194,11 @@ def _sensed(
     """What the file holds of the true angle (N,) at times t (N,): the sensor, then its noise, then the converter."""
     y = theta
     for name, values in effects:
-        y = y if name in AFTER_NOISE else BY_NAME[name].measure(values, t, y)
+        y = y if BY_NAME[name].after_noise else BY_NAME[name].measure(values, t, y)
     if noise:
         y = y + noise * np.random.default_rng(seed).standard_normal(y.size)
     for name, values in effects:
-        y = BY_NAME[name].measure(values, t, y) if name in AFTER_NOISE else y
+        y = BY_NAME[name].measure(values, t, y) if BY_NAME[name].after_noise else y
     return y
 
 
@@ -205,7 +206,7 @@ def _sensed(
 
 
 def parse_effect(text: str) -> tuple[str, dict[str, float]]:
-    """ "end_stop:upper=0.6,f_stop=80" -> ("end_stop", {"upper": 0.6, "f_stop": 80.0}).
+    """NAME:key=value,key=value -> (NAME, {key: value}).
 
     Raises:
         InputError: not of this form, or not of this library.
@@ -227,6 +228,21 @@ def parse_effect(text: str) -> tuple[str, dict[str, float]]:
     return effect.name, values
 
 
+def delayed(seconds: float) -> tuple[str, dict[str, float]]:
+    """The effect of a command that arrives this late."""
+    return InputDelay.name, {"T_d": seconds}
+
+
+def counting(step: float) -> tuple[str, dict[str, float]]:
+    """The effect of a sensor that counts in these steps [output unit]."""
+    return SensorQuantisation.name, {"step": step}
+
+
+def has_play(effects: Iterable[tuple[str, object]]) -> bool:
+    """Whether one of these effects (name, values) is a play."""
+    return any(name in BY_NAME and BY_NAME[name].is_play for name, _ in effects)
+
+
 def _number(text: str, where: str) -> float:
     try:
         number = float(text)
@@ -246,12 +262,29 @@ def _effect(name: str) -> Effect:
 def _vector(effect: Effect, values: Mapping[str, float], inertia: float) -> np.ndarray:
     """The parameters (k,) of one effect, what is not given at its declared default."""
     known = {parameter.name: parameter for parameter in effect.parameters}
+    _refuse_strangers(effect, values, known)
+    _refuse_lacking(effect, values)
+    _refuse_halves(effect, values)
+    given = [_checked(effect, p, float(values[p.name])) if p.name in values else p.absent for p in effect.parameters]
+    ends = dict(zip(known, given, strict=True))
+    if ends.get("lower", -math.inf) >= ends.get("upper", math.inf):
+        raise InputError(f"{effect.name}: lower = {ends['lower']:g} is not below upper = {ends['upper']:g}")
+    scale = [inertia if p.kind in PER_INERTIA else 1.0 for p in effect.parameters]
+    return np.array(given) / np.array(scale)
+
+
+def _refuse_strangers(effect: Effect, values: Mapping[str, float], known: Iterable[str]) -> None:
+    """What the effect has not."""
     for key in values:
         if key not in known:
             raise InputError(
                 f"{effect.name}: there is no parameter {key[:40]!r}; {_nearest(key, known)}"
                 f"there are {_meanings(effect.parameters)}"
             )
+
+
+def _refuse_lacking(effect: Effect, values: Mapping[str, float]) -> None:
+    """Without what it does nothing."""
     needed = [p.name for p in effect.parameters if p.positive and p.absent == 0 and p.name not in values]
     if needed or not values:
         what = " and ".join(needed) or "one or more"
@@ -261,18 +294,16 @@ def _vector(effect: Effect, values: Mapping[str, float], inertia: float) -> np.n
             raise InputError(
                 f"{effect.name}: does nothing with {', '.join(values)} alone, expected {' or '.join(group)} too"
             )
+
+
+def _refuse_halves(effect: Effect, values: Mapping[str, float]) -> None:
+    """What says something only together."""
     for group in effect.together:
         if lacking := [key for key in group if key not in values and values.keys() & set(group)]:
             raise InputError(
                 f"{effect.name}: {', '.join(key for key in group if key in values)} given without"
                 f" {' and '.join(lacking)}, expected {', '.join(group)} together"
             )
-    given = [_checked(effect, p, float(values[p.name])) if p.name in values else p.absent for p in effect.parameters]
-    ends = dict(zip(known, given, strict=True))
-    if ends.get("lower", -math.inf) >= ends.get("upper", math.inf):
-        raise InputError(f"{effect.name}: lower = {ends['lower']:g} is not below upper = {ends['upper']:g}")
-    scale = [inertia if p.kind in PER_INERTIA else 1.0 for p in effect.parameters]
-    return np.array(given) / np.array(scale)
 
 
 def _checked(effect: Effect, parameter: Parameter, x: float) -> float:

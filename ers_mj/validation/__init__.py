@@ -1,1 +1,1 @@
-"""The reduced model against the mechanical plant."""
+"""Where the reduced model stops being valid: both plants under the same voltages, in cases and in maps."""

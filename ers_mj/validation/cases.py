@@ -16,22 +16,36 @@ import numpy as np
 from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
 from ers_mj.plants.mechanical import simulate_many
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.simulation import build_plant, finite
+from ers_mj.servo.simulation import build_plant, finite, has_play
 
 GAPS, LINKAGES, INDUCTANCES = (0.0, float(np.radians(0.5))), ("constant", "rod"), (False, True)  # [rad] of play
-AMPLITUDES, FREQUENCIES_HZ = (
-    (1.1, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0),
-    (0.5, 1.0, 2.0, 4.0, 8.0, 16.0),
-)  # of the maps' sines; in breakaways
-MAP_GAPS_DEG, MAP_L_FACTORS = (
-    (0.0, 0.1, 0.25, 0.5, 1.0),
-    (0.0, 0.5, 1.0, 2.0, 4.0),
-)  # play, and L in units of the datasheet's
-SINE_S, PLAY_S = 2.0, 3.0  # [s] of a run of either map
-MOST_TRAVEL = np.radians(60)  # about theta_0, beyond which a sine's cell is left empty
-STILL = 1e-4  # [rad] of motion below which nothing is told relative to it
-MAP_SHARE = 0.35  # of the work, in the progress
 Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What the maps are made of.
+
+    Attributes:
+        amplitudes, frequencies_hz: of the sines; amplitudes in breakaways.
+        sine_s: how long a sine runs [s].
+        most_travel: about theta_0 [rad], beyond which a sine's cell is left empty.
+        gaps_deg, L_factors: play, and the inductance in units of the datasheet's.
+        play_s: how long the multisine over them runs [s].
+        share: of a validation's work that the maps take, for its progress.
+    """
+
+    amplitudes: tuple[float, ...] = (1.1, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
+    frequencies_hz: tuple[float, ...] = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+    sine_s: float = 2.0
+    most_travel: float = float(np.radians(60))
+    gaps_deg: tuple[float, ...] = (0.0, 0.1, 0.25, 0.5, 1.0)
+    L_factors: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0, 4.0)
+    play_s: float = 3.0
+    share: float = 0.35
+
+
+GRID = Grid()
 
 
 @dataclass(frozen=True)
@@ -116,8 +130,8 @@ class ValidityMap:
 
     @property
     def relative(self) -> np.ndarray:
-        """rms over motion (X, Y), NaN where nothing moves."""
-        return self.rms / np.where(self.motion > STILL, self.motion, np.nan)
+        """rms over motion (X, Y), NaN where it moves by less than 1e-4 rad."""
+        return self.rms / np.where(self.motion > 1e-4, self.motion, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +155,7 @@ def possible(datasheet: Datasheet) -> tuple[tuple[float, ...], tuple[str, ...], 
     """
     p, left_out = datasheet.parameters, []
     gaps, linkages, inductances = GAPS, LINKAGES, INDUCTANCES
-    if _has_play(datasheet):
+    if has_play(datasheet.effects):
         gaps = (0.0,)
         left_out.append("a gap, as the model has a play of its own")
     if not all(p.get(name, 0.0) > 0.0 for name in ("J", "n", "K_t")):
@@ -153,17 +167,13 @@ def possible(datasheet: Datasheet) -> tuple[tuple[float, ...], tuple[str, ...], 
     return gaps, linkages, inductances, left_out
 
 
-def _has_play(datasheet: Datasheet) -> bool:
-    return any(name == "backlash" for name, _ in datasheet.effects)
-
-
 def validate(
     datasheet: Datasheet,
     gaps: Sequence[float] = GAPS,
     linkages: Sequence[str] = LINKAGES,
     inductances: Sequence[bool] = INDUCTANCES,
     *,
-    maps: bool = True,
+    maps: Grid | None = GRID,
     jobs: int = 0,
     duration: float = DURATION,
     progress: Progress = lambda text, fraction: None,
@@ -172,7 +182,7 @@ def validate(
 
     Args:
         datasheet: the servo; effects that it holds act in both plants.
-        maps: whether the maps are run.
+        maps: what the maps are made of; None for no maps.
         jobs: cores to use, 0 for all.
         duration: of each input [s].
         progress: told (text, fraction).
@@ -185,16 +195,16 @@ def validate(
     conditions = [Condition(*values) for values in product(gaps, linkages, inductances)]
     for condition in conditions:  # what cannot be built is refused before anything runs
         _mujoco(datasheet, condition)
-    share, cases = 1.0 - MAP_SHARE * maps, []
+    share, cases = 1.0 - (maps.share if maps else 0.0), []
     for k, condition in enumerate(conditions):
         progress(f"simulating {spoken(condition)}", share * k / len(conditions))
         cases += _cases(datasheet, condition, t, inputs, jobs)
-    if not maps:
+    if maps is None:
         return Validation(tuple(cases), datasheet.to_lumped())
     return Validation(
         tuple(cases),
         datasheet.to_lumped(),
-        *_maps(datasheet, conditions, jobs, lambda text, x: progress(text, share + MAP_SHARE * x)),
+        *_maps(datasheet, conditions, maps, jobs, lambda text, x: progress(text, share + maps.share * x)),
     )
 
 
@@ -242,22 +252,22 @@ def mapped(conditions: Sequence[Condition]) -> list[Condition]:
     return [c for c in single if c.gap == widest or not c.gap] or [c for c in conditions if c.departures][:1]
 
 
-def _maps(datasheet: Datasheet, conditions: Sequence[Condition], jobs: int, progress: Progress):
+def _maps(datasheet: Datasheet, conditions: Sequence[Condition], grid: Grid, jobs: int, progress: Progress):
     """(maps over sines, map over play and L or None)."""
     chosen = mapped(conditions)
     over_play = (
         any(c.gap or c.inductance for c in conditions)
         and datasheet.parameters.get("L", 0.0) > 0.0
-        and not _has_play(datasheet)
+        and not has_play(datasheet.effects)
     )
     sines = []
     for k, condition in enumerate(chosen):
         progress(f"mapping {spoken(condition)}", k / (len(chosen) + over_play))
-        sines.append(_sine_map(datasheet, condition, jobs))
+        sines.append(_sine_map(datasheet, condition, grid, jobs))
     if not over_play:
         return tuple(sines), None
     progress("mapping play and inductance", len(chosen) / (len(chosen) + 1))
-    return tuple(sines), _play_map(datasheet, jobs)
+    return tuple(sines), _play_map(datasheet, grid, jobs)
 
 
 def breakaway(lumped: Mapping[str, float]) -> float:
@@ -265,28 +275,28 @@ def breakaway(lumped: Mapping[str, float]) -> float:
     return (lumped.get("c_1", 0.0) + lumped.get("c_2", 0.0)) / abs(lumped["b"]) or 1.0
 
 
-def _sine_map(datasheet: Datasheet, condition: Condition, jobs: int) -> ValidityMap:
-    """Over amplitude [V] and frequency [Hz] of a sine; empty where Eq. (5) leaves MOST_TRAVEL."""
-    t = np.arange(round(SINE_S * RATE_HZ)) / RATE_HZ
-    amplitudes = tuple(float(f"{breakaway(datasheet.to_lumped()) * factor:.2g}") for factor in AMPLITUDES)
-    cells = list(product(range(len(amplitudes)), range(len(FREQUENCIES_HZ))))
-    u = np.array([amplitudes[i] * np.sin(2 * np.pi * FREQUENCIES_HZ[j] * t) for i, j in cells])
+def _sine_map(datasheet: Datasheet, condition: Condition, grid: Grid, jobs: int) -> ValidityMap:
+    """Over amplitude [V] and frequency [Hz] of a sine; empty where Eq. (5) travels too far."""
+    t = np.arange(round(grid.sine_s * RATE_HZ)) / RATE_HZ
+    amplitudes = tuple(float(f"{breakaway(datasheet.to_lumped()) * factor:.2g}") for factor in grid.amplitudes)
+    cells = list(product(range(len(amplitudes)), range(len(grid.frequencies_hz))))
+    u = np.array([amplitudes[i] * np.sin(2 * np.pi * grid.frequencies_hz[j] * t) for i, j in cells])
     eq_5 = np.array([build_plant(datasheet).simulate(t, row).theta for row in u])
-    within = np.flatnonzero(np.abs(eq_5 - eq_5[:, :1]).max(axis=1) <= MOST_TRAVEL)
-    error, motion = np.full((2, len(amplitudes), len(FREQUENCIES_HZ)), np.nan)
+    within = np.flatnonzero(np.abs(eq_5 - eq_5[:, :1]).max(axis=1) <= grid.most_travel)
+    error, motion = np.full((2, len(amplitudes), len(grid.frequencies_hz)), np.nan)
     if within.size:
         for k, run in zip(within, simulate_many([_mujoco(datasheet, condition)], t, u[within], jobs), strict=True):
             error[cells[k]], motion[cells[k]] = rms(run.theta - eq_5[k]), run.theta.std()
-    return ValidityMap(condition, amplitudes, FREQUENCIES_HZ, error, motion)
+    return ValidityMap(condition, amplitudes, grid.frequencies_hz, error, motion)
 
 
-def _play_map(datasheet: Datasheet, jobs: int) -> ValidityMap:
+def _play_map(datasheet: Datasheet, grid: Grid, jobs: int) -> ValidityMap:
     """Over play [rad] and inductance [H], under the multisine."""
-    t = np.arange(round(PLAY_S * RATE_HZ)) / RATE_HZ
+    t = np.arange(round(grid.play_s * RATE_HZ)) / RATE_HZ
     u, L = INPUTS["multisine"](t), datasheet.parameters["L"]
-    inductances = tuple(factor * L for factor in MAP_L_FACTORS)
+    inductances = tuple(factor * L for factor in grid.L_factors)
     eq_5 = build_plant(datasheet).simulate(t, u).theta
-    gaps = tuple(np.radians(MAP_GAPS_DEG).tolist())
+    gaps = tuple(np.radians(grid.gaps_deg).tolist())
     plants = [
         _mujoco(replace(datasheet, parameters={**datasheet.parameters, "L": x}), Condition(gap, "constant", x > 0))
         for gap, x in product(gaps, inductances)

@@ -15,12 +15,29 @@ from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.view.rendering import Painter, jpeg_bytes
 from ers_mj.view.replay import posed
 
-MOMENTS = 3
-APART = 0.1  # of a recording, least distance of two moments
-WIDTH, HEIGHT = 480, 360  # [pixels]
-VISIBLE = math.radians(6)  # what the largest difference is enlarged to, at least
 ENLARGED = (1, 2, 5, 10, 20, 50)
-WORTHWHILE = 4.0  # a mismatch is shown from so many times the noise
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which moments are shown, and how.
+
+    Attributes:
+        moments: how many.
+        apart: least distance of two, as a share of the recording.
+        worthwhile: a mismatch is shown from so many times the noise.
+        visible: what the largest difference is enlarged to, at least [rad].
+        size: width and height of a picture [pixels].
+    """
+
+    moments: int = 3
+    apart: float = 0.1
+    worthwhile: float = 4.0
+    visible: float = math.radians(6)
+    size: tuple[int, int] = (480, 360)
+
+
+CHOICE = Choice()
 
 
 @dataclass(frozen=True)
@@ -58,9 +75,9 @@ def frames_of(plant: MechanicalPlant, evidence: Evidence) -> Frames | None:
     chosen = worst_moments(view)
     error = np.abs(view.before - view.measured)[chosen]
     gained = np.nan_to_num(np.abs(view.before - view.after)[chosen])
-    if not chosen.size or max(gained) <= WORTHWHILE * np.nan_to_num(evidence.noise):
+    if not chosen.size or max(gained) <= CHOICE.worthwhile * np.nan_to_num(evidence.noise):
         return None
-    enlarged = next((times for times in ENLARGED if times * error.max() >= VISIBLE), ENLARGED[-1])
+    enlarged = next((times for times in ENLARGED if times * error.max() >= CHOICE.visible), ENLARGED[-1])
     try:
         return Frames(view.name, _drawn(plant, view, chosen, enlarged), enlarged)
     except InputError as error:
@@ -68,13 +85,13 @@ def frames_of(plant: MechanicalPlant, evidence: Evidence) -> Frames | None:
 
 
 def worst_moments(view: RecordView) -> np.ndarray:
-    """Samples (at most MOMENTS,), in their order, of the largest differences before, each APART from the others."""
+    """Samples (M,), in their order, of the largest differences before, apart from each other."""
     left = np.abs(view.measured - view.before) + 0.0 * view.after
     chosen = []
-    while len(chosen) < MOMENTS and np.isfinite(left).any():
+    while len(chosen) < CHOICE.moments and np.isfinite(left).any():
         k = int(np.nanargmax(left))
         chosen.append(k)
-        left[np.abs(view.t - view.t[k]) < APART * (view.t[-1] - view.t[0])] = np.nan
+        left[np.abs(view.t - view.t[k]) < CHOICE.apart * (view.t[-1] - view.t[0])] = np.nan
     return np.array(sorted(chosen), int)
 
 
@@ -82,7 +99,7 @@ def _drawn(plant: MechanicalPlant, view: RecordView, chosen: np.ndarray, enlarge
     t, measured, before, after = (x[chosen] for x in (view.t, view.measured, view.before, view.after))
     shown = np.concatenate([measured + enlarged * (x - measured) for x in (before, after)])
     film = posed(plant, np.concatenate([t, t]), shown)
-    with Painter(film.model, WIDTH, HEIGHT) as painter:
+    with Painter(film.model, *CHOICE.size) as painter:
         pictures = [
             jpeg_bytes(painter.draw(qpos, y))
             for qpos, y in zip(film.qpos, np.concatenate([measured, measured]), strict=True)
@@ -90,5 +107,5 @@ def _drawn(plant: MechanicalPlant, view: RecordView, chosen: np.ndarray, enlarge
     rows = zip(t, measured, before, after, strict=True)
     return tuple(
         Frame(*map(float, row), *both)
-        for row, both in zip(rows, zip(pictures[: t.size], pictures[t.size :]), strict=True)
+        for row, both in zip(rows, zip(pictures[: t.size], pictures[t.size :], strict=True), strict=True)
     )

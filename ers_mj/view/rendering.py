@@ -17,8 +17,6 @@ from ers_mj.view.replay import Replay
 
 MEASURED = (1.0, 0.72, 0.10, 0.50)  # of the ghost, translucent: what was measured lies over what was simulated
 INK, AMBER = (31, 42, 55), (140, 84, 0)  # of the words: simulated, measured
-INFLATED = 6e-4  # [m] by which a ghost is thicker than the rudder, so that both are seen where they coincide
-MOST_SHAPES = 2000
 INSTALL = "install EGL (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), or libosmesa6 and set MUJOCO_GL=osmesa"
 
 
@@ -32,7 +30,7 @@ class Painter:
     def __init__(self, model: mujoco.MjModel, width: int, height: int):
         self.model, self.width, self.height = model, width, height
         self.data, self.other = mujoco.MjData(model), mujoco.MjData(model)
-        self.option, self.scene = mujoco.MjvOption(), mujoco.MjvScene(model, MOST_SHAPES)
+        self.option, self.scene = mujoco.MjvOption(), mujoco.MjvScene(model, 2000)
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         try:
             self.context = _context_class()(width, height)
@@ -100,7 +98,8 @@ def add_ghost(model: mujoco.MjModel, data: mujoco.MjData, scene: mujoco.MjvScene
     first, count = model.body("rudder").geomadr[0], model.body("rudder").geomnum[0]
     for k in range(first, first + count):
         shape = scene.geoms[scene.ngeom]
-        size = model.geom_size[k] + INFLATED * (model.geom_size[k] > 0)
+        # thicker than the rudder [m], so that both are seen where they coincide
+        size = model.geom_size[k] + 6e-4 * (model.geom_size[k] > 0)
         mujoco.mjv_initGeom(
             shape, model.geom_type[k], size, data.geom_xpos[k], data.geom_xmat[k], np.array(MEASURED, np.float32)
         )

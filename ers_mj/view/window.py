@@ -14,7 +14,6 @@ from ers_mj.view.rendering import add_ghost
 from ers_mj.view.replay import Replay
 
 INSTEAD = "give --render FILE.png or FILE.gif for a picture"
-PAUSE = 0.5  # [s] between the end of a motion and its repetition
 
 
 def refuse_no_display() -> None:
@@ -51,13 +50,14 @@ def open_window(replay: Replay) -> None:
         ) from None
 
 
-def _repeat(replay: Replay) -> None:
+def _repeat(replay: Replay, pause: float = 0.5) -> None:
+    """The motion over and over, with a pause [s] after its end."""
     import mujoco.viewer
 
     data, scratch, begin = at_home(replay.model), mujoco.MjData(replay.model), time.perf_counter()
     with mujoco.viewer.launch_passive(replay.model, data) as window:
         while window.is_running():
-            now = math.fmod(time.perf_counter() - begin, float(replay.t[-1]) + PAUSE)
+            now = math.fmod(time.perf_counter() - begin, float(replay.t[-1]) + pause)
             k = min(int(replay.t.searchsorted(now)), replay.t.size - 1)
             with window.lock():
                 data.qpos = replay.qpos[k]

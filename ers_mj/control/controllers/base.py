@@ -1,5 +1,6 @@
 """What every controller is: reference with its derivatives and one measurement in, one voltage out, sample by sample.
- A member of this folder declares ``name``, ``sentence`` and ``law``. The base brings what all of them need alike: the
+
+A member of this folder declares ``name``, ``sentence`` and ``law``. The base brings what all of them need alike: the
 filtered difference that makes a speed of the measured angle, the integral, the saturation, and an integral that stands
 still while the saturation would only deepen. The letters are Eq. (7)'s: x1 = int x2 dt, x2 = theta_r - theta, x3 =
 theta_r' - w.
@@ -15,9 +16,6 @@ from typing import ClassVar, NamedTuple
 from ers_mj.errors import InputError
 from ers_mj.servo.datasheet import TABLE_1, Datasheet
 
-SLIP = 0.05  # [rad/s] above which the sign of the speed is taken for the sign of the friction
-STICK_BAND = math.radians(0.02)  # [rad] of x2 over which the friction's compensation grows while the rudder sticks
-SIDE_BAND = math.radians(0.05)  # [rad] from theta_0 over which the preload changes its sign
 FILTER_S = 5e-4  # [s] time constant of the speed's filter where none is given
 LETTERS = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 
@@ -43,7 +41,17 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Servo:
-    """Eq. (6) as a controller knows it: a_1 [1/s^2], a_2 [1/s], b [rad/s^2/V], c_1, c_2 [rad/s^2], theta_0 [rad]."""
+    """Eq. (6) as a controller knows it: a_1 [1/s^2], a_2 [1/s], b [rad/s^2/V], c_1, c_2 [rad/s^2], theta_0 [rad].
+
+    Attributes:
+        slip: speed [rad/s] above which its sign is taken for the sign of the friction.
+        stick_band: x2 [rad] over which the friction's compensation grows while the rudder sticks.
+        side_band: angle [rad] from theta_0 over which the preload changes its sign.
+    """
+
+    slip: ClassVar[float] = 0.05
+    stick_band: ClassVar[float] = math.radians(0.02)
+    side_band: ClassVar[float] = math.radians(0.05)
 
     a_1: float = 0.0
     a_2: float = 0.0
@@ -68,19 +76,17 @@ class Servo:
         return cls(**{letter: lumped[letter] for letter in LETTERS if letter in lumped})
 
     def spring(self, theta: float) -> float:
-        """Spring and preload a_1 (theta - theta_0) + c_1 Sgn(theta - theta_0) [rad/s^2], the sign smooth over
-        SIDE_BAND.
-        """
+        """Spring and preload a_1 (theta - theta_0) + c_1 Sgn(theta - theta_0) [rad/s^2], the sign smooth."""
         phi = theta - self.theta_0
-        return self.a_1 * phi + self.c_1 * math.tanh(phi / SIDE_BAND)
+        return self.a_1 * phi + self.c_1 * math.tanh(phi / self.side_band)
 
     def friction(self, omega: float, x2: float) -> float:
         """c_2 Sgn(w) [rad/s^2], stick-aware: where the rudder rests, in proportion to the error that it should
         leave.
         """
-        if abs(omega) > SLIP:
+        if abs(omega) > self.slip:
             return math.copysign(self.c_2, omega)
-        return self.c_2 * min(max(x2 / STICK_BAND, -1.0), 1.0)
+        return self.c_2 * min(max(x2 / self.stick_band, -1.0), 1.0)
 
     def feed_forward(self, s: State) -> float:
         """theta_r'' + a_1 (theta - theta_0) + a_2 w + c_1 Sgn(theta - theta_0) + c_2 Sgn(w) [rad/s^2]: the torque of

@@ -13,7 +13,6 @@ def sig(x: float, p: float) -> float:
     return abs(x) ** p if x >= 0 else -(abs(x) ** p)
 
 
-LARGEST = 1e9  # of a gain
 NAMES = ("q", "k_1", "k_2", "k_3", "l", *(f"gamma_{k}" for k in range(1, 8)))
 
 
@@ -29,7 +28,7 @@ class Gains:
     k_1: float = 0.25
     k_2: float = 38.0
     k_3: float = 400.0
-    l: float = 0.00019  # noqa: E741  the paper's letter
+    l: float = 0.00019
     gamma: tuple[float, ...] = (0.03, 1.0, 20.0, 1.0, 15.0, 10.0, 54.0)
 
     def __post_init__(self):
@@ -62,6 +61,7 @@ def parse_gains(text: str) -> Gains:
         InputError: not of this form, or gains that no law can have.
     """
     given: dict = {}
+    largest = 1e9
     gamma, named = list(Gains.gamma), set()
     for pair in filter(None, (part.strip() for part in text.split(","))):
         key, mark, value = (part.strip() for part in pair.partition("="))
@@ -76,8 +76,8 @@ def parse_gains(text: str) -> Gains:
         if key in named:
             raise InputError(f"--gains gives {key} twice, once was expected")
         named.add(key)
-        if abs(x) > LARGEST:
-            raise InputError(f"--gains: {key} = {value[:40]} is beyond {LARGEST:g}")
+        if abs(x) > largest:
+            raise InputError(f"--gains: {key} = {value[:40]} is beyond {largest:g}")
         if key.startswith("gamma_"):
             gamma[int(key[6:]) - 1] = float(x)
         else:

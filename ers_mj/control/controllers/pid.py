@@ -15,7 +15,7 @@ class PidGains:
     """
 
     P: float = 5.0
-    I: float = 1.2  # noqa: E741  the letter that it has everywhere
+    I: float = 1.2
     D: float = 0.1
 
     def as_document(self) -> dict[str, float]:

@@ -1,10 +1,12 @@
 """Limit cycles: those that the describing functions predict, and the one that the simulated loop shows.
 
-    motor's side   Z_m theta_m + tau = drive,   Z_m = rho s^2 + beta a_mech s + a_emf s / (1 + tau_e s) rudder
-    Z_l theta = tau,             Z_l = (1 - rho) s^2 + (1 - beta) a_mech s + a_1 + N_friction(E) + N_preload(E) play
-    tau = N_contact(A, w) (theta_m - theta) drive          -H C(E) N_limit(|C| E) theta,  H = b (1 - e^(-s h)) / (s h)
-    e^(-s delay) / (1 + tau_e s)
- with E the rudder's amplitude and A the twist's. A cycle of frequency w and amplitude E balances both lines; without
+    motor's side   Z_m theta_m + tau = drive,   Z_m = rho s^2 + beta a_mech s + a_emf s / (1 + tau_e s)
+    rudder         Z_l theta = tau,
+                   Z_l = (1 - rho) s^2 + (1 - beta) a_mech s + a_1 + N_friction(E) + N_preload(E)
+    play           tau = N_contact(A, w) (theta_m - theta)
+    drive          -H C(E) N_limit(|C| E) theta,  H = b (1 - e^(-s h)) / (s h) e^(-s delay) / (1 + tau_e s)
+
+with E the rudder's amplitude and A the twist's. A cycle of frequency w and amplitude E balances both lines; without
 play theta_m = theta. It lasts where a larger E damps it: Im(R_E / R_w) < 0 of the residual R(w, E), the quasi-static
 criterion of Gelb and Vander Velde.
 """
@@ -22,18 +24,35 @@ from scipy.optimize import root
 
 from ers_mj.control.closed_loop import Sampled, Sensor, close
 from ers_mj.control.controllers import Controller
-from ers_mj.control.frequency.describing import ROOM, contact, controller_response, coulomb, preload, saturation
+from ers_mj.control.frequency.describing import contact, controller_response, coulomb, highest_hz, preload, saturation
 from ers_mj.control.references import Reference
 from ers_mj.effects.base import Coefficients
 
-FROM_HZ, TO_HZ = 2.0, 500.0  # where cycles are looked for, below half the sample rate
-LEAST, MOST = math.radians(0.02), math.radians(20.0)  # [rad] amplitudes of the rudder
-ASKED_HZ, ASKED_E = 24, 7  # grid on which the controller is asked
-LOOKED_HZ, LOOKED_E = 120, 48  # grid on which the balance is looked at
-WIDEST, TWISTS = 1e4, 300  # times the play: the widest twist that is looked at, and how many up to there
-LASTS = 0.9  # share of its size that a cycle keeps from one quarter of the time to the next
-SEEN = math.radians(0.01)  # [rad] amplitude from which a cycle counts as seen
-KICK_SHARE = 0.25  # of the time, after which a loop has forgotten how it was let go
+
+@dataclass(frozen=True)
+class Grid:
+    """Where cycles are looked for.
+
+    Attributes:
+        from_hz, to_hz: frequencies, below half the sample rate.
+        least, most: amplitudes of the rudder [rad].
+        asked: numbers of frequencies and amplitudes at which the controller is asked.
+        looked: those at which the balance is looked at.
+        twists: how many, up to the widest.
+        widest: twist, in times of the play.
+    """
+
+    from_hz: float = 2.0
+    to_hz: float = 500.0
+    least: float = math.radians(0.02)
+    most: float = math.radians(20.0)
+    asked: tuple[int, int] = (24, 7)
+    looked: tuple[int, int] = (120, 48)
+    twists: int = 300
+    widest: float = 1e4
+
+
+GRID = Grid()
 
 
 @dataclass(frozen=True)
@@ -59,8 +78,8 @@ def predicted(controller: Controller, c: Coefficients, centre: float) -> list[Cy
         c: the plant. What holds it at its centre is taken as constant.
         centre: where the reference stands.
     """
-    top = min(TO_HZ, ROOM / controller.h)
-    f_hz, E = np.geomspace(FROM_HZ, top, ASKED_HZ), np.geomspace(LEAST, MOST, ASKED_E)
+    top = min(GRID.to_hz, highest_hz(controller.h))
+    f_hz, E = np.geomspace(GRID.from_hz, top, GRID.asked[0]), np.geomspace(GRID.least, GRID.most, GRID.asked[1])
     C = _surface(f_hz, E, np.array([controller_response(controller, centre, e, f_hz) for e in E]).T)
 
     def left(f: float, e: float) -> complex:
@@ -94,13 +113,13 @@ def residual(c: Coefficients, h: float, centre: float, C: complex, f_hz: float, 
         return complex(s * s + c.a_mech_plus * s + c.a_emf * s / lag + c.a_1 + N + held * C)
     Z_l = (1.0 - c.rho) * s * s + (1.0 - c.beta) * c.a_mech_plus * s + c.a_1 + N
     Z_m = c.rho * s * s + c.beta * c.a_mech_plus * s + c.a_emf * s / lag
-    passed = _passed(c, w, abs(Z_l) * E)
-    if passed is None:
+    through = passed(c, w, abs(Z_l) * E)
+    if through is None:
         return complex(math.nan, math.nan)
-    return complex(Z_m * (1.0 + Z_l / passed) + Z_l + held * C)
+    return complex(Z_m * (1.0 + Z_l / through) + Z_l + held * C)
 
 
-def _passed(c: Coefficients, w: float, torque: float) -> complex | None:
+def passed(c: Coefficients, w: float, torque: float) -> complex | None:
     """N of the contact [1/s^2] at the twist by which it passes this much [rad/s^2]; None where no twist does."""
     if c.gap <= 0 and c.harden <= 0:
         return c.k_twist + 1j * w * c.d_twist
@@ -111,11 +130,11 @@ def _passed(c: Coefficients, w: float, torque: float) -> complex | None:
     return complex(np.interp(at, np.log(torques), N.real), np.interp(at, np.log(torques), N.imag))
 
 
-@lru_cache(maxsize=4 * LOOKED_HZ)
+@lru_cache(maxsize=4 * GRID.looked[0])
 def _contacts(k: float, d: float, gap: float, harden: float, w: float) -> tuple[np.ndarray, np.ndarray]:
-    """What the contact passes (X,) [rad/s^2] of twists just beyond the play up to WIDEST times it, and its N (X,); of a
+    """What the contact passes (X,) [rad/s^2] of twists just beyond the play up to the widest, and its N (X,); of a
     shaft that hardens, of twists as small against that at which it takes twice the torque."""
-    spread = np.geomspace(1e-4, WIDEST, TWISTS)
+    spread = np.geomspace(1e-4, GRID.widest, GRID.twists)
     if harden > 0:
         twist = spread / np.sqrt(harden)
         N = k * (1.0 + 0.75 * harden * twist**2) + 1j * w * d  # of a cube: Gelb and Vander Velde 1968
@@ -125,17 +144,17 @@ def _contacts(k: float, d: float, gap: float, harden: float, w: float) -> tuple[
     return np.abs(N) * twist, N
 
 
-def balanced(residual: Callable[[float, float], complex], to_hz: float = TO_HZ) -> list[Cycle]:
+def balanced(residual: Callable[[float, float], complex], to_hz: float = GRID.to_hz) -> list[Cycle]:
     """Where a residual of (frequency [Hz], amplitude [rad]) vanishes up to to_hz, those that last first."""
-    f_hz, E = np.geomspace(FROM_HZ, to_hz, LOOKED_HZ), np.geomspace(LEAST, MOST, LOOKED_E)
+    f_hz, E = np.geomspace(GRID.from_hz, to_hz, GRID.looked[0]), np.geomspace(GRID.least, GRID.most, GRID.looked[1])
     R = np.array([[residual(f, e) for e in E] for f in f_hz])
     ends = np.log([[f_hz[0], E[0]], [f_hz[-1], E[-1]]])
-    at = lambda z: residual(*np.exp(np.clip(z, *ends)).tolist())  # noqa: E731
+    at = lambda z: residual(*np.exp(np.clip(z, *ends)).tolist())
     found: list[Cycle] = []
     for i, j in np.argwhere(_turns(R.real) & _turns(R.imag)):
         start = np.log([math.sqrt(f_hz[i] * f_hz[i + 1]), math.sqrt(E[j] * E[j + 1])])
         size = abs(R[i, j])
-        solved = root(lambda z: [at(z).real / size, at(z).imag / size], start, tol=1e-10)
+        solved = root(lambda z, size=size: [at(z).real / size, at(z).imag / size], start, tol=1e-10)
         f, e = np.exp(np.clip(solved.x, *ends)).tolist()
         inside = bool((ends[0] < solved.x).all() and (solved.x < ends[1]).all())
         if (
@@ -174,7 +193,8 @@ def simulated(
 
 def lasting(theta: np.ndarray, h: float) -> Cycle | None:
     """The oscillation (N,) [rad], sampled at h [s], that is still there at the end; None where it dies out, grows out
-    of bounds or never is.
+    of bounds or never is: where it keeps less than 0.9 of its size from one quarter of the time to the next, or its
+    amplitude is below 0.01 degrees.
     """
     quarter = theta.size // 4
     before, last = theta[-2 * quarter : -quarter], theta[-quarter:]
@@ -183,7 +203,7 @@ def lasting(theta: np.ndarray, h: float) -> Cycle | None:
     last, before = last - last.mean(), before - before.mean()
     up = np.flatnonzero((last[:-1] < 0) & (last[1:] >= 0))
     amplitude = 0.5 * float(np.ptp(last))
-    if up.size < 4 or amplitude < SEEN or last.std() < LASTS * before.std():
+    if up.size < 4 or amplitude < math.radians(0.01) or last.std() < 0.9 * before.std():
         return None
     crossing = up - last[up] / (last[up + 1] - last[up])
     return Cycle(float((up.size - 1) / (h * (crossing[-1] - crossing[0]))), amplitude)

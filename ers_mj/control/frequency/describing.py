@@ -1,5 +1,6 @@
 """What is not linear, at one amplitude: the first harmonic out over the sine in.
- Of an angle E sin(wt) about a centre, each nonlinearity's N [1/s^2] stands beside the inertia: theta'' + N theta = ...
+
+Of an angle E sin(wt) about a centre, each nonlinearity's N [1/s^2] stands beside the inertia: theta'' + N theta = ...
 ; 4/pi terms as in Gelb and Vander Velde, Multiple-Input Describing Functions, 1968. A controller is described as it
 runs: sample by sample, with its filter or observer.
 """
@@ -13,9 +14,10 @@ import numpy as np
 from ers_mj.control.controllers import Aim, Controller
 from ers_mj.control.frequency.linear import LinearPlant
 
-POINTS = 256  # of a quarter period, over a contact
-CYCLES, LEAST_S = 2, 0.05  # of a sine that a controller answers, counted after as many again
-ROOM = 0.47  # of the sample rate, up to which a controller is asked
+
+def highest_hz(h: float) -> float:
+    """Up to where a controller of this sample time [s] is asked: almost half its sample rate."""
+    return 0.47 / h
 
 
 def coulomb(c_2: float, amplitude):
@@ -52,13 +54,14 @@ def contact(k: float, d: float, gap: float, amplitude: np.ndarray, omega: float)
     k [1/s^2] and d [1/s] per total inertia. The spring-damper pushes and never pulls; without d this is k times the
     dead zone's 1 - (2/pi) (asin(g/A) + (g/A) sqrt(1 - (g/A)^2)).
     """
-    quarter = 0.5 * math.pi * (np.arange(POINTS) + 0.5) / POINTS
+    points = 256  # of a quarter period
+    quarter = 0.5 * math.pi * (np.arange(points) + 0.5) / points
     phase = np.concatenate([quarter, quarter + 0.5 * math.pi])  # the other half period is its mirror image
     depth = np.multiply.outer(amplitude, np.sin(phase)) - gap
     force = np.where(
         depth > 0, np.maximum(k * depth + d * omega * np.multiply.outer(amplitude, np.cos(phase)), 0.0), 0.0
     )
-    return (force @ np.sin(phase) + 1j * (force @ np.cos(phase))) / (POINTS * np.asarray(amplitude))
+    return (force @ np.sin(phase) + 1j * (force @ np.cos(phase))) / (points * np.asarray(amplitude))
 
 
 def saturation(limit: float, amplitude: float) -> float:
@@ -84,8 +87,9 @@ def controller_response(controller: Controller, centre: float, amplitude: float,
 
 
 def _answer(controller: Controller, centre: float, amplitude: float, f_hz: float) -> complex:
+    """Two cycles or 0.05 s of a sine, whichever is longer, counted after as many again."""
     h = controller.h
-    counted = max(round(CYCLES / (f_hz * h)), round(LEAST_S / h))
+    counted = max(round(2 / (f_hz * h)), round(0.05 / h))
     t = h * np.arange(2 * counted)
     phase = 2.0 * math.pi * f_hz * t
     controller.reset(centre + amplitude)

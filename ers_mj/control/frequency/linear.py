@@ -3,7 +3,8 @@ own derivatives.
 
     plant, point -> x' = A x + B (voltage, load), theta = C x -> the same from sample to sample, held, with the
     command's delay
- Where a plant slips, its Coulomb friction and its preload are constant and drop out; a play is closed. Laws of effects
+
+Where a plant slips, its Coulomb friction and its preload are constant and drop out; a play is closed. Laws of effects
 enter with their slopes at the point.
 """
 
@@ -24,17 +25,6 @@ from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.mjcf import unlogged
 from ers_mj.plants.reduced import ReducedModel
 
-SLIP = 1.0  # [rad/s] of the point
-NUDGE = 1e-5  # of the point, for slopes of laws
-EPSILONS = (
-    1e-7,
-    1e-8,
-    3e-9,
-    1e-9,
-)  # of MuJoCo's finite differences: the first that its rigid contacts bear, which give little under their loads
-BURST = 1.01  # growth in one step beyond which a difference has opened a contact
-SETTLE_S = 0.1  # before them, so that contacts and couplings carry their loads
-PADE = 4  # order of a dead time where no sample time is given
 Move = Callable[[float], tuple[np.ndarray, np.ndarray]]  # time [s] -> (transition, effect of held inputs)
 
 
@@ -72,10 +62,9 @@ def at(system: control.StateSpace, f_hz: np.ndarray) -> np.ndarray:
     return np.asarray(system(np.exp(s * system.dt) if system.dt else s)).reshape(-1)
 
 
-def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: float, omega: float = SLIP) -> LinearPlant:
+def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: float, omega: float = 1.0) -> LinearPlant:
     """A plant about the angle theta [rad] while it slips at omega [rad/s], for a loop of this sample rate."""
-    reduced = isinstance(plant, ReducedModel)
-    c: Coefficients = Coefficients(*plant._lowered[0]) if reduced else plant._lowered
+    reduced, c = isinstance(plant, ReducedModel), coefficients(plant)
     if reduced:
         A, B, C = matrices(plant, theta, omega)
         load = control.ss(A, B[:, 1:], C, 0)
@@ -92,6 +81,11 @@ def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: flo
     return LinearPlant("reduced" if reduced else "mujoco", held, load, theta, omega, _left_out(plant))
 
 
+def coefficients(plant: ReducedModel | MechanicalPlant) -> Coefficients:
+    """The letters of a plant's equation, with its effects in them."""
+    return Coefficients(*plant._lowered[0]) if isinstance(plant, ReducedModel) else plant._lowered
+
+
 def _left_out(plant: ReducedModel | MechanicalPlant) -> tuple[str, ...]:
     """Effects that change the command or the reading in ways that are not linear; in MuJoCo also laws that the stepping
     applies.
@@ -105,8 +99,7 @@ def _left_out(plant: ReducedModel | MechanicalPlant) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*shaped, *(plant.stepped if isinstance(plant, MechanicalPlant) else ())]))
 
 
-# -- the reduced model
-# ---------------------------------------------------------------------------------------------------
+# -- the reduced model -------------------------------------------------------------------------------------------------
 
 
 def matrices(model: ReducedModel, theta: float, omega: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -118,7 +111,7 @@ def matrices(model: ReducedModel, theta: float, omega: float) -> tuple[np.ndarra
 
     With one body w_m = w and both lines are one; without tau_e j = b u - a_emf w_m.
     """
-    c = Coefficients(*model._lowered[0])
+    c = coefficients(model)
     f_theta, f_w, f_j = _slopes(model, c, theta, omega)
     two, n = c.has_motor_side, 4 if c.has_motor_side else 2
     A, B = np.zeros((n + 1, n + 1)), np.zeros((n + 1, 2))
@@ -160,12 +153,11 @@ def _slopes(model: ReducedModel, c: Coefficients, theta: float, omega: float) ->
         return total - level
 
     point = np.array([theta, omega, j])
-    steps = NUDGE * np.maximum(np.abs(point), 1.0)
+    steps = 1e-5 * np.maximum(np.abs(point), 1.0)
     return tuple((force(*(point + e)) - force(*(point - e))) / (2.0 * e.sum()) for e in np.diag(steps))
 
 
-# -- the MuJoCo plant
-# ------------------------------------------------------------------------------------------------------
+# -- the MuJoCo plant --------------------------------------------------------------------------------------------------
 
 
 @unlogged()
@@ -175,12 +167,14 @@ def transitions(
     """A (n, n), B (n, 2) of voltage [V] and load [rad/s^2], C (1, n), from one step of MuJoCo to the next, and that
     step [s].
 
-    By `mjd_transitionFD`, after SETTLE_S of motion under the voltage that holds the speed.
+    By `mjd_transitionFD`, after a motion under the voltage that holds the speed, so that contacts and couplings carry
+    their loads. Of its differences the first that the rigid contacts bear, which give little under their loads: a
+    growth beyond 1.01 in one step has opened one.
 
     Raises:
         InputError: no difference is small enough for the contacts at this point.
     """
-    stepper, c, J = plant._stepper(), plant._lowered, plant._skeleton.inertia
+    stepper, c, J, settle_s = plant._stepper(), plant._lowered, plant._skeleton.inertia, 0.1
     model, data = stepper.model, stepper.data
     v = (
         c.a_1 * (theta - c.theta_0)
@@ -188,14 +182,14 @@ def transitions(
         + c.c_1 * np.sign(theta - c.theta_0)
         + c.c_2_plus
     ) / c.b
-    stepper.reset(_pushing(plant, theta - SETTLE_S * omega, omega))
-    stepper.hold([(v, stepper._divide(SETTLE_S)[1])], SETTLE_S)
+    stepper.reset(_pushing(plant, theta - settle_s * omega, omega))
+    stepper.hold([(v, stepper._divide(settle_s)[1])], settle_s)
     model.opt.timestep, _ = stepper._divide(1.0 / rate_hz)
     n = 2 * model.nv + model.na
     A, B = np.zeros((n, n)), np.zeros((n, model.nu))
-    for epsilon in EPSILONS:
+    for epsilon in (1e-7, 1e-8, 3e-9, 1e-9):
         mujoco.mjd_transitionFD(model, data, epsilon, 1, A, B, None, None)
-        if np.isfinite(A).all() and np.abs(np.linalg.eigvals(A)).max() < BURST:
+        if np.isfinite(A).all() and np.abs(np.linalg.eigvals(A)).max() < 1.01:
             break
     else:
         raise InputError(
@@ -220,8 +214,7 @@ def _pushing(plant: MechanicalPlant, theta: float, omega: float) -> dict[str, tu
     )
 
 
-# -- from sample to sample
-# ----------------------------------------------------------------------------------------------------
+# -- from sample to sample ---------------------------------------------------------------------------------------------
 
 
 def _flow(A: np.ndarray, B: np.ndarray) -> Move:
@@ -270,7 +263,7 @@ def _late(values: np.ndarray, dt: float) -> control.StateSpace:
     if not np.isfinite(T_d):
         return _lag(T, dt)
     if not dt:
-        return _lag(T, dt) * control.ss(control.tf(*control.pade(T_d, PADE)))
+        return _lag(T, dt) * control.ss(control.tf(*control.pade(T_d, 4)))
     whole, part = divmod(T_d / dt, 1.0)
     return _lag(T, dt) * control.ss(control.tf([1.0 - part, part], [1.0, *[0.0] * (int(whole) + 1)], dt))
 

@@ -1,5 +1,6 @@
 """One controller around one plant over frequency: open loop, sensitivity, margins, disk margins, bandwidth.
- plant about its point, friction and preload at the amplitude; controller at the same amplitude -> L = C P -> S = 1/(1 +
+
+plant about its point, friction and preload at the amplitude; controller at the same amplitude -> L = C P -> S = 1/(1 +
 L), T = L S -> margins
 """
 
@@ -12,11 +13,11 @@ import control
 import numpy as np
 
 from ers_mj.control.controllers import Controller
-from ers_mj.control.frequency.describing import ROOM, controller_response, coulomb, plant_response, preload
+from ers_mj.control.frequency.describing import controller_response, coulomb, highest_hz, plant_response, preload
 from ers_mj.control.frequency.linear import LinearPlant
 from ers_mj.effects.base import Coefficients
 
-LOWEST_HZ, ASKED, DRAWN = 0.5, 40, 600  # frequencies at which a controller is asked, and to which that is interpolated
+LOWEST_HZ = 0.5  # of all that is asked and drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +98,11 @@ class Answers:
 
 
 def ask(controller: Controller, centre: float, amplitude: float) -> Answers:
-    """What a controller answers to sines of the rudder, from LOWEST_HZ almost up to half its sample rate."""
-    asked = np.geomspace(LOWEST_HZ, ROOM / controller.h, ASKED)
-    f_hz = np.geomspace(asked[0], asked[-1], DRAWN)
+    """What a controller answers to sines of the rudder, from LOWEST_HZ almost up to half its sample rate: asked at 40
+    frequencies, interpolated to 600.
+    """
+    asked = np.geomspace(LOWEST_HZ, highest_hz(controller.h), 40)
+    f_hz = np.geomspace(asked[0], asked[-1], 600)
     return Answers(
         controller.name,
         centre,

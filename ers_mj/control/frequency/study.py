@@ -1,5 +1,6 @@
 """One call of `ers frequency`: plants, loops, limit cycles and recordings under the same conditions.
- datasheet -> plants -> linear plants -> loops (a controller each) -> margins;  describing functions -> cycles;
+
+datasheet -> plants -> linear plants -> loops (a controller each) -> margins;  describing functions -> cycles;
 recordings -> responses -> gaps
 """
 
@@ -14,7 +15,7 @@ import numpy as np
 from ers_mj.control.controllers import Servo
 from ers_mj.control.frequency.cycle import Cycle, predicted, simulated
 from ers_mj.control.frequency.describing import coulomb, leaning, plant_response, preload, rubbing
-from ers_mj.control.frequency.linear import LinearPlant, linearised
+from ers_mj.control.frequency.linear import LinearPlant, coefficients, linearised
 from ers_mj.control.frequency.loop import LOWEST_HZ, Loop, ask, close_loop
 from ers_mj.control.trial import Conditions, make_controller, refuse_late, sampled
 from ers_mj.data.frequency_response import Gap, Response, frequency_response, gap
@@ -26,19 +27,37 @@ from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import Plant, build_plant
 
 Progress = Callable[[str, float], None]
-KICK = math.radians(2.0)  # from the centre, at which a loop is let go
-CYCLE_S = 3.0  # [s] for which it is watched
-COMPARED_HZ = 100.0  # up to which linear plants are compared in one number
-SLOWEST_HZ, FASTEST_HZ = 20.0, 1e5  # sample rates of a loop that is analysed
-MOST_LATE = 1000  # samples of dead time, each of which is a state of the linear plant
-DRAWN = 300  # frequencies of a plant's own picture
+
+
+@dataclass(frozen=True)
+class Scope:
+    """How far a study goes.
+
+    Attributes:
+        slowest_hz, fastest_hz: sample rates of a loop that is analysed.
+        most_late: samples of dead time, each of which is a state of the linear plant.
+        compared_hz: up to which linear plants are compared in one number.
+        drawn: frequencies of a plant's own picture.
+        kick, watched: where from its centre a loop is let go [rad], and for how long it is watched [s].
+    """
+
+    slowest_hz: float = 20.0
+    fastest_hz: float = 1e5
+    most_late: int = 1000
+    compared_hz: float = 100.0
+    drawn: int = 300
+    kick: float = math.radians(2.0)
+    watched: float = 3.0
+
+
+SCOPE = Scope()
 
 
 @dataclass(frozen=True, eq=False)
 class PlantView:
     """A plant beside the others, each (F,) [rad/V]: linear while it slips, and with friction and preload at the
-    amplitude; ``off`` is the largest difference of its linear response from the first plant's up to COMPARED_HZ, ([dB],
-    [deg])."""
+    amplitude; ``off`` is the largest difference of its linear response from the first plant's where they are compared,
+    ([dB], [deg])."""
 
     linear: LinearPlant
     f_hz: np.ndarray
@@ -101,17 +120,18 @@ def study(
     Raises:
         InputError: the datasheet, an effect, a recording or the sample rate cannot be used.
     """
-    if not SLOWEST_HZ <= conditions.rate_hz <= FASTEST_HZ:
+    if not SCOPE.slowest_hz <= conditions.rate_hz <= SCOPE.fastest_hz:
         raise InputError(
-            f"the loop's sample rate is {conditions.rate_hz:g} Hz, {SLOWEST_HZ:g} Hz to {FASTEST_HZ:g} Hz was expected"
+            f"the loop's sample rate is {conditions.rate_hz:g} Hz, {SCOPE.slowest_hz:g} Hz to {SCOPE.fastest_hz:g} Hz"
+            " was expected"
         )
     known = Servo.of(design or datasheet)
     responses = [_response(r, datasheet) for r in recordings]  # what cannot be used is refused before anything runs
     built = {name: _build(datasheet, name, conditions) for name in plants}
     for plant in built.values():
-        refuse_late(plant, conditions.rate_hz, MOST_LATE)
+        refuse_late(plant, conditions.rate_hz, SCOPE.most_late)
     reduced = built.get("reduced") or _build(datasheet, "reduced", replace(conditions, linkage="constant"))
-    c = Coefficients(*reduced._lowered[0])
+    c = coefficients(reduced)
     linear = {name: linearised(plant, conditions.rate_hz, conditions.start) for name, plant in built.items()}
     loops, cycles = [], []
     for k, name in enumerate(controllers):
@@ -141,12 +161,12 @@ def _build(datasheet: Datasheet, plant: str, conditions: Conditions) -> Plant:
 
 
 def _views(linear: dict[str, LinearPlant], c: Coefficients, conditions: Conditions) -> tuple[PlantView, ...]:
-    f_hz = np.geomspace(LOWEST_HZ, 0.47 * conditions.rate_hz, DRAWN)
+    f_hz = np.geomspace(LOWEST_HZ, 0.47 * conditions.rate_hz, SCOPE.drawn)
     N = coulomb(0.5 * (c.c_2_plus + c.c_2_minus), conditions.amplitude) + preload(
         c.c_1, conditions.amplitude, conditions.start - c.theta_0
     )
     slipping = {name: plant.response(f_hz) for name, plant in linear.items()}
-    first, low = next(iter(slipping.values())), f_hz <= COMPARED_HZ
+    first, low = next(iter(slipping.values())), f_hz <= SCOPE.compared_hz
     views = []
     for name, plant in linear.items():
         ratio = (slipping[name] / first)[low]
@@ -159,14 +179,13 @@ def _cycles(law, built: dict[str, Plant], c: Coefficients, conditions: Condition
     """About theta_0, where nothing leans a play to one side."""
     seen, tails = {}, {}
     for name, plant in built.items():
-        stood = sampled(plant, conditions.rate_hz, (c.theta_0 + KICK, 0.0))
-        seen[name], theta = simulated(law, stood, plant.effects, plant.terminal, c.theta_0, KICK, CYCLE_S)
+        stood = sampled(plant, conditions.rate_hz, (c.theta_0 + SCOPE.kick, 0.0))
+        seen[name], theta = simulated(law, stood, plant.effects, plant.terminal, c.theta_0, SCOPE.kick, SCOPE.watched)
         tails[name] = theta[-round(0.1 * conditions.rate_hz) :]
     return Cycles(law.name, tuple(predicted(law, c, c.theta_0)), seen, tails)
 
 
-# -- recordings
-# ----------------------------------------------------------------------------------------------------------
+# -- recordings --------------------------------------------------------------------------------------------------------
 
 
 def _response(recording: Recording, datasheet: Datasheet) -> Response:

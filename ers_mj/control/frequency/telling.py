@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ers_mj.control.frequency.cycle import Cycle
-from ers_mj.control.frequency.study import COMPARED_HZ, Compared, Cycles, Study
+from ers_mj.control.frequency.study import SCOPE, Compared, Cycles, Study
 
 
 def headline(found: Study) -> str:
@@ -33,7 +33,7 @@ def notes(found: Study) -> list[str]:
         if view.linear.name != first:
             out.append(
                 f"The {view.linear.name} plant's linear response is within {view.off[0]:.2g} dB and {view.off[1]:.2g}°"
-                f" of the {first} plant's up to {COMPARED_HZ:g} Hz."
+                f" of the {first} plant's up to {SCOPE.compared_hz:g} Hz."
             )
         if view.linear.left_out:
             out.append(f"The linear {view.linear.name} plant leaves out: {', '.join(view.linear.left_out)}.")

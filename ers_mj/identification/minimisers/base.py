@@ -1,5 +1,6 @@
 """What every minimiser is: a search for the least value of any callable within bounds, by seed, within a budget.
- An objective is called with many points at once, x (M, k) -> values (M,). One that is a sum of squares may also have
+
+An objective is called with many points at once, x (M, k) -> values (M,). One that is a sum of squares may also have
 ``residuals(x (k,)) -> (N,)``, which `ls` needs, ``slopes(x, residuals there) -> (N, k)`` where they are cheaper than
 differences, ``stages``, easier objectives to go through first, ``draw(random)``, a point to begin again from, and
 ``target``, a value that is good enough. Nothing here knows of servos.
@@ -7,6 +8,7 @@ differences, ``stages``, easier objectives to go through first, ``draw(random)``
 
 from __future__ import annotations
 
+import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -133,10 +135,8 @@ class Minimiser(ABC):
             )
         meter = Meter(objective, lower, upper, budget)
         cube = None if start is None else np.clip((np.asarray(start, float) - lower) / meter.width, 0.0, 1.0)
-        try:
+        with contextlib.suppress(Spent):
             self._search(meter, np.random.default_rng(seed), cube)
-        except Spent:
-            pass
         return meter.minimum()
 
     @abstractmethod

@@ -1,0 +1,94 @@
+"""What `ers trial` and `ers frequency` share: options of the plant and of the laws, and the conditions from them."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import TYPE_CHECKING
+
+from ers_mj.commands.options import number, refuse_unknown, small_deg
+
+if TYPE_CHECKING:
+    from ers_mj.control.trial import Conditions
+    from ers_mj.servo.datasheet import Datasheet
+
+
+def add_plant(parser: argparse.ArgumentParser) -> None:
+    """--gap, --linkage, --inductance and --effect: what the plant has beyond its datasheet."""
+    parser.add_argument("--gap", type=small_deg, default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
+    parser.add_argument(
+        "--linkage", choices=("constant", "rod"), default="constant", help="of MuJoCo's rudder (default constant)"
+    )
+    parser.add_argument("--inductance", choices=("on", "off"), default="off", help="whether L acts (default off)")
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME:key=value,...",
+        help="physics to add to the plant, SI; repeatable",
+    )
+
+
+def add_laws(parser: argparse.ArgumentParser) -> None:
+    """--delay-ms, --filter-ms, --gains and --pid: what stands between the plant and the laws, and their gains."""
+    parser.add_argument(
+        "--delay-ms", type=number(least=0), default=0.0, metavar="X", help="dead time of the command (default 0)"
+    )
+    parser.add_argument(
+        "--filter-ms",
+        type=number(least=0),
+        default=0.5,
+        metavar="X",
+        help="time constant of the speed's filter (default 0.5)",
+    )
+    parser.add_argument(
+        "--gains", default="", metavar="NAME=X,...", help="of the finite-time laws, as `ers gains` takes them"
+    )
+    parser.add_argument(
+        "--pid", default="", metavar="P=X,I=X,D=X", help="of pid and pid-ff, in V/deg (default P=5,I=1.2,D=0.1)"
+    )
+
+
+def chosen_controllers(arguments: argparse.Namespace) -> list[str]:
+    """The names of --controller, all where none is given.
+
+    Raises:
+        InputError: there is no controller of that name.
+    """
+    from ers_mj.control.controllers import CONTROLLERS
+
+    chosen = arguments.controller or list(CONTROLLERS)
+    refuse_unknown("--controller", chosen, CONTROLLERS)
+    return chosen
+
+
+def plant_and_design(model: str, design: str | None) -> tuple[Datasheet, Datasheet]:
+    """The plant's datasheet, and what the controllers know of it."""
+    from ers_mj.servo.datasheet import read_datasheet
+
+    datasheet = read_datasheet(model)
+    return datasheet, datasheet if design is None else read_datasheet(design)
+
+
+def conditions_of(arguments: argparse.Namespace, **others) -> Conditions:
+    """The conditions of the options above, of --amplitude-deg and of --umax-V; `others` are fields of their own, added
+    effects among them.
+    """
+    from ers_mj.control.controllers import parse_gains, parse_pid
+    from ers_mj.control.trial import Conditions
+    from ers_mj.servo.simulation import parse_effect
+
+    effects = [parse_effect(text) for text in arguments.effect]
+    effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
+    return Conditions(
+        amplitude=math.radians(arguments.amplitude_deg),
+        u_max=arguments.umax,
+        gap=math.radians(arguments.gap),
+        linkage=arguments.linkage,
+        inductance=arguments.inductance == "on",
+        filter_s=1e-3 * arguments.filter_ms,
+        gains=parse_gains(arguments.gains),
+        pid=parse_pid(arguments.pid),
+        effects=(*effects, *others.pop("effects", ())),
+        **others,
+    )

@@ -1,0 +1,161 @@
+"""What of a recording is refused, and what is worked around and told: the checks that arrays and files get alike."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ers_mj.data.columns import MEASURED
+from ers_mj.data.sensor_faults import at_extreme, decimal_grain, frozen_spans, held_spans, varied
+from ers_mj.data.tables import listed
+from ers_mj.errors import InputError
+
+FEWEST_SAMPLES = 100
+
+
+@dataclass(frozen=True)
+class Limits:
+    """From where on a recording is refused, or something of it told."""
+
+    most_missing: float = 0.20  # share of a column: a required one is refused, another one not used
+    gap: float = 3.0  # median steps of time, from which a longer one is a gap
+    least_jitter: float = 0.01  # rms share of the step from which jitter is worth a sentence
+
+
+LIMITS = Limits()
+
+
+# -- what is refused -------------------------------------------------------------------------------------------------
+
+
+def checked(values: dict[str, np.ndarray], labels: dict[str, str], name: str) -> dict[str, np.ndarray]:
+    """The fields of a recording, locked, or the first reason to refuse them."""
+    for field, x in values.items():
+        _refuse_length(x, labels[field], len(values["t"]), name)
+        _refuse_infinite(x, labels[field], name)
+    refuse_time(values["t"], labels["t"], name)
+    for field in ("u", "y"):
+        _refuse_missing(values[field], labels[field], name)
+    if np.nanmin(values["y"]) == np.nanmax(values["y"]):
+        raise InputError(f"{name}: the output {labels['y']} is constant at {np.nanmax(values['y']):.6g}")
+    fields = {field: x if field in MEASURED else _held(x) for field, x in values.items() if not _sparse(x)}
+    if "enable" in fields:
+        fields["enable"] = fields["enable"] > 0.5
+    return {field: locked(x) for field, x in (fields | {"valid": np.isfinite(values["y"])}).items()}
+
+
+def _refuse_length(x: np.ndarray, label: str, count: int, name: str) -> None:
+    if len(x) != count:
+        raise InputError(f"{name}: {label} has {len(x)} samples, the time has {count}")
+    if count < FEWEST_SAMPLES:
+        raise InputError(f"{name}: has {count} samples, at least {FEWEST_SAMPLES} are needed")
+
+
+def _refuse_infinite(x: np.ndarray, label: str, name: str) -> None:
+    if np.isinf(x).any():
+        raise InputError(f"{name}: {label} is infinite in data row {1 + int(np.argmax(np.isinf(x)))}")
+
+
+def refuse_time(t: np.ndarray, label: str, name: str) -> None:
+    """Raise InputError where time (N,) is missing, repeats or runs backwards."""
+    if np.isnan(t).any():
+        raise InputError(f"{name}: the time {label} is missing in data row {1 + int(np.argmax(np.isnan(t)))}")
+    if (late := np.flatnonzero(np.diff(t) <= 0)).size:
+        k = int(late[0]) + 1
+        what = "repeats" if t[k] == t[k - 1] else "runs backwards"
+        raise InputError(f"{name}: the time {label} {what} in data row {k + 1} ({t[k - 1]:.9g} s, then {t[k]:.9g} s)")
+
+
+def _refuse_missing(x: np.ndarray, label: str, name: str) -> None:
+    if _sparse(x):
+        raise InputError(
+            f"{name}: {label} lacks {np.mean(np.isnan(x)):.0%} of its values, at most {LIMITS.most_missing:.0%} may be"
+            " missing"
+        )
+
+
+def _sparse(x: np.ndarray) -> bool:
+    return bool(np.mean(np.isnan(x)) > LIMITS.most_missing)
+
+
+def _held(x: np.ndarray) -> np.ndarray:
+    """x with each gap filled by the value before it (the first value, where it begins with one)."""
+    known = np.flatnonzero(np.isfinite(x))
+    last = np.maximum(np.searchsorted(known, np.arange(len(x)), side="right") - 1, 0)
+    return x[known[last]]
+
+
+def locked(x: np.ndarray) -> np.ndarray:
+    """x in one piece, that nobody can write to."""
+    x = np.ascontiguousarray(x)
+    x.setflags(write=False)
+    return x
+
+
+# -- what is worked around and told ----------------------------------------------------------------------------------
+
+
+def problems_of(
+    fields: dict[str, np.ndarray], printed: dict[str, np.ndarray], labels: dict[str, str], step: float
+) -> list[str]:
+    """A sentence for each; `printed` are the columns as they stand in the file, `step` the converter's there."""
+    t, u, y = fields["t"], fields["u"], printed["y"]
+    frozen = frozen_spans(y, step or decimal_grain(y[np.isfinite(y)]))
+    return [
+        *(_told_blanks(x, labels[field], field) for field, x in printed.items() if np.isnan(x).any()),
+        *_told_gaps(t),
+        *_told_jitter(t),
+        *_told_clipped(u, labels["u"], [s for s in held_spans(u) if at_extreme(u, s) and varied(u, s)]),
+        *_told_clipped(y, labels["y"], [s for s in frozen if at_extreme(y, s)]),
+        *_told_stuck(t, labels["y"], [s for s in frozen if not at_extreme(y, s) and np.ptp(u[s]) > 0]),
+        *([f"the input {labels['u']} is constant at {u[0]:.6g}"] if np.ptp(u) == 0 else []),
+        *([f"the output {labels['y']} moves in steps of {step:.4g}, those of its converter"] if step else []),
+    ]
+
+
+def _told_blanks(x: np.ndarray, label: str, field: str) -> str:
+    count, share = int(np.isnan(x).sum()), np.mean(np.isnan(x))
+    if _sparse(x):
+        return f"{label} lacks {share:.0%} of its values and is not used"
+    remedy = "left out" if field in MEASURED else "taken as the last value before"
+    return f"{label} is missing in {count} samples ({share:.2%}), which are {remedy}"
+
+
+def _told_gaps(t: np.ndarray) -> list[str]:
+    dt = np.diff(t)
+    gaps = np.flatnonzero(dt > LIMITS.gap * np.median(dt))
+    if not gaps.size:
+        return []
+    k = gaps[np.argmax(dt[gaps])]
+    return [f"time has {gaps.size} gap{'s'[: gaps.size > 1]}, the largest of {dt[k]:.4g} s after {t[k]:.4g} s"]
+
+
+def _told_jitter(t: np.ndarray) -> list[str]:
+    dt = np.diff(t) / np.median(np.diff(t))
+    jitter = np.sqrt(np.mean((dt[dt <= LIMITS.gap] - 1) ** 2))
+    return [f"the steps of time jitter by {jitter:.1%} rms"] if jitter > LIMITS.least_jitter else []
+
+
+def _told_clipped(x: np.ndarray, label: str, spans: list[slice]) -> list[str]:
+    if not spans:
+        return []
+    limits = listed(f"{limit:.6g}" for limit in sorted({float(x[span.start]) for span in spans}))
+    return [f"{label} looks clipped at {limits}: {_told_spans(spans, len(x))}"]
+
+
+def _told_stuck(t: np.ndarray, label: str, spans: list[slice]) -> list[str]:
+    if not spans:
+        return []
+    longest = max(spans, key=lambda s: s.stop - s.start)
+    lasts, start = t[longest.stop - 1] - t[longest.start], t[longest.start]
+    return [f"{label} looks stuck: {_told_spans(spans, len(t))}, the longest for {lasts:.4g} s from {start:.4g} s on"]
+
+
+def _told_spans(spans: list[slice], total: int) -> str:
+    count = sum(span.stop - span.start for span in spans)
+    return f"{count} samples ({count / total:.2%}) in {len(spans)} span{'s'[: len(spans) > 1]}"
+
+
+def ignored(columns: list[str], labels: dict[str, str]) -> list[str]:
+    """Tell the columns that were not taken in; `run` chose the rows."""
+    ignored = [column for column in columns if column not in labels.values() and column != "run"]
+    return [f"columns that mean nothing here are ignored: {listed(ignored)}"] if ignored else []

@@ -1,0 +1,108 @@
+"""What the figures of all pages share: inline SVG at two widths, room for labels, curves thinned to what can be seen.
+
+draw(width) -> Figure, once wide and once narrow for a phone -> SVG text in the page
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+from collections.abc import Callable, Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from ers_mj.report.style import STYLE
+
+_serial = itertools.count(1)
+
+
+def restart_ids() -> None:
+    """Number the figures from 1 again, so that the same diagnosis gives the same page."""
+    global _serial
+    _serial = itertools.count(1)
+
+
+def both_widths(draw: Callable[[float], Figure], described: str) -> str:
+    """One figure drawn for a desktop and for a phone; the page's style shows the one that fits."""
+    with matplotlib.rc_context(STYLE.settings):
+        wide, narrow = _svg(draw(STYLE.wide), described), _svg(draw(STYLE.narrow), described)
+    return f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>'
+
+
+def _svg(figure: Figure, described: str) -> str:
+    """The figure as an SVG element: scalable, its ids unique in the page, no address in it."""
+    FigureCanvasSVG(figure)
+    out = io.StringIO()
+    figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = out.getvalue()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.S)
+    text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text)
+    mark = f"f{next(_serial)}-"
+    text = re.sub(r'\bid="', f'id="{mark}', text)
+    text = re.sub(r'href="#', f'href="#{mark}', text).replace("url(#", f"url(#{mark}")
+    text = re.sub(
+        r'<svg [^>]*?viewBox="([^"]+)"[^>]*>', rf'<svg viewBox="\1" role="img" aria-label="{described}">', text, count=1
+    )
+    return re.sub(r"\n\s*", "\n", text)
+
+
+def margins(figure: Figure, top: float = 0.1) -> None:
+    """Room for labels about the axes, in inches: a layout that measures every text takes longer than all the
+    drawing.
+    """
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(
+        left=0.8 / width, right=1.0 - 0.12 / width, bottom=0.5 / height, top=1.0 - top / height, hspace=0.1
+    )
+    for ax in figure.axes:
+        ax.yaxis.set_label_coords(-0.62 / (width - 0.92), 0.5)
+
+
+def rect(figure: Figure, left: float, bottom: float, right: float, top: float) -> tuple[float, float, float, float]:
+    """Where axes lie in a figure, from distances in inches to its left and lower edge; a negative ``right`` or ``top``
+    to the opposite one.
+    """
+    width, height = figure.get_size_inches()
+    right, top = right if right > 0 else width + right, top if top > 0 else height + top
+    return left / width, bottom / height, (right - left) / width, (top - bottom) / height
+
+
+def decimate(t: np.ndarray, x: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """t and x (N,) thinned to the lowest and the highest value of each of points/2 spans; a span of NaN stays a
+    hole.
+    """
+    bins = points // 2
+    if t.size <= points:
+        return t, x
+    edges = np.linspace(0, t.size, bins + 1).astype(int)
+    starts = edges[:-1]
+    low = np.minimum.reduceat(np.where(np.isfinite(x), x, np.inf), starts)
+    high = np.maximum.reduceat(np.where(np.isfinite(x), x, -np.inf), starts)
+    empty = ~np.isfinite(low)
+    rising = x[edges[1:] - 1] >= x[starts]
+    first, second = np.where(rising, low, high), np.where(rising, high, low)
+    first[empty], second[empty] = np.nan, np.nan
+    middle = t[(edges[:-1] + edges[1:] - 1) // 2]
+    return np.column_stack([t[starts], middle]).ravel(), np.column_stack([first, second]).ravel()
+
+
+def largest(x: np.ndarray) -> float:
+    """The largest size in x, 0 where nothing is known."""
+    return float(np.nanmax(np.abs(x))) if np.isfinite(x).any() else 0.0
+
+
+def label_aside(ax: Axes) -> None:
+    """The label of the vertical axis at the same distance from it whatever the numbers between them."""
+    width = ax.figure.get_size_inches()[0]
+    ax.yaxis.set_label_coords(-0.62 / (ax.get_position().width * width), 0.5)
+
+
+def plain_ticks(ax: Axes, ticks: Sequence[float]) -> None:
+    """These ticks alone along a logarithmic axis, in plain numbers."""
+    ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    ax.xaxis.minorticks_off()
