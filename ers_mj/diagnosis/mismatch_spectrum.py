@@ -67,8 +67,8 @@ class Mismatch:
         beyond: which lines are off beyond the noise, (F,) of bool; in half of the frames at least, so that some in
             which stick and slip fork are not enough.
         response: measured over simulated output, as in a free run.
-        region: the shortest band [Hz], in log frequency, that holds most (READING.region) of the error beyond the noise;
-        None where too few lines are off. share_of_error, share_of_motion: of the power of either that lies in it.
+        region: the shortest band [Hz], in log frequency, that holds READING.region of the error beyond the noise; None
+        where too few lines are off. share_of_error, share_of_motion: of the power of either that lies in it.
         linear_share: of the error beyond the noise that lies in it, the part that is linear.
         kind: "linear", "distortion" or "both"; None without a region.
         sentence: all of it in words.
