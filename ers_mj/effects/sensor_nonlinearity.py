@@ -4,8 +4,6 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Sensor
 
-NEWTON, FLATTEST = 6, 0.2  # steps that take a sensor's error off a reading at most, and the least slope of a reading
-SETTLED = 1e-7  # [output unit] of a step after which no other follows: its error is of the order of its square
 ORDERS = (0.5, 1, 2, 3, 4, 6, 8)  # periods within the travel from which a fit is begun
 
 
@@ -51,10 +49,10 @@ class SensorNonlinearity(Sensor):
 
     def behind(self, p, y):
         theta = y
-        for _ in range(NEWTON):
-            step = (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), FLATTEST)
+        for _ in range(6):
+            step = (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), 0.2)
             theta = theta + step
-            if np.nanmax(np.abs(step), initial=0.0) < SETTLED:
+            if np.nanmax(np.abs(step), initial=0.0) < 1e-7:  # its error is of the order of its square
                 break
         return theta
 
