@@ -184,20 +184,13 @@ class _Court:
         """
         if not BY_NAME[name].once:
             return False
-        traces, edge = self.start.traces, self.policy.edge
-        columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
-        begun, width, fade = (model.local[name][:, columns.index(column)] for column in ("t_0", "width", "fade"))
-        pushes = [
-            (b - t.t[0], w, t.t[-1] - b)
-            for b, w, t in zip(begun, np.fmin(width, fade), traces, strict=True)
-            if np.isfinite(b)
-        ]
+        pushes, edge = _pushes(name, model, self.start.traces), self.policy.edge
         if any(before < START or left < START for before, _, left in pushes):
             return True
-        if not any(before < edge or left - w < edge for before, w, left in pushes):
+        if not any(before < edge or left - length < edge for before, length, left in pushes):
             return False
         layout, size = model.layout(), BY_NAME[name].parameters[0].name
-        z, widths = model.vector(layout), half_widths(model, traces, (), self.tau)
+        z, widths = model.vector(layout), half_widths(model, self.start.traces, (), self.tau)
         return all(abs(z[k]) <= widths[k] for k, f in enumerate(layout) if f.owner == name and f.name == size)
 
     def _halved(
@@ -250,6 +243,17 @@ def delta_bic(name: str, model: Model, after: Score, without: Score) -> float:
     """
     gain = cost(without.misfit, 1.0) - cost(after.misfit, 1.0)
     return 2.0 * gain - sum(np.isfinite(v) for v in dict(model.effects)[name]) * math.log(max(without.misfit.size, 2))
+
+
+def _pushes(name: str, model: Model, traces: Sequence[Trace]) -> list[tuple[float, float, float]]:
+    """Of what acts once, in each recording where it does: the time [s] before it, its length, and the time left."""
+    columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
+    begun, width, fade = (model.local[name][:, columns.index(column)] for column in ("t_0", "width", "fade"))
+    return [
+        (b - t.t[0], w, t.t[-1] - b)
+        for b, w, t in zip(begun, np.fmin(width, fade), traces, strict=True)
+        if np.isfinite(b)
+    ]
 
 
 def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:
