@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.base import Coefficients, Twin
+from ers_mj.effects.records import Coefficients, Twin
 from ers_mj.errors import InputError
 from ers_mj.plants.play import rigid_play
 from ers_mj.plants.reduced import Motion
