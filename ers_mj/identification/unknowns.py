@@ -190,7 +190,8 @@ def unknowns_of(
                 ends.append((float(y.min()), float(y.max())))
         elif known[name] != 0.0 and _matters(name, traces, known, is_lumped):
             names.append(name)
-            ends.append(tuple(sorted((factors[0] * known[name], factors[1] * known[name]))))
+            low, high = sorted((factors[0] * known[name], factors[1] * known[name]))
+            ends.append((low, high))
             if datasheet is None:
                 guessed.append(name)
     lower, upper = np.array(ends, float).reshape(-1, 2).T.copy()
@@ -199,7 +200,7 @@ def unknowns_of(
         raise InputError("every letter is fixed, there is nothing to identify")
     held = {name: x for name, x in known.items() if name not in names}
     return Unknowns(
-        tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped, tuple(guessed), tuple(factors)
+        tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped, tuple(guessed), (factors[0], factors[1])
     )
 
 

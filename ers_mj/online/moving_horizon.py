@@ -193,6 +193,6 @@ class Tracker:
         """
         first = int(np.searchsorted(self._t, begin - 1e-9))
         trace = windowed(self._t[first:], self._u[first:], self._y[first:], sigma)
-        explained = self._last is not None and self._last.misfit <= HORIZON.explained
-        known = self._last.state_at(trace.t[0]) if explained else None
+        last = self._last
+        known = last.state_at(trace.t[0]) if last is not None and last.misfit <= HORIZON.explained else None
         return fitted(self._model, replace(trace, start=known or fitted_start(self._model, trace)))
