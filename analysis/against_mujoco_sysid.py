@@ -1,6 +1,7 @@
 """Five parameters in MuJoCo, beside `mujoco.sysid`: `python analysis/against_mujoco_sysid.py --seed 31 --runs 3` (needs
 `pip install "mujoco[sysid]"`).
- One joint in MuJoCo with Table 1's a_1, a_2, b, c_1, c_2 (theta_0 known), step 5e-4 s, recorded for 5 s at 2 kHz under
+
+One joint in MuJoCo with Table 1's a_1, a_2, b, c_1, c_2 (theta_0 known), step 5e-4 s, recorded for 5 s at 2 kHz under
 the package's multisine with 0.01 deg of noise. Both are given the same model, record, bounds [0.2, 3] x truth and start
 (drawn within [0.5, 1.8] x truth); one thread each. Then a record of the plant with a play of +-0.5 deg, which neither
 knows of: what either says.

@@ -1,5 +1,6 @@
 """Speed and error of the reduced model: `python analysis/benchmark_reduced.py`.
- Speed is milliseconds of one core for a simulated second at 1 kHz (best of 20). Error is the largest change of theta
+
+Speed is milliseconds of one core for a simulated second at 1 kHz (best of 20). Error is the largest change of theta
 [deg] against an independent scheme (baseline) or against segments ten times finer (effects).
 """
 

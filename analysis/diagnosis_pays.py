@@ -1,5 +1,6 @@
 """What naming the physics buys in control: `python analysis/diagnosis_pays.py [--servos N] [--seed S]`.
- Each servo is Table 1 with its parameters scattered by 10 % and one concealed effect that limits a loop (a dead time, a
+
+Each servo is Table 1 with its parameters scattered by 10 % and one concealed effect that limits a loop (a dead time, a
 springy shaft, a lagging sensor, a weak converter or a play), as a MuJoCo plant. It is recorded (multisine and steps, 5
 s each, 1 kHz, 0.01 deg of noise) and diagnosed with Table 1 as the datasheet. Two models follow: the baseline, refitted
 to the same recordings, and the diagnosed one, the same with the named effects. On each `pid-ff` is tuned: P, D and the

@@ -1,5 +1,6 @@
 """Is it finite time? Phase portraits, V_3 along them, and the approach to rest: `python analysis/finite_time.py`.
- The loop of `ftrc` around Eq. (5) at 10 kHz, let go at several distances, with q = 97/99 (the paper's), q = 5/7 (far
+
+The loop of `ftrc` around Eq. (5) at 10 kHz, let go at several distances, with q = 97/99 (the paper's), q = 5/7 (far
 from 1, so that finite time shows) and q = 1 (the same law made linear), otherwise Eq. (40)'s gains. Two plants: Eq. (5)
 as it is, and one without friction, preload and voltage limit, which is the double integrator of the proof. V_3 is Eq.
 (24)'s with x1 as the controller has it. Printed: the time to come within 0.1 and 0.005 of the start for good, the share

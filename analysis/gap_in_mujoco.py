@@ -1,5 +1,6 @@
 """Play in the MuJoCo plant, found again: `python analysis/gap_in_mujoco.py [--plants N] [--seed S]`.
- Servos with parameters scattered by 10 % and a rigid play of +-0.3 to 1 deg (gap joint, constant linkage) are recorded
+
+Servos with parameters scattered by 10 % and a rigid play of +-0.3 to 1 deg (gap joint, constant linkage) are recorded
 in MuJoCo with
 0.01 deg of noise: multisine and steps for training, a chirp held out. The diagnosis gets Table 1 as the datasheet and
 those recordings. Printed: what was named first, the size of the play, and MuJoCo's own held-out error with plant.xml's

@@ -1,6 +1,7 @@
 """Can gravity be told from a constant torque? `python analysis/gravity_tie.py CASE [CASE ...]`, each a folder with
 rec*.csv and datasheet.toml.
- Selects effects as `ers diagnose` does and, where one of TIED is among them, fits each of these in its place from all
+
+Selects effects as `ers diagnose` does and, where one of TIED is among them, fits each of these in its place from all
 its starts, to the floor of its valley. Prints C of each: two that lie within one of each other, the recordings do not
 tell apart.
 """

@@ -1,19 +1,20 @@
-"""The figures of the house: `python analysis/house.py [CHECKOUT]...` prints each count for every checkout named, this one by default.
+"""The figures of the house: `python analysis/house.py [CHECKOUT]...` prints each count for every checkout named, this
+one by default.
 
 Counted over the package (`ers_mj/` of the checkout), by reading its source; nothing is imported.
 
 - files: Python files; at the root: those that lie in `ers_mj/` itself.
 - long files: more than 400 lines. Long lines: more than 120 characters.
 - long functions: more than 60 lines from `def` to the last statement, its docstring counted.
-- complex functions: complexity above 15. Complexity is one, and one more for each `if`, `elif`, conditional expression, `for`,
-  `while`, `except`, `assert`, `match` case, `if` or `for` of a comprehension, and each further operand of an `and` or `or`. Functions
-  within a function count as their own.
-- wide functions: more than 8 parameters, `self` and `cls` not counted; those that a compiling decorator (`njit`, `unit`, `law`)
-  marks are kernels and left out.
+- complex functions: complexity above 15. Complexity is one, and one more for each `if`, `elif`, conditional expression,
+  `for`, `while`, `except`, `assert`, `match` case, `if` or `for` of a comprehension, and each further operand of an
+  `and` or `or`. Functions within a function count as their own.
+- wide functions: more than 8 parameters, `self` and `cls` not counted; those that a compiling decorator (`njit`,
+  `unit`, `law`) marks are kernels and left out.
 - capitals: assignments `NAME = number` at module or class level, NAME in capitals; of several targets each is one.
 - moves: imports between files of the package, and those from one folder (or root file) to another.
-- descents: definitions of a Levenberg-Marquardt loop, told by a name that ends in `damping` being multiplied and divided in one
-  function.
+- descents: definitions of a Levenberg-Marquardt loop, told by a name that ends in `damping` being multiplied and
+  divided in one function.
 """
 
 from __future__ import annotations

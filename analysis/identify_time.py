@@ -1,5 +1,6 @@
 """How long `ers identify` takes on one 10 s, 1 kHz recording: `python analysis/identify_time.py --seed 15 --runs 5`.
- Table 1's plant under the package's named inputs in turn, 0.01 deg of noise, with and without a datasheet, each in a
+
+Table 1's plant under the package's named inputs in turn, 0.01 deg of noise, with and without a datasheet, each in a
 process of its own with one thread and compiled code at hand (one run beforehand). Processor time, so that a machine
 that is shared does not count: of the start (Python and the imports), and of all that follows, from reading the file to
 the report that is written.

@@ -1,5 +1,6 @@
 """Two masses with a rigid play between them, by an implicit scheme that shares nothing with the package's plants.
- Motor side (share rho of the inertia J, driven) and rudder (the rest, with spring, damping and set-valued friction F_c
+
+Motor side (share rho of the inertia J, driven) and rudder (the rest, with spring, damping and set-valued friction F_c
 and preload T_LH) meet inelastically at +-gap. Each step solves for the speeds at its end: friction, preload and contact
 are inclusions in them, so that nothing is regularised and nothing sticks out of the play.
 """

@@ -1,5 +1,6 @@
 """Where the describing function of a play holds: `python analysis/limit_cycle_of_play.py` writes docs/limit_cycle.png.
- Table 1 with F_c = T_LH = 0, play +-0.5 deg (effect `backlash`), feedback of the rudder's angle by a PID of 2 V/deg,
+
+Table 1 with F_c = T_LH = 0, play +-0.5 deg (effect `backlash`), feedback of the rudder's angle by a PID of 2 V/deg,
 1.2 V/(deg s), 0.05 V s/deg at 2 kHz with a speed filter of
 0.5 ms and 24 V; 0.64 of the inertia and of the bearing's damping at the motor. The contact is a spring-damper that
 pushes and never pulls; its frequency (against the whole inertia) and damping ratio are varied. Printed: predicted and

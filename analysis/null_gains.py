@@ -1,5 +1,6 @@
 """How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
- Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits
+
+Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits
 every effect whose secant promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of
 race.py open. Prints the largest gain in C of each servo, whether no other law is offered nearly as much
 (ranking.stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that

@@ -1,5 +1,6 @@
 """Is a pendulum's load recovered in ratio? `python analysis/pendulum_ratio.py ../shared/data/sts3215 [--runs 4]`
- The STS3215 servo swings eight known loads. Each load's runs are fitted alone, masses and lengths withheld: Eq. (6)
+
+The STS3215 servo swings eight known loads. Each load's runs are fitted alone, masses and lengths withheld: Eq. (6)
 without spring and preload, with gravity_imbalance, alone and beside what else such a servo may have. Position and
 voltage tell m g l only per inertia, and b = n K_t/(J R) likewise, so that (g/J)/b is m g l in units of the motor's
 torque per volt, the same unit for all loads. It is printed beside m l, with a straight line through all loads (its zero

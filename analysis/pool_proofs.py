@@ -1,6 +1,7 @@
 """Pool finished proofs: `python analysis/pool_proofs.py FOLDER [FOLDER ...]`, each the --out of an `ers prove` of its
 own seed.
- Prints the table of `ers prove` over the cases of all of them, what is found of several by what an effect leaves by
+
+Prints the table of `ers prove` over the cases of all of them, what is found of several by what an effect leaves by
 itself, which effects from outside the library are flagged (those apart that have a suspect's law, see
 ers_mj/selection/confounders.py), and the time by kind of case.
 """

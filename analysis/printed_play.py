@@ -1,5 +1,6 @@
 """Eq. (4) as the paper prints it against a gap joint: `python analysis/printed_play.py [--gap DEG] [--picture FILE]`.
- Table 1, voltages by name, three models: Eq. (5) without play, the gap joint (two bodies, the reduced model's), Eq. (4)
+
+Table 1, voltages by name, three models: Eq. (5) without play, the gap joint (two bodies, the reduced model's), Eq. (4)
 around Eq. (5). Eq. (4) has a torque where an angle belongs, so its width is taken twice: as what the return spring
 pulls over the play, k_s gap, and as whatever brings it nearest to the gap joint, input by input. Printed: how far each
 is from the others, and what each does at rest.

@@ -1,6 +1,7 @@
 """How near a recording's frequency response is to the linear model: `python analysis/recorded_responses.py --plants 8
 --seed 90051`.
- Each servo is Table 1 without Coulomb friction and preload, its J, B, K_t, K_e, k_s and R scaled at random within
+
+Each servo is Table 1 without Coulomb friction and preload, its J, B, K_t, K_e, k_s and R scaled at random within
 --spread, log-uniform; 1 kHz, noise 0.01 deg. Printed by input and plant: the lines of coherence above 0.95, and the
 largest deviation at them over all servos (bar: 0.5 dB, 3 deg for the multisine).
 """

@@ -1,6 +1,7 @@
 """Diagnose concealed cases blind and score the answers: `python analysis/score_concealed.py FOLDER [--half
 tuning|reporting|all] [--out FILE] [--jobs N]`.
- FOLDER holds case-NNN/ (recordings and datasheet) and truth/case-NNN.json, as ../shared/concealed does and
+
+FOLDER holds case-NNN/ (recordings and datasheet) and truth/case-NNN.json, as ../shared/concealed does and
 concealed_cases.py writes. Each case is handed to `ers diagnose` as files; its truth is opened only after its answer has
 been printed. Lines go to FILE as they come, and a second run with the same FILE goes on where the first ended.
 """

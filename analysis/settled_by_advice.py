@@ -1,6 +1,7 @@
 """Does the recording that is advised settle what it promises? `python analysis/settled_by_advice.py [--seed N]
 [--servos N]`.
- Each servo differs from Table 1 at random and has one weak effect of a class whose members are easily confused. Its
+
+Each servo differs from Table 1 at random and has one weak effect of a class whose members are easily confused. Its
 recordings are gentle. All members are fitted to them, the next recording is advised, made by the true servo (not by a
 fitted model), and added. Beside it a recording of the kind at hand is added instead. Printed: probability of the truth
 with the recordings at hand, with one more of the same kind, with the one advised; and C that separates the best wrong

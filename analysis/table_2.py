@@ -1,6 +1,7 @@
 """The paper's identification experiment, Table 2 and Figure 10, with rivals: `python analysis/table_2.py --trials 30
 --seed 7`.
- Table 2's plant under 2 s of the package's multisine at 1 kHz, without noise. Each method minimises Eq. (13) over the
+
+Table 2's plant under 2 s of the package's multisine at 1 kHz, without noise. Each method minimises Eq. (13) over the
 paper's nine parameters, in its own units, within [0.2, 3] x truth. Printed: the fitness reached, evaluations to given
 fitnesses, processor time, and the paper's errors (41), (42) of the nine parameters beside those of the seven
 combinations that angle and voltage can tell. Then the same for IGA within other bounds: what the nine errors measure.

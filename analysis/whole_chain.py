@@ -1,5 +1,6 @@
 """The paper's whole chain: `python analysis/whole_chain.py --method iga --seed 21`.
- A plant (Table 1; the reduced model, then MuJoCo) is recorded under the package's multisine with 0.01 deg of noise.
+
+A plant (Table 1; the reduced model, then MuJoCo) is recorded under the package's multisine with 0.01 deg of noise.
 What is known beforehand is Table 1 with every letter scaled at random within --off. The recording is identified by
 --method on the same kind of plant; the finite-time law's k_2, k_3, l and gamma are searched on the identified model for
 --settling-ms; that law, which knows nothing but the identified model, then runs the plant, beside the same law with

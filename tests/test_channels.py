@@ -9,7 +9,7 @@ from ers_mj.data.prepared import Blocks, trace_of
 from ers_mj.data.recording import from_arrays
 from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.estimation.baseline import baseline
-from ers_mj.estimation.fit import residuals
+from ers_mj.estimation.objective import residuals
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import read_datasheet

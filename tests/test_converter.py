@@ -12,8 +12,10 @@ from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import from_arrays
 from ers_mj.estimation import baseline
 from ers_mj.estimation.baseline import Start, sharpened
-from ers_mj.estimation.fit import fit, residuals, run_of, step_of
+from ers_mj.estimation.fit import fit
 from ers_mj.estimation.initial_state import with_starts
+from ers_mj.estimation.jacobian import step_of
+from ers_mj.estimation.objective import residuals, run_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.candidates import _is_within_a_step

@@ -11,7 +11,8 @@ from test_reduced import SCALES
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
 from ers_mj.effects import BY_NAME, EFFECTS
-from ers_mj.estimation.fit import residuals, step_of
+from ers_mj.estimation.jacobian import step_of
+from ers_mj.estimation.objective import residuals
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.model import OBSERVER_RATE, Model

@@ -9,8 +9,10 @@ from servo import NAMES, TRUTH, T, recorded, started
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
+from ers_mj.decisions.explained import score
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import fit, residuals, score, tau_of
+from ers_mj.estimation.fit import fit
+from ers_mj.estimation.objective import residuals, tau_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
 from ers_mj.selection import candidates as race

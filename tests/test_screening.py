@@ -8,9 +8,10 @@ from servo import TRUTH, T, recorded, started
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
+from ers_mj.decisions.explained import score
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import baseline
-from ers_mj.estimation.fit import residuals, residuals_in, run_of, score
+from ers_mj.estimation.objective import residuals, residuals_in, run_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection import screening

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from servo import TRUTH, recorded, started
 
+from ers_mj.decisions.explained import score
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import fit, score
+from ers_mj.estimation.fit import fit
 from ers_mj.selection import moves as reviews
 from ers_mj.selection import stepwise as selection
 from ers_mj.selection.comparison import Candidate, judged

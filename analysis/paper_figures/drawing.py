@@ -1,5 +1,6 @@
 """What the scripts of this folder share: the trials behind a figure, their curves and bars, and where pictures go.
- The paper's figures 7 and 8 are simulations of Eq. (5) at 10 kHz; 11 to 15 were measured on its test bench, in whose
+
+The paper's figures 7 and 8 are simulations of Eq. (5) at 10 kHz; 11 to 15 were measured on its test bench, in whose
 place stands the MuJoCo plant here, with a sensor noise of 0.01 deg and a loop of 1 kHz. Beside the paper's three laws
 stands the fair rival, its PID with the feed-forward of FTRC.
 """

@@ -10,6 +10,7 @@ from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
 
 FEWEST_SAMPLES = 100
+GAP = 3.0  # a step of time longer than this many median steps is a gap
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,6 @@ class Limits:
     """From where on a recording is refused, or something of it told."""
 
     most_missing: float = 0.20  # share of a column: a required one is refused, another one not used
-    gap: float = 3.0  # median steps of time, from which a longer one is a gap
     least_jitter: float = 0.01  # rms share of the step from which jitter is worth a sentence
 
 
@@ -122,7 +122,7 @@ def _told_blanks(x: np.ndarray, label: str, field: str) -> str:
 
 def _told_gaps(t: np.ndarray) -> list[str]:
     dt = np.diff(t)
-    gaps = np.flatnonzero(dt > LIMITS.gap * np.median(dt))
+    gaps = np.flatnonzero(dt > GAP * np.median(dt))
     if not gaps.size:
         return []
     k = gaps[np.argmax(dt[gaps])]
@@ -131,7 +131,7 @@ def _told_gaps(t: np.ndarray) -> list[str]:
 
 def _told_jitter(t: np.ndarray) -> list[str]:
     dt = np.diff(t) / np.median(np.diff(t))
-    jitter = np.sqrt(np.mean((dt[dt <= LIMITS.gap] - 1) ** 2))
+    jitter = np.sqrt(np.mean((dt[dt <= GAP] - 1) ** 2))
     return [f"the steps of time jitter by {jitter:.1%} rms"] if jitter > LIMITS.least_jitter else []
 
 

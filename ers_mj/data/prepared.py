@@ -9,9 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ers_mj.data.quantisation import COARSE, Converter
+from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import Recording
 from ers_mj.data.sensor_faults import at_extreme, converter_step, frozen_spans, leapt_spans, spikes, unmoved_spans
+from ers_mj.decisions.policy import POLICY
 
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or BEGINNING.samples, whichever is longer
@@ -223,7 +224,10 @@ def _meets(span: slice, others: Sequence[slice]) -> bool:
 
 def counted(traces: Sequence[Trace], travel: float) -> list[Trace]:
     """The traces with their converters, where these are coarse for the travel [output unit]."""
-    return [replace(t, converter=Converter(t.quantum, t.sigma)) if t.quantum > COARSE * travel else t for t in traces]
+    return [
+        replace(t, converter=Converter(t.quantum, t.sigma)) if t.quantum > POLICY.coarse_step * travel else t
+        for t in traces
+    ]
 
 
 def _supply(recording: Recording) -> np.ndarray | None:

@@ -14,14 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-COARSE, FINE = (
-    1 / 300,
-    1 / 1000,
-)  # share of the travel from which a step is an effect whatever its size, and up to which an ordinary one
-ORDINARY = math.radians(
-    0.03
-)  # of a rudder's angle, the step of an ordinary converter at most: 12 bits over 120 degrees have 0.0293
-
 
 @dataclass(frozen=True)
 class Weighing:

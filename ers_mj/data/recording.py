@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ers_mj.data.checks import FEWEST_SAMPLES as FEWEST_SAMPLES
+from ers_mj.data.checks import GAP as GAP
 from ers_mj.data.checks import checked, ignored, locked, problems_of, refuse_time
 from ers_mj.data.columns import COLUMNS, OPTIONAL, choose_columns, refuse_unknown_unit
 from ers_mj.data.sensor_faults import converter_step

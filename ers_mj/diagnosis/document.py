@@ -10,11 +10,11 @@ import numpy as np
 
 from ers_mj import __version__
 from ers_mj.data.prepared import Trace
+from ers_mj.decisions.explained import cost
 from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map, shaded
-from ers_mj.diagnosis.verdict import HALF, TIED, Case
+from ers_mj.diagnosis.verdict import Case
 from ers_mj.effects import BY_NAME, Parameter
-from ers_mj.estimation.fit import score
 from ers_mj.experiment_design.next_recording import next_recording
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.selection.confirmation import delta_bic
@@ -24,10 +24,6 @@ from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import BASE, STATES
 from ers_mj.servo.simulation import PER_INERTIA, unit_of
 
-LEAST_FACTOR, LEAST_OFFSET = (
-    0.02,
-    0.01,
-)  # of a gain or friction level, and of half the travel: a smaller drift is not worth a line
 SHEET_UNITS = {
     "J": "kg m^2",
     "B": "N m s/rad",
@@ -103,7 +99,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
 def _missing(case: Case) -> list[dict]:
     sensors = [_symptom(case, name, values) for name, values in case.sensors.items()]
     effects = [_effect(case, name) for name in case.told_effects]
-    effects.sort(key=lambda e: -float(np.sum(score(case.confirmed.without[e["effect"]].misfit, 1.0))))
+    effects.sort(key=lambda e: -cost(case.confirmed.without[e["effect"]].misfit, 1.0))
     return effects + sensors
 
 
@@ -204,7 +200,7 @@ def _alternatives(case: Case, name: str) -> list[dict]:
     on them.
     """
     ranked, weights = case.found(name)
-    others = [c for c in ranked[1:] if weights[c.name] > TIED]
+    others = [c for c in ranked[1:] if weights[c.name] > case.policy.tied]
     apart = isolability(ranked[0].fit, [c.fit for c in others], case.start.traces) if others else []
     return [
         {
@@ -284,7 +280,8 @@ def _record_state(case: Case, held: list[Trace]) -> list[dict]:
             *(errors.get((name, k), unknown) for k in range(count)),
             *(s[name][1:] if name in s else unknown for s in later),
         ]
-        least = LEAST_OFFSET * case.start.fit.model.scales.position if name == "offset" else LEAST_FACTOR
+        travel, policy = case.start.fit.model.scales.position, case.policy
+        least = policy.state_offset * travel if name == "offset" else policy.state_factor
         if any(
             abs(v - rest) > least and not low <= rest <= high for v, (low, high) in zip(values, ci95) if low is not None
         ):
@@ -323,7 +320,10 @@ def _sentence(case: Case, missing: list, found: list[Place]) -> str:
                 else f"Only the sensor shows: {names}."
             )
         told = "held-out error"
-        if fits["heldout_rmse_after_rad"] > math.sqrt(HALF) * fits["heldout_rmse_before_rad"] and case.holdout:
+        if (
+            fits["heldout_rmse_after_rad"] > math.sqrt(case.policy.half) * fits["heldout_rmse_before_rad"]
+            and case.holdout
+        ):
             told = "held-out error, once gain, offset and friction level of that day are known,"
             before, after = (_shown(fits[f"recalibrated_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
         return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."

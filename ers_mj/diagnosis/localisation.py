@@ -1,6 +1,7 @@
 """Where does the refitted baseline fail? In time, angle, speed, direction, input level, frequency, and in which
 subsystem.
- The error that is located is that of a fast observer (LOCAL_RATE): it forgets within 1 / LOCAL_RATE, so that a force
+
+The error that is located is that of a fast observer (LOCAL_RATE): it forgets within 1 / LOCAL_RATE, so that a force
 that was missing shows where it was missing and not where its effect on the angle ended.
 """
 
@@ -20,9 +21,18 @@ from ers_mj.selection.comparison import Candidate
 from ers_mj.servo.model import Model
 
 LOCAL_RATE = 30.0  # [1/s]
-BINS = 24
-LEAST_SHARE = 0.05  # of the misfit from which a subsystem is told
-LEAST_EXCESS = 0.2  # share of error minus share of time from which a region is worth a sentence
+
+
+@dataclass(frozen=True)
+class Telling:
+    """What is worth a sentence."""
+
+    bins: int = 24  # of an axis
+    least_share: float = 0.05  # of the misfit from which a subsystem is told
+    least_excess: float = 0.2  # share of error minus share of time from which a region is
+
+
+TELLING = Telling()
 
 
 @dataclass(frozen=True)
@@ -107,7 +117,7 @@ def places(
     time they hold.
     """
     found = [*_by_value(samples, output_unit, input_unit), *_by_direction(samples), *_by_time(samples, traces)]
-    found = [p for p in found if p.share_of_error - p.share_of_time >= LEAST_EXCESS]
+    found = [p for p in found if p.share_of_error - p.share_of_time >= TELLING.least_excess]
     if spectrum is not None and spectrum.region is not None:
         found.append(
             Place(
@@ -139,7 +149,7 @@ def _by_value(samples: Samples, output_unit: str, input_unit: str) -> list[Place
         low, high = np.quantile(values, [0.001, 0.999])
         if high <= low:
             continue
-        a, b, error, time = _best_interval(values, samples.before, np.linspace(low, high, BINS + 1))
+        a, b, error, time = _best_interval(values, samples.before, np.linspace(low, high, TELLING.bins + 1))
         out.append(
             Place(
                 axis,
@@ -187,7 +197,7 @@ def _by_time(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
         if not mask.any():
             continue
         a, b, error, time = _best_interval(
-            samples.t[mask], samples.before[mask], np.linspace(trace.t[0], trace.t[-1], BINS + 1)
+            samples.t[mask], samples.before[mask], np.linspace(trace.t[0], trace.t[-1], TELLING.bins + 1)
         )
         part = float(samples.before[mask].sum() / max(samples.before.sum(), 1e-300))
         whole = float(mask.mean())
@@ -217,7 +227,7 @@ def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named
             subsystem = BY_NAME[candidate.name].subsystem
             best[subsystem] = max(best.get(subsystem, (0.0, "")), (share, candidate.name))
     lead = list(dict.fromkeys(BY_NAME[name].subsystem for name in named))
-    ranked = sorted((s for s in best if s not in lead and best[s][0] > LEAST_SHARE), key=lambda s: -best[s][0])
+    ranked = sorted((s for s in best if s not in lead and best[s][0] > TELLING.least_share), key=lambda s: -best[s][0])
     out = []
     for subsystem in (*lead, *ranked):
         share, name = best.get(subsystem, (None, None))

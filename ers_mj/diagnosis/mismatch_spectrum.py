@@ -22,20 +22,39 @@ from ers_mj.data.frequency_response import Response, gap, shortest_band
 from ers_mj.data.prepared import Trace
 from ers_mj.servo.model import OBSERVER_STEP
 
-FRAMES = 8  # lengths of a frame in the median recording
-FIRST = 2  # line from which the window's leakage leaves something to read
-TOP = 0.4  # of the rate at which the observer corrects itself: its steps are no motion
-FEWEST_FRAMES, LEAST_SAMPLES = 6, 32  # of an analysis; of a frame
-FEWEST_LINES = 3  # off beyond the noise, or coherent, before anything is told of them
-BEYOND = 7.0  # over the root of the number of frames: excess over the noise, five deviations, from which a line is off
-REGION = 2 / 3  # of the error beyond the noise that the region holds
-LINEAR, DISTORTED = 0.6, 0.4  # share of the error there that is linear, from which and up to which it is called so
-PHASE, DELAY = (
-    2.0,
-    0.7,
-)  # times the size's gap that a phase's must be; share of it that a delay explains, to be told alone
-NEIGHBOURS = 1  # lines on either side over which a linear part is straight
-RESONANT = 0.1  # ln of a peak of measured over simulated motion, from which it is called a resonance (0.9 dB)
+
+@dataclass(frozen=True)
+class Frames:
+    """How recordings are cut into frames."""
+
+    lengths: int = 8  # of a frame in the median recording
+    first: int = 2  # line from which the window's leakage leaves something to read
+    top: float = 0.4  # of the rate at which the observer corrects itself: its steps are no motion
+    fewest: int = 6  # of an analysis
+    least_samples: int = 32  # of a frame
+
+
+FRAMING = Frames()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What spectra must show for something to be told."""
+
+    fewest_lines: int = 3  # off beyond the noise, or coherent
+    # over the root of the number of frames: excess over the noise, five deviations, from which a line is off
+    beyond: float = 7.0
+    region: float = 2 / 3  # of the error beyond the noise that the region holds
+    linear: float = 0.6  # share of the error there that is linear, from which it is called so
+    distorted: float = 0.4  # up to which it is called a distortion
+    phase: float = 2.0  # times the size's gap that a phase's must be
+    delay: float = 0.7  # share of it that a delay explains, to be told alone
+    neighbours: int = 1  # lines on either side over which a linear part is straight
+    # ln of a peak of measured over simulated motion, from which it is called a resonance (0.9 dB)
+    resonant: float = 0.1
+
+
+READING = Reading()
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +67,8 @@ class Mismatch:
         beyond: which lines are off beyond the noise, (F,) of bool; in half of the frames at least, so that some in
             which stick and slip fork are not enough.
         response: measured over simulated output, as in a free run.
-        region: the shortest band [Hz], in log frequency, that holds REGION of the error beyond the noise; None where
-        fewer than FEWEST_LINES are off. share_of_error, share_of_motion: of the power of either that lies in it.
+        region: the shortest band [Hz], in log frequency, that holds READING.region of the error beyond the noise; None
+        where too few lines are off. share_of_error, share_of_motion: of the power of either that lies in it.
         linear_share: of the error beyond the noise that lies in it, the part that is linear.
         kind: "linear", "distortion" or "both"; None without a region.
         sentence: all of it in words.
@@ -82,17 +101,17 @@ def mismatch(traces: Sequence[Trace], errors: Sequence[np.ndarray], rate: float)
     Returns:
         None where the recordings are too short.
     """
-    length = float(np.median([t.t[-1] - t.t[0] for t in traces])) / FRAMES  # [s] of a frame
+    length = float(np.median([t.t[-1] - t.t[0] for t in traces])) / FRAMING.lengths  # [s] of a frame
     parts = [
         _framed(t, e, length, rate)
         for t, e in zip(traces, errors, strict=True)
-        if round(length / t.sample_time) >= LEAST_SAMPLES
+        if round(length / t.sample_time) >= FRAMING.least_samples
     ]
-    if sum(part[0].shape[0] for part in parts) < FEWEST_FRAMES:
+    if sum(part[0].shape[0] for part in parts) < FRAMING.fewest:
         return None
     lines = min(part[0].shape[1] for part in parts)
-    X, U, E, noise = (np.concatenate([part[k][:, FIRST:lines] for part in parts]) for k in range(4))
-    return _told(*_split(np.arange(FIRST, lines) / length, X, U, E, noise, rate))
+    X, U, E, noise = (np.concatenate([part[k][:, FRAMING.first : lines] for part in parts]) for k in range(4))
+    return _told(*_split(np.arange(FRAMING.first, lines) / length, X, U, E, noise, rate))
 
 
 def _framed(trace: Trace, error: np.ndarray, length: float, rate: float) -> tuple[np.ndarray, ...]:
@@ -106,7 +125,7 @@ def _framed(trace: Trace, error: np.ndarray, length: float, rate: float) -> tupl
     t = trace.t[0] + h * np.arange(int((trace.t[-1] - trace.t[0]) / h + 1.5))
     e, y, u = np.interp(t, trace.t[v], error), np.interp(t, trace.t[v], trace.y[v]), np.interp(t, trace.t, trace.u)
     every = max(1, round(OBSERVER_STEP / h))
-    lines = int(TOP * size / every) + 1
+    lines = int(FRAMING.top * size / every) + 1
     X, U, E = (_frames(x, size, lines) * math.sqrt(h) for x in (y - e, u, e))
     noise = observed_noise(np.arange(lines) / (h * size), h, every, trace.sigma, rate)
     return X, U, E, np.broadcast_to(noise, E.shape)
@@ -137,7 +156,7 @@ def _split(f_hz: np.ndarray, X: np.ndarray, U: np.ndarray, E: np.ndarray, noise:
     K, S_ee, level = X.shape[0], np.mean(np.abs(E) ** 2, axis=0), noise.mean(axis=0)
     share = np.array([_linear_share(X, U, E, k) for k in range(f_hz.size)])
     linear, distortion = share * S_ee, np.maximum((1.0 - share) * S_ee - level, 0.0)
-    beyond = np.median(np.abs(E) ** 2 / noise, axis=0) / math.log(2.0) > 1.0 + BEYOND / math.sqrt(K)
+    beyond = np.median(np.abs(E) ** 2 / noise, axis=0) / math.log(2.0) > 1.0 + READING.beyond / math.sqrt(K)
     return (
         f_hz,
         np.mean(np.abs(X + E) ** 2, axis=0),
@@ -157,7 +176,7 @@ def _linear_share(X: np.ndarray, U: np.ndarray, E: np.ndarray, k: int) -> float:
     A sweep passes a line in a frame or two, which one complex number explains whatever the reason; over the neighbours
     it takes more. The number of independent terms is told by how evenly the error's power is spread over them.
     """
-    near = slice(max(k - NEIGHBOURS, 0), k + NEIGHBOURS + 1)
+    near = slice(max(k - READING.neighbours, 0), k + READING.neighbours + 1)
     x, u, e = X[:, near], U[:, near], E[:, near].ravel()
     r = np.arange(E.shape[1])[near] - k
     columns = [(z / math.sqrt(max(np.mean(np.abs(z) ** 2), 1e-300)) * w).ravel() for z in (x, u) for w in (1.0, r)]
@@ -174,7 +193,7 @@ def _response(f_hz: np.ndarray, X: np.ndarray, E: np.ndarray, rate: float) -> Re
     X = Y - free
     S_xx, S_yy, S_xy = np.mean(np.abs(X) ** 2, axis=0), np.mean(np.abs(Y) ** 2, axis=0), np.mean(X.conj() * Y, axis=0)
     coherence = np.abs(S_xy) ** 2 / np.maximum(S_xx * S_yy, 1e-300)
-    size = np.sqrt(S_yy * f_hz[0] / FIRST)
+    size = np.sqrt(S_yy * f_hz[0] / FRAMING.first)
     return Response(
         "measured over simulated",
         "frames",
@@ -192,15 +211,15 @@ def _response(f_hz: np.ndarray, X: np.ndarray, E: np.ndarray, rate: float) -> Re
 def _told(f_hz, motion, error, linear, distortion, noise, beyond, response) -> Mismatch:
     """The region, and what is in it."""
     parts = f_hz, motion, error, linear, distortion, noise, beyond, response
-    if beyond.sum() < FEWEST_LINES:
+    if beyond.sum() < READING.fewest_lines:
         return Mismatch(*parts)
     excess = np.where(beyond, np.maximum(error - noise, 0.0), 0.0)
-    low, high = shortest_band(f_hz[beyond], excess[beyond], REGION)
-    inside, half = (f_hz >= low) & (f_hz <= high), 0.5 * f_hz[0] / FIRST
+    low, high = shortest_band(f_hz[beyond], excess[beyond], READING.region)
+    inside, half = (f_hz >= low) & (f_hz <= high), 0.5 * f_hz[0] / FRAMING.first
     share, moving = float(excess[inside].sum() / excess.sum()), float(motion[inside].sum() / motion.sum())
     both = float((linear + distortion)[inside & beyond].sum())
     part = float(linear[inside & beyond].sum()) / max(both, 1e-300)
-    kind = "linear" if part >= LINEAR else "distortion" if part <= DISTORTED else "both"
+    kind = "linear" if part >= READING.linear else "distortion" if part <= READING.distorted else "both"
     region = float(low - half), float(high + half)
     sentence = (
         f"{share:.0%} of the error beyond the noise lies at {region[0]:.2g} to {region[1]:.2g} Hz, where {moving:.0%}"
@@ -221,13 +240,13 @@ def _shape(response: Response, beyond: np.ndarray) -> str:
     """
     sure = response.sure & beyond
     found = gap(response, np.ones_like(response.g))
-    if sure.sum() < FEWEST_LINES or found is None:
+    if sure.sum() < READING.fewest_lines or found is None:
         return ""
     f, phase, size = response.f_hz[sure], np.unwrap(np.angle(response.g[sure])), np.log(np.abs(response.g[sure]))
     late = -float(f @ phase) / (2.0 * np.pi * float(f @ f))  # [s]
-    if phase @ phase >= PHASE * (size @ size) and np.sum((phase + 2.0 * np.pi * f * late) ** 2) <= (1.0 - DELAY) * (
-        phase @ phase
-    ):
+    if phase @ phase >= READING.phase * (size @ size) and np.sum((phase + 2.0 * np.pi * f * late) ** 2) <= (
+        1.0 - READING.delay
+    ) * (phase @ phase):
         return (
             f": a phase that grows with frequency, to {math.degrees(abs(2 * np.pi * f[-1] * late)):.2g} deg at"
             f" {f[-1]:.2g} Hz, as where the motion comes {1e3 * abs(late):.2g} ms {'later' if late > 0 else 'earlier'}"
@@ -235,7 +254,7 @@ def _shape(response: Response, beyond: np.ndarray) -> str:
         )
     peak = int(np.argmax(np.abs(size)))
     if max(abs(size[0]), abs(size[-1])) < 0.5 * abs(size[peak]):
-        of_what = ", as by a resonance that the model lacks" if size[peak] > RESONANT else ""
+        of_what = ", as by a resonance that the model lacks" if size[peak] > READING.resonant else ""
         return (
             f": the motion is {20 * size[peak] / math.log(10):+.2g} dB off the model's at {f[peak]:.2g} Hz and less on"
             f" either side{of_what}"

@@ -1,5 +1,6 @@
 """The main job: recordings in, the missing physics out.
- traces -> baseline -> selection -> held-out confirmation -> localisation -> intervals -> document (diagnosis.json) and
+
+traces -> baseline -> selection -> held-out confirmation -> localisation -> intervals -> document (diagnosis.json) and
 evidence
 """
 
@@ -11,24 +12,21 @@ from dataclasses import replace
 import numpy as np
 
 from ers_mj.data.prepared import Trace, counted, trace_of
-from ers_mj.data.quantisation import COARSE, FINE, ORDINARY
 from ers_mj.data.recording import Recording
+from ers_mj.decisions.policy import POLICY, Policy
 from ers_mj.diagnosis.document import Diagnosis, told
 from ers_mj.diagnosis.mujoco_check import Rig
 from ers_mj.diagnosis.verdict import Case
-from ers_mj.effects import SUSPECTS
+from ers_mj.effects import BY_NAME, SUSPECTS
+from ers_mj.effects.base import Symptoms
 from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes
 from ers_mj.selection.confirmation import confirmed
-from ers_mj.selection.confounders import unmasked
+from ers_mj.selection.confounders import without_confounders
 from ers_mj.selection.stepwise import select
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import MOST_TAU, Model
-
-FEWEST_LOST = 3  # dropouts from which a sensor is said to have them
-# share of the most that the baseline allows of a known inductance, from which it may be more than an ordinary one
-AT_BOUND = 0.95
 
 Progress = Callable[[str, float], None]
 
@@ -41,6 +39,7 @@ def diagnose(
     seed: int = 0,
     jobs: int | None = None,
     progress: Progress = lambda text, share: None,
+    policy: Policy = POLICY,
 ) -> Diagnosis:
     """Locate, name and model what a simulation of these recordings leaves out.
 
@@ -51,6 +50,7 @@ def diagnose(
         seed: kept in the document; nothing here draws random numbers.
         jobs: threads; all cores by default. The result does not depend on it.
         progress: called with a text and a share of the work done.
+        policy: the thresholds that decide.
 
     Raises:
         InputError: no motion of the model resembles the recordings.
@@ -62,14 +62,15 @@ def diagnose(
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
-    sensors = _symptoms(recordings, start.traces, travel)
+    sensors = _symptoms(recordings, start.traces, travel, policy)
     chosen = select(
         start.fit,
         start.traces,
         anchors=start.anchors,
-        exclude=(*_ordinary(start.fit.model), *SUSPECTS),
+        exclude=(*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,
+        policy=policy,
     )
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
     chosen = replace(
@@ -77,45 +78,44 @@ def diagnose(
     )
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
-    selection, judged = confirmed(start, chosen, held, jobs)
-    named, suspects = unmasked(selection, start.traces, jobs)
+    selection, judged = confirmed(start, chosen, held, jobs, policy)
+    named, suspects = without_confounders(selection, start.traces, jobs)
     if named is not selection:
-        selection, judged = confirmed(start, named, held, jobs)
+        selection, judged = confirmed(start, named, held, jobs, policy)
     progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
     before = rig.rmse(judged.base_models, judged.parts, jobs)
     multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
     progress("locating", 0.92)
-    case = Case(recordings, list(holdout), datasheet, start, selection, judged, sensors, suspects, seed, rig, multibody)
+    case = Case(
+        recordings, list(holdout), datasheet, start, selection, judged, sensors, suspects, seed, rig, multibody, policy
+    )
     return told(case, held)
 
 
-def _ordinary(model: Model) -> tuple[str, ...]:
+def _ordinary(model: Model, policy: Policy) -> list[str]:
     """Effects that are none here: a winding whose inductance a datasheet gives has it, as long as it is not about twice
     that.
     """
     known = model.scales.tau_e_datasheet
-    return ("inductance",) if known and model.values["tau_e"] < AT_BOUND * MOST_TAU * known else ()
+    if not known or model.values["tau_e"] >= policy.ordinary_inductance * MOST_TAU * known:
+        return []
+    return [effect.name for effect in BY_NAME.values() if "tau_e" in effect.absorbs]
 
 
-def _symptoms(recordings: Sequence[Recording], traces: Sequence[Trace], travel: float) -> dict[str, np.ndarray]:
-    """Sensor effects that show in the data itself, with their parameters.
-
-    A converter is one where it is coarse for the travel, or coarser than those of rudders' angles are and not fine for
-    the travel.
-    """
-    found = {}
-    lost = [(t, span) for t in traces for span in t.lost]
-    if len(lost) >= FEWEST_LOST:
-        seconds = sum(float(t.t[-1] - t.t[0]) for t in traces)
-        found["sensor_dropout"] = np.array(
-            [len(lost) / seconds, np.mean([(s.stop - s.start) * t.sample_time for t, s in lost])]
-        )
-    quanta = [t.quantum for t in traces]
-    unusual = recordings[0].output_unit == "rad" and np.median(quanta) > max(ORDINARY, FINE * travel)
-    if max(quanta) > COARSE * travel or unusual:
-        found["sensor_quantisation"] = np.array([max(quanta)])
-    return found
+def _symptoms(
+    recordings: Sequence[Recording], traces: Sequence[Trace], travel: float, policy: Policy
+) -> dict[str, np.ndarray]:
+    """Sensor effects that show in the data itself, with their parameters (see Effect.symptom)."""
+    seen = Symptoms(
+        dropouts=np.array([(s.stop - s.start) * t.sample_time for t in traces for s in t.lost]),
+        seconds=sum(float(t.t[-1] - t.t[0]) for t in traces),
+        quanta=np.array([t.quantum for t in traces]),
+        travel=travel,
+        is_angle=recordings[0].output_unit == "rad",
+    )
+    found = ((effect.name, effect.symptom(seen, policy)) for effect in BY_NAME.values())
+    return {name: values for name, values in found if values is not None}
 
 
 def _cores() -> int:

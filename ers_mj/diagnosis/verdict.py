@@ -13,46 +13,23 @@ import numpy as np
 
 from ers_mj.data.prepared import Blocks
 from ers_mj.data.recording import Recording
+from ers_mj.decisions import conclusion
+from ers_mj.decisions.explained import cost, is_consistent
+from ers_mj.decisions.policy import POLICY, Policy
 from ers_mj.diagnosis.mujoco_check import Rig, run_in_mujoco
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
-from ers_mj.estimation.fit import Fit, residuals, score
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.intervals import half_widths, slopes_of, unseen_widths
+from ers_mj.estimation.objective import Fit, residuals
 from ers_mj.selection.comparison import Candidate
 from ers_mj.selection.confirmation import Confirmed
 from ers_mj.selection.cross_validation import Score, pooled, recalibrated, scored
 from ers_mj.selection.posterior import probabilities
 from ers_mj.selection.stepwise import Selection
-from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere, more_is_missing
+from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.model import STATES, Model
-
-CONSISTENT = 0.05  # cost per block up to which a model explains the data within its noise (an error of 0.3 sigma RMS)
-TIED = 0.02  # weight from which a rival is told as an alternative
-VISIBLE = 1.5  # noise levels of free-run error from which a recording shows a mismatch
-FREE, FREE_HELD = (
-    1.02,
-    1.15,
-)  # noise levels of free-run error up to which training and held-out recordings show nothing but noise
-# times the noise by which the free run of every held-out recording misses: forks of stick and slip lose one or another
-ASTRAY = 30.0
-HALF = 0.5  # share of the squared held-out error that the named effects must explain
-NEARLY_ALL = 0.98  # that another form of the right law explains
-LEFT = (
-    0.115  # of what is left in the output (see whiteness.py), 0.35 noise levels, from which it counts beside that share
-)
-# of the same in the recordings but the worst, 0.23 noise levels, from which a model without effects misses something:
-# none of 65 nulls (4133 to 4135) leaves it
-FAINT = 0.05
-MUCH, NEARLY_GONE = (
-    30.0,
-    0.75,
-    # held-out C that shows a mismatch beyond any doubt, and the share of it, or of what memory tells, that goes with what
-    # acts
-)
-FAIR = 0.4  # share of the squared held-out error that is enough beside memory of which NEARLY_GONE goes
-LOST = 6.0  # noise levels of free-run error after, from which stick and slip that fork are what a free run misses
+from ers_mj.servo.model import OBSERVER_RATE, STATES, Model
 
 
 @dataclass(frozen=True)
@@ -71,6 +48,7 @@ class Case:
     seed: int
     rig: Rig
     multibody: tuple[float | None, float | None]
+    policy: Policy = POLICY
 
     @property
     def model(self) -> Model:
@@ -143,6 +121,12 @@ class Case:
             for models in (c.base_models, c.models)
         )
 
+    # -- what decisions/conclusion.py reads ----------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.model.names
+
     @cached_property
     def explained(self) -> float:
         """Share of the squared held-out free-run error above the noise that the named effects take away.
@@ -151,118 +135,74 @@ class Case:
         tells more. Where stick and slip fork in one recording its free run is lost with any model and swamps the rest:
         the mean over recordings tells more then.
         """
-        shares, c = [], self.confirmed
+        c = self.confirmed
         noise = math.sqrt(float(np.mean([fold.held_out.sure_noise**2 for fold in c.parts])))
-        for ends in ((pooled(c.before), pooled(c.after)), *([self._again] if self.holdout else [])):
-            shares.append(_share(*(score.sure**2 for score in ends), noise**2))
-        return max(*shares, self._explained_each())
-
-    def _explained_each(self) -> float:
-        """The mean of that share over the held-out recordings, or halves of one, whose error without the effects is
-        above the noise.
-
-        One whose free run is lost with and without them tells nothing, as long as there are others: by ASTRAY, or,
-        where the effects leave nothing beyond the noise (see whiteness.py), by LOST, since stick and slip must have
-        forked then. Where there are no others the observer's held-out error tells their share. Where no error is above
-        the noise, of which the estimate may be too large, and memory tells of a mismatch, memory tells the share.
-        """
-        forked = not more_is_missing(self.left, None)
-        above = [(b, a, noise) for b, a, noise in self.confirmed.shown if b.sure > VISIBLE * noise]
-        if not above and more_is_missing(self.left_before, None):
-            kind = max(self.left_before, key=self.left_before.get)
-            return _share(*(math.expm1(left[kind]) for left in (self.left_before, self.left)), 0.0)
-        told = [ends for ends in above if min(ends[0].sure, ends[1].sure) < (LOST if forked else ASTRAY) * ends[2]]
-        if told or not forked:
-            shares = [_share(b.sure**2, a.sure**2, noise**2) for b, a, noise in told or above]
-        else:
-            shares = [_share(*(float(np.mean(np.maximum(s.misfit, 1.0))) for s in (b, a)), 1.0) for b, a, _ in above]
-        return float(np.mean(shares)) if shares else 0.0
-
-    def _goes_in_blocks(self) -> bool:
-        """Whether nearly all of a large held-out C goes with the named effects: stick and slip that fork have lost the
-        free runs then. Of what has no name a mimic takes away half (of 20 outsiders of 4157 to 4168 with one 0.55 at
-        most, by what was fitted)."""
-        before, after = (
-            float(np.sum(score(pooled(scores).misfit, 1.0))) for scores in (self.confirmed.before, self.confirmed.after)
-        )
-        return before > MUCH and after < (1.0 - NEARLY_GONE) * before
-
-    def _goes_from_memory(self) -> bool:
-        """Whether nearly all that the output remembers of a mismatch goes with the named effects, and a FAIR share of
-        the free-run error: one free run that stick and slip lose weighs as much as one that is met."""
-        before, after = (max(left["output"], 0.0) for left in (self.left_before, self.left))
-        return (
-            self.explained >= FAIR and more_is_missing(self.left_before, None) and after < (1.0 - NEARLY_GONE) * before
-        )
-
-    @cached_property
-    def more_is_missing(self) -> bool:
-        """Whether the model leaves more than noise (see whiteness.py): of the output nothing where free runs leave
-        none, whatever forks in the observer.
-        """
-        free = (
-            self.fits["train_rmse_after_rad"] < FREE * self.noise
-            and self.fits["heldout_rmse_after_rad"] < FREE_HELD * self.noise
-        )
-        left = {**self.left, "output": 0.0} if free else self.left
-        if more_is_missing(left, self.left_before if self.model.names else None):
-            return True
-        return not (free or self.model.names) and left_elsewhere(self.model, self.start.traces) > FAINT
+        ends = [(pooled(c.before), pooled(c.after)), *([self._again] if self.holdout else [])]
+        shares = [conclusion.share(before.sure**2, after.sure**2, noise**2) for before, after in ends]
+        each = conclusion.explained_each(self._shown, self.left_before, self.left, self.policy)
+        return max(*shares, each)
 
     @property
-    def told_effects(self) -> tuple[str, ...]:
-        """The effects that are named: those of the model, if they account for half of what the baseline leaves, in free
-        run or, beyond doubt, in blocks or memory.
-        """
-        return self.model.names if self.explained >= HALF or self._goes_in_blocks() or self._goes_from_memory() else ()
+    def _shown(self) -> list[conclusion.Shown]:
+        def misfit(s: Score) -> float:
+            return float(np.mean(np.maximum(s.misfit, 1.0)))
 
-    @cached_property
-    def verdict(self) -> str:
-        """One of diagnosis.json's verdicts."""
-        if self.told_effects or self.sensors:
-            return "missing_physics"
-        if self.model.names or self.suspects or self.more_is_missing or self._astray():
-            return "unexplained"
-        return "consistent" if self._datasheet_explains() else "parameters_only"
+        return [conclusion.Shown(b.sure, a.sure, noise, misfit(b), misfit(a)) for b, a, noise in self.confirmed.shown]
 
     @property
-    def more_is_left(self) -> bool:
-        """Whether a mismatch stays that nothing named accounts for."""
-        return (
-            self.verdict == "unexplained"
-            or bool(self.suspects)
-            or self.told_effects != self.model.names
-            or self.more_is_missing
-            or self._is_a_part()
-        )
+    def heldout_cost(self) -> tuple[float, float]:
+        before, after = (pooled(scores).misfit for scores in (self.confirmed.before, self.confirmed.after))
+        return cost(before, 1.0), cost(after, 1.0)
 
-    def _is_a_part(self) -> bool:
-        """Whether memory and held-out error agree that the named effects are a part only, as the mimic of an unknown
-        effect is.
-        """
-        return (
-            bool(self.told_effects)
-            and self.explained < NEARLY_ALL
-            and self.left["output"] > LEFT
-            and self.fits["heldout_rmse_after_rad"] < LOST * self.noise
-        )
+    @cached_property
+    def left_elsewhere(self) -> float:
+        return left_elsewhere(self.model, self.start.traces)
 
-    def _astray(self) -> bool:
-        """Whether no held-out recording is met by a free run, though the observer, which is set right on the way, sees
-        nothing amiss.
-        """
-        return all(
-            s.rmse > ASTRAY * fold.held_out.sigma for s, fold in zip(self.confirmed.before, self.confirmed.parts)
-        )
+    @property
+    def free_train(self) -> float:
+        return self.fits["train_rmse_after_rad"] / self.noise
 
-    def _datasheet_explains(self) -> bool:
+    @property
+    def free_held(self) -> float:
+        return self.fits["heldout_rmse_after_rad"] / self.noise
+
+    @property
+    def least_astray(self) -> float:
+        c = self.confirmed
+        return min(s.rmse / fold.held_out.sigma for s, fold in zip(c.before, c.parts))
+
+    @cached_property
+    def datasheet_explains(self) -> bool:
         known = self.datasheet.to_lumped() if self.datasheet is not None else {}
         if not {"a_2", "b"} <= known.keys():
             return False
         base = self.start.fit.model
         sheet = replace(base, values={**base.values, **{k: v for k, v in known.items() if k in base.values}})
-        misfit = Blocks.of(self.start.traces).misfit(residuals(sheet, with_starts(sheet, self.start.traces), 5.0))
-        return bool(np.all(np.isfinite(misfit))) and float(np.mean(score(misfit, 1.0))) < CONSISTENT
+        left = residuals(sheet, with_starts(sheet, self.start.traces), OBSERVER_RATE)
+        return is_consistent(Blocks.of(self.start.traces).misfit(left), self.policy)
+
+    # -- what follows
+    # ------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def told_effects(self) -> tuple[str, ...]:
+        """The effects that are named."""
+        return tuple(conclusion.told_effects(self, self.policy))
+
+    @cached_property
+    def verdict(self) -> str:
+        """One of diagnosis.json's verdicts."""
+        return conclusion.verdict(self, self.policy)
+
+    @cached_property
+    def more_is_missing(self) -> bool:
+        """Whether the model leaves more than noise."""
+        return conclusion.is_more_missing(self, self.policy)
+
+    @cached_property
+    def more_is_left(self) -> bool:
+        """Whether a mismatch stays that nothing named accounts for."""
+        return conclusion.is_more_left(self, self.policy)
 
     def found(self, name: str) -> tuple[list[Candidate], dict[str, float]]:
         """The effects that were compared when this one was found, itself first, and their probabilities."""
@@ -276,30 +216,28 @@ class Case:
 
     def rivals(self) -> tuple[tuple[str, Fit], list[tuple[str, Fit, float]]]:
         """The answer and what the recordings do not exclude in its place, with probabilities: of the effect with the
-        least certain name. Of a law without a name the effect that explained most before."""
+        least certain name. Of a law without a name the effect that explained most before.
+        """
         if self.suspects:
-            law, first = (
-                self.suspects[0],
-                [
-                    c
-                    for ranked in self.selection.rounds[:1]
-                    for c in ranked
-                    if c.name in BY_NAME and c.name not in self.model.names
-                ],
-            )
-            return (law.name, law.fit), [
-                (c.name, c.fit, probabilities({law.name: law.fit, c.name: c.fit})[c.name]) for c in first[:1]
-            ]
-        chosen = self.selection.chosen
-        best = (" and ".join(self.model.names) or "baseline", chosen), []
-        for name in self.model.names or [
-            ranked[0].name for ranked in self.selection.rounds[-1:] if ranked and self.more_is_missing
-        ]:
+            return self._rivals_of_a_suspect()
+        best = (" and ".join(self.model.names) or "baseline", self.selection.chosen), []
+        for name in self.model.names or self._last_leader():
             ranked, weights = self.found(name)
-            rivals = [(c.name, c.fit, weights[c.name]) for c in ranked[1:] if weights[c.name] > TIED]
+            rivals = [(c.name, c.fit, weights[c.name]) for c in ranked[1:] if weights[c.name] > self.policy.tied]
             if sum(r[2] for r in rivals) > sum(r[2] for r in best[1]):
                 best = (name, ranked[0].fit), rivals
         return best
+
+    def _last_leader(self) -> list[str]:
+        """What led the last round where nothing is named, though something is missing."""
+        return [ranked[0].name for ranked in self.selection.rounds[-1:] if ranked and self.more_is_missing]
+
+    def _rivals_of_a_suspect(self) -> tuple[tuple[str, Fit], list[tuple[str, Fit, float]]]:
+        law, names = self.suspects[0], self.model.names
+        first = [c for ranked in self.selection.rounds[:1] for c in ranked if c.name in BY_NAME and c.name not in names]
+        return (law.name, law.fit), [
+            (c.name, c.fit, probabilities({law.name: law.fit, c.name: c.fit})[c.name]) for c in first[:1]
+        ]
 
     @cached_property
     def errors(self) -> dict[tuple[str, str], tuple[float, float]]:
@@ -338,8 +276,3 @@ class Case:
             for f, q, w in zip(layout, self.model.vector(layout), widths)
             if f.owner in STATES
         }
-
-
-def _share(before: float, after: float, noise: float) -> float:
-    """Share of a squared error ``before`` that is gone ``after``, above the squared ``noise``."""
-    return min(max(1.0 - (after - noise) / (before - noise), 0.0), 1.0) if before > noise else 0.0

@@ -6,11 +6,6 @@ import numpy as np
 
 from ers_mj.effects.base import Friction, Parameter, law
 
-FAST, AT_REST = (
-    (0.05, 0.2),
-    0.5,
-)  # shares of the largest speed, and the share at rest, from which one that differs less at rest is begun
-
 
 class AsymmetricFriction(Friction):
     """Coulomb F_c +- dF and viscous B +- dB for motion up and down (worn screws; EMPS). Where rest and v_a are given,
@@ -39,10 +34,13 @@ class AsymmetricFriction(Friction):
             for a, b in ((1, 1), (1, -1))
         ]
 
+    def scaffold(self, scales, sprung):
+        return None if sprung else self.starts(scales)[0]
+
     def grown(self, name, p, scales):
-        """From one difference: with half of it where motion begins."""
+        """From one difference: with half of it where motion begins, at shares of the largest speed."""
         return (
-            [np.array([*p[:2], AT_REST, share * scales.speed]) for share in FAST]
+            [np.array([*p[:2], 0.5, share * scales.speed]) for share in (0.05, 0.2)]
             if name == self.name and not np.isfinite(p[2])
             else []
         )

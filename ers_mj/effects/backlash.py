@@ -4,11 +4,6 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Transmission, coupled
 
-SPRINGY = 0.5  # damping ratio up to which a shaft is a spring, and a play as wide as nothing
-# of what the contact gives way under the friction, from which a play is seen as one: concealed shafts look like up to
-# 0.36 of it, plays like 0.40 and more
-SEEN = 0.38
-
 
 class Backlash(Transmission):
     """Two bodies that touch at +-gap: inside, each moves on its own; at the ends, a stiff spring-damper.
@@ -40,14 +35,16 @@ class Backlash(Transmission):
 
     def grown(self, name, p, scales):
         """A twisting shaft is a contact without play: one as wide as the noise, or a third of that."""
-        if name != "shaft_compliance" or p[1] > SPRINGY:
+        if name != "shaft_compliance" or p[1] > 0.5:  # damped more, a shaft is no spring
             return []
         f, zeta, rho, phi, _ = p
         return [np.array([part * scales.noise, rho, phi, min(f, 1000.0), max(zeta, 0.05)]) for part in (1.0, 0.3)]
 
     def seen(self, p, friction):
-        """A play that is wider than its contact gives way under the friction, or nearly."""
-        return p[0] >= SEEN * friction / (2.0 * np.pi * p[3]) ** 2
+        """A play that is wider than its contact gives way under the friction, or nearly: concealed shafts look like
+        up to 0.36 of it, plays like 0.40 and more.
+        """
+        return p[0] >= 0.38 * friction / (2.0 * np.pi * p[3]) ** 2
 
     def really(self, p, friction):
         """A play less wide than its contact gives way under the friction is not seen as one: a shaft, stiffer the more

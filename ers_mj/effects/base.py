@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 import numpy as np
 from scipy.linalg.blas import dtbsv
 
+from ers_mj.decisions.policy import Policy
+
 if TYPE_CHECKING:
     import mujoco
 
@@ -114,6 +116,20 @@ class Scales:
     duration: float = 10.0
     recordings: int = 1
     hot: tuple[tuple[int, float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Symptoms:
+    """What recordings show of their sensor by themselves: the lengths [s] of the spans that it lost (n,), the
+    ``seconds`` recorded, the step of each recording's converter (recordings,), 0 where there is none, the travel
+    [output unit], and whether the output is an angle in rad.
+    """
+
+    dropouts: np.ndarray
+    seconds: float
+    quanta: np.ndarray
+    travel: float
+    is_angle: bool
 
 
 @dataclass(frozen=True)
@@ -252,6 +268,18 @@ class Effect:
         """Parameter vectors (k,) of a visible size from which a fit is begun; empty where the effect cannot apply."""
         raise NotImplementedError
 
+    def symptom(self, seen: Symptoms, policy: Policy) -> np.ndarray | None:
+        """The effect's numbers (k,) where it shows in the data itself; None where it does not, or no fit is needed to
+        tell.
+        """
+        return None
+
+    def scaffold(self, scales: Scales, sprung: bool) -> np.ndarray | None:
+        """Values (k,) of the effect under which a search without a datasheet is tried as well, without springs or with
+        them (``sprung``), since it disturbs that search most; None where it does not.
+        """
+        return None
+
     def grown(self, name: str, p: np.ndarray, scales: Scales) -> list[np.ndarray]:
         """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of
         this one.
@@ -311,6 +339,10 @@ class Effect:
     def measure(self, p: np.ndarray, t: np.ndarray, y: np.ndarray) -> np.ndarray:
         """What the sensor reads (N,) at times t (N,) of the true output y (N,)."""
         return y
+
+    def is_within(self, p: np.ndarray, y: np.ndarray, step: float) -> bool:
+        """Whether a sensor's error along the readings y (N,) is less than a ``step`` [output unit]."""
+        return False
 
     def behind(self, p: np.ndarray, y):
         """The output, a number or (N,), at which a sensor at rest reads y."""

@@ -4,8 +4,6 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter, law
 
-GROWN = 0.1  # share of the excess that still flows, from which it is fitted
-
 
 class CurrentLimit(Drive):
     """The motor's torque at the output, n K_t i, stays within +-tau_max, or exceeds it by the share ``beyond`` of what
@@ -34,8 +32,8 @@ class CurrentLimit(Drive):
         return [np.array([part * peak, np.inf]) for part in (0.94, 0.86, 0.7, 0.5)]
 
     def grown(self, name, p, scales):
-        """A drive that takes voltage back, from one that clamps."""
-        return [np.array([p[0], GROWN])] if name == self.name and not np.isfinite(p[1]) else []
+        """A drive that takes voltage back, a tenth of the excess still flowing, from one that clamps."""
+        return [np.array([p[0], 0.1])] if name == self.name and not np.isfinite(p[1]) else []
 
     def constants(self, p, c):
         return np.array([p[0], p[1] if np.isfinite(p[1]) else 0.0])

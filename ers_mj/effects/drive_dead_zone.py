@@ -4,14 +4,12 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter
 
-SLOPE = 30.0  # at which a drive that wakes up with the whole command returns to it
-
 
 class DriveDeadZone(Drive):
     """The terminals see nothing within +-d and u - lost Sgn(u) outside: the dead time of a bridge (lost = d, where it
     is not given) or a threshold below which the drive sleeps (lost = 0).
 
-    With ``lost`` the way back is a line of slope SLOPE and not a jump, so that the misfit stays continuous in d.
+    With ``lost`` the way back is a line of slope 30 and not a jump, so that the misfit stays continuous in d.
     """
 
     name = "drive_dead_zone"
@@ -41,4 +39,4 @@ class DriveDeadZone(Drive):
         size, lost = np.abs(u), min(p[-1], p[0])
         if lost == p[0]:
             return u - np.clip(u, -p[0], p[0])
-        return np.sign(u) * np.clip(SLOPE * (size - p[0]), 0.0, np.maximum(size - lost, 0.0))
+        return np.sign(u) * np.clip(30.0 * (size - p[0]), 0.0, np.maximum(size - lost, 0.0))

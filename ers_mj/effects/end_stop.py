@@ -27,6 +27,9 @@ class EndStop(Load):
         ends = ((low, np.inf), (-np.inf, high), (low, high))
         return [np.array([lower, upper, frequency, 0.3]) for lower, upper in ends]
 
+    def scaffold(self, scales, sprung):
+        return self.starts(scales)[-1]
+
     def describe(self, values):
         ends = [f"the {end} one at {values[end]}" for end in ("lower", "upper") if values[end] != "none"]
         return f"the travel ends at a stop, {' and '.join(ends)}" if ends else self.sentence

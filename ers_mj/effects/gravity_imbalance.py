@@ -7,7 +7,6 @@ import numpy as np
 from ers_mj.effects.base import Load, Parameter, law
 
 G = 9.81  # [m/s^2]
-IMBALANCE_SHARE = 0.01  # the point mass takes this share of the rudder's inertia; any small share gives the same torque
 
 
 class GravityImbalance(Load):
@@ -43,7 +42,7 @@ class GravityImbalance(Load):
         if not twin.is_angle or size == 0:
             return size == 0
         rudder = twin.spec.body("rudder")
-        inertia = IMBALANCE_SHARE * rudder.inertia[1]
+        inertia = 0.01 * rudder.inertia[1]  # of the point mass; any small share gives the same torque
         arm = inertia * G / (twin.inertia * size)
         for body in twin.spec.bodies[1:]:
             body.gravcomp = 1.0

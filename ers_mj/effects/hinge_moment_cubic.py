@@ -6,8 +6,6 @@ import numpy as np
 
 from ers_mj.effects.base import Load, Parameter, law
 
-GROWN = 2.0  # half travels at which the flow is taken to part where a cubic alone has been found
-
 
 class HingeMomentCubic(Load):
     """theta'' -= k_3 x^3 exp(-(x / x_p)^2 / 2) / J, x = theta - theta_0: a hardening (or, k_3 < 0, softening) moment
@@ -31,8 +29,8 @@ class HingeMomentCubic(Load):
         return [np.array([0.2 * scales.acceleration / scales.position**3, np.inf])]
 
     def grown(self, name, p, scales):
-        """From a plain cubic: one that grows more slowly far out."""
-        return [np.array([p[0], GROWN * scales.position])] if name == self.name and not np.isfinite(p[1]) else []
+        """From a plain cubic: one that grows more slowly two half travels out."""
+        return [np.array([p[0], 2.0 * scales.position])] if name == self.name and not np.isfinite(p[1]) else []
 
     def constants(self, p, c):
         return np.array([p[0], c.theta_0, 0.5 / p[1] ** 2])

@@ -4,10 +4,6 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter
 
-# [s] of a winding: no sample tells a shorter one from none, and to simulate it takes as much longer as it is shorter
-SHORTEST = 2e-5
-HALVED = 1.5  # times the drive's largest torque at which the inductance is half where a fall is looked for first
-
 
 class Inductance(Drive):
     """Eq. (1)'s L i' = u - R i - K_e w_m, where the datasheet has none, or more of it than the datasheet says.
@@ -20,7 +16,8 @@ class Inductance(Drive):
     sentence = "the motor current lags by an extra {tau_L}, more winding inductance than the datasheet has"
     mjcf = "the inductance of the dcmotor; where it falls with the current it is set step by step"
     parameters = (
-        Parameter("tau_L", "time", "electrical time constant beyond the baseline's", lower=SHORTEST),
+        # no sample tells a shorter one from none, and to simulate it takes as much longer as it is shorter
+        Parameter("tau_L", "time", "electrical time constant beyond the baseline's", lower=2e-5),
         Parameter(
             "half",
             "torque",
@@ -39,7 +36,7 @@ class Inductance(Drive):
     def grown(self, name, p, scales):
         """One that falls with the current, from one that does not."""
         return (
-            [np.array([p[0], HALVED * (scales.drive or scales.acceleration)])]
+            [np.array([p[0], 1.5 * (scales.drive or scales.acceleration)])]
             if name == self.name and not np.isfinite(p[1])
             else []
         )

@@ -7,7 +7,6 @@ import numpy as np
 from ers_mj.effects.base import Load, Parameter, law
 
 EDGE = 0.005  # [s] over which the torque rises and falls
-SHORT = 0.1  # [s] up to which a push is begun as one that ends
 # how much stronger one that fades is begun, and how much shorter its time constant is than the length of one that ends
 FADING = 1.5
 
@@ -43,7 +42,9 @@ class LoadDisturbance(Load):
         begun somewhat before it or in it; long ones fade.
         """
         return [
-            self._of(size * scales.acceleration, begin + later, length, record, length > SHORT)
+            self._of(
+                size * scales.acceleration, begin + later, length, record, length > 0.1
+            )  # shorter, it is begun as one that ends
             for record, begin, length in scales.hot
             for later in (-0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2)
             for size in (-4.0, -2.5, -1.0, -0.3, -0.1, -0.03, 0.03, 0.1, 0.3, 1.0, 2.5, 4.0)

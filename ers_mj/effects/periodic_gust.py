@@ -7,11 +7,6 @@ import numpy as np
 from ers_mj.effects.base import Load, Parameter, law
 
 CYCLES = range(3, 41)  # within the longest recording, from which a fit is begun: a sine fits within one cycle only
-FLAT, SWELLS = (
-    0.1,
-    (1.0, 2.0, 3.0),
-)  # third harmonic, and cycles of a swell within that recording, from which wider forms are begun
-SLOWEST = 0.02  # [Hz] of a swell: its wave within has the cycles that tell it from a drift
 
 
 class PeriodicGust(Load):
@@ -39,7 +34,7 @@ class PeriodicGust(Load):
         Parameter(
             "swell", "ratio", "by how much its amplitude swells", positive=False, lower=-1.0, upper=1.0, absent=np.inf
         ),
-        Parameter("f_s", "frequency", "frequency of the swell", lower=SLOWEST, absent=np.inf),
+        Parameter("f_s", "frequency", "frequency of the swell", lower=0.02, absent=np.inf),
         Parameter("phase_s", "phase", "phase of the swell at time zero", positive=False, absent=np.inf),
     )
     needs, together = (("A",),), (("swell", "f_s", "phase_s"),)
@@ -57,10 +52,11 @@ class PeriodicGust(Load):
             return []
         swells = [
             np.array([*p[:3], np.inf, 0.2, cycles / scales.duration, phase])
-            for cycles in SWELLS
+            for cycles in (1.0, 2.0, 3.0)
             for phase in (0.0, 0.5 * np.pi)
         ]
-        return [np.array([*p[:3], FLAT, np.inf, np.inf, np.inf]), *swells]
+        # a tenth of it in the third harmonic
+        return [np.array([*p[:3], 0.1, np.inf, np.inf, np.inf]), *swells]
 
     def constants(self, p, c):
         swell, f_s, phase_s = p[4:] if np.isfinite(p[4]) else (0.0, 0.0, 0.0)

@@ -22,6 +22,11 @@ class SensorDropout(Sensor):
     def starts(self, scales):
         return []
 
+    def symptom(self, seen, policy):
+        if seen.dropouts.size < policy.fewest_dropouts:
+            return None
+        return np.array([seen.dropouts.size / seen.seconds, np.mean(seen.dropouts)])
+
     def measure(self, p, t, y):
         """The instants and lengths are the same at every call."""
         random = np.random.default_rng(0)

@@ -4,8 +4,6 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Sensor
 
-NEWTON, FLATTEST = 6, 0.2  # steps that take a sensor's error off a reading at most, and the least slope of a reading
-SETTLED = 1e-7  # [output unit] of a step after which no other follows: its error is of the order of its square
 ORDERS = (0.5, 1, 2, 3, 4, 6, 8)  # periods within the travel from which a fit is begun
 
 
@@ -43,12 +41,18 @@ class SensorNonlinearity(Sensor):
         wave = amplitude * np.sin(2 * np.pi / period * y + phase) if np.isfinite(period) else 0.0
         return y + wave + (bend * y**2 if np.isfinite(bend) else 0.0) + (twist * y**3 if np.isfinite(twist) else 0.0)
 
+    def is_within(self, p, y, step):
+        error = self.measure(p, None, y) - y
+        beside = np.stack([np.ones(y.size), y], axis=1)  # an offset and a gain are no error that position can tell
+        error = error - beside @ np.linalg.lstsq(beside, error, rcond=None)[0]
+        return float(np.max(np.abs(error))) < step
+
     def behind(self, p, y):
         theta = y
-        for _ in range(NEWTON):
-            step = (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), FLATTEST)
+        for _ in range(6):
+            step = (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), 0.2)
             theta = theta + step
-            if np.nanmax(np.abs(step), initial=0.0) < SETTLED:
+            if np.nanmax(np.abs(step), initial=0.0) < 1e-7:  # its error is of the order of its square
                 break
         return theta
 

@@ -17,5 +17,14 @@ class SensorQuantisation(Sensor):
     def starts(self, scales):
         return []
 
+    def symptom(self, seen, policy):
+        """A converter is one where it is coarse for the travel, or coarser than those of rudders' angles are and not
+        fine for the travel.
+        """
+        ordinary = max(policy.ordinary_step, policy.fine_step * seen.travel)
+        is_unusual = seen.is_angle and np.median(seen.quanta) > ordinary
+        is_coarse = np.max(seen.quanta) > policy.coarse_step * seen.travel
+        return np.array([np.max(seen.quanta)]) if is_coarse or is_unusual else None
+
     def measure(self, p, t, y):
         return np.round(y / p[0]) * p[0]

@@ -5,10 +5,6 @@ import numpy as np
 from ers_mj.effects.base import Parameter, Transmission, coupled
 
 LIGHTEST = 0.2  # share of the inertia that the motor's side of a shaft bears at least
-# of the noise, under the usual torque, of a shaft that is told: two that stood for forks had 0.025, seven concealed
-# ones 3 and more
-LEAST_TWIST = 0.1
-HARDENS = 3.0  # times the twist under the friction at which a shaft that hardens is looked for first
 
 
 class ShaftCompliance(Transmission):
@@ -49,18 +45,18 @@ class ShaftCompliance(Transmission):
         return [np.array([min(f, highest), 0.1, 0.6, 0.2, np.inf]) for f in (10.0, 20.0, 40.0, 80.0)]
 
     def grown(self, name, p, scales):
-        """A shaft that hardens, from one that does not: it takes twice the torque at a few times the twist that the
+        """A shaft that hardens, from one that does not: it takes twice the torque at three times the twist that the
         friction makes.
         """
         if name != self.name or np.isfinite(p[4]) or self.really(p, 0.0) != self.name:
             return []
-        return [np.array([*p[:4], HARDENS * scales.acceleration / (2.0 * np.pi * p[0]) ** 2])]
+        return [np.array([*p[:4], 3.0 * scales.acceleration / (2.0 * np.pi * p[0]) ** 2])]
 
     def shows(self, p, scales):
         """A shaft that the usual torque twists by far less than the noise shows nothing: a name for it stands for what
-        stick and slip fork.
+        stick and slip fork (two that did so had 0.025 of the noise, seven concealed ones three times it and more).
         """
-        return scales.acceleration / (2.0 * np.pi * p[0]) ** 2 >= LEAST_TWIST * scales.noise
+        return scales.acceleration / (2.0 * np.pi * p[0]) ** 2 >= 0.1 * scales.noise
 
     def really(self, p, friction):
         """One whose motor side would rather bear nothing is a filter in the drive: of 15 shafts that `ers prove`

@@ -4,8 +4,6 @@ import numpy as np
 
 from ers_mj.effects.base import Drive, Parameter, law
 
-LEAST = -0.5  # of fall, times the square of the drive
-
 
 class TorqueSaturation(Drive):
     """j / (1 + fall (j / j_peak)^2) in place of the drive acceleration j: iron that saturates. j_peak is that of a
@@ -31,5 +29,5 @@ class TorqueSaturation(Drive):
 
     @law
     def torque(p, theta, w, j, t):
-        loss = max(p[0] * (j / p[1]) ** 2, LEAST)
+        loss = max(p[0] * (j / p[1]) ** 2, -0.5)
         return -j * loss / (1.0 + loss)

@@ -5,7 +5,6 @@ import numpy as np
 from ers_mj.effects.base import Drive, Parameter
 
 SOFT = 10.0  # sharpness from which a soft knee is begun
-LEAST_SHARP = 4.0  # at which half of u_max is given to 1.5 % still: what bends more is a supply that sags, no knee
 
 
 class VoltageSaturation(Drive):
@@ -22,7 +21,7 @@ class VoltageSaturation(Drive):
             "sharpness",
             "ratio",
             "exponent of a soft knee; a plain clip where there is none",
-            lower=LEAST_SHARP,
+            lower=4.0,  # half of u_max is given to 1.5 % still: what bends more is a supply that sags, no knee
             upper=100.0,
             absent=np.inf,
         ),

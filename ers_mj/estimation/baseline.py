@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.prepared import Trace, counted
+from ers_mj.decisions.policy import POLICY
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
 from ers_mj.errors import InputError
-from ers_mj.estimation.fit import Fit, cost_of, descend, fit, hopped, run_of, tau_of
+from ers_mj.estimation.fit import Along, descend, fit, hopped
 from ers_mj.estimation.initial_state import with_starts, without_spikes
+from ers_mj.estimation.objective import Fit, cost_of, run_of, tau_of
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
@@ -30,16 +32,10 @@ OPENED = {
 }  # of these in a search that is only opened, in which the first has the most terms
 BEHIND = 0.25  # of C per block, by which a kind is too far behind to be finished
 SPRINGS = {"bare": (), "spring": ("a_1",), "preload": ("a_1", "c_1")}
-VALLEY = 10.0  # of C by which two fits differ that ended in different valleys
-# a turn of a motor: the least common multiple of its poles and slots, of which the smallest motors have two and three
-FEWEST_COGS = 3
 OVER_INERTIA, INERTIAS = (
     ("a_1", "a_2", "b", "c_1", "c_2", "ampere"),
     (0.6, 0.7, 0.8, 1.2, 1.4, 1.8),
 )  # what the inertia divides, and how it is tried beside what was found
-SUPPORT = 0.05  # decrease of C per block that a spring or a preload must buy to be kept
-
-Scaffolds = tuple[tuple[str, ...], ...]
 
 
 def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bool, tau_e: float | None) -> Scales:
@@ -100,8 +96,10 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
             " output"
         )
     model, gear = found.fit.model, datasheet.parameters.get("n") if datasheet is not None else None
+    # a turn of a motor: the least common multiple of its poles and slots, of which the smallest have two and three
+    cogs = 3
     drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, found.traces, OBSERVER_RATE).motions)
-    scales = replace(model.scales, drive=drive, cog=2 * np.pi / (FEWEST_COGS * gear) if gear else model.scales.cog)
+    scales = replace(model.scales, drive=drive, cog=2 * np.pi / (cogs * gear) if gear else model.scales.cog)
     return replace(found, fit=replace(found.fit, model=replace(model, scales=scales)))
 
 
@@ -162,11 +160,12 @@ def _refined(
     """
     traces = with_starts(model, traces)
     first, second = sorted(
-        (fit(model, traces, by_tangents=by_tangents) for by_tangents in (True, False)), key=lambda found: found.cost
+        (fit(model, traces, along=Along(by_tangents=by_tangents)) for by_tangents in (True, False)),
+        key=lambda found: found.cost,
     )
     traces = with_starts(first.model, without_spikes(first.model, traces))
     found = fit(first.model, traces, tau=tau_of(first.misfit))
-    others = [dict(second.model.values)] if second.cost - found.cost > VALLEY else []
+    others = [dict(second.model.values)] if second.cost - found.cost > POLICY.valley else []
     return *hopped(found, traces, tau_of(found.misfit), jobs, restart=True), others
 
 
@@ -222,41 +221,22 @@ def _priors(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
 def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, jobs: int) -> Start:
     """Several guesses, refitted as observers of falling gain; the simplest structure that the data supports.
 
-    Stops and one-sided friction disturb the search most, so both are tried as a scaffold that is taken away at the end:
-    a spring must beat one-sided friction to be kept, and what was found under the scaffold stays as an anchor for later
-    fits.
+    What disturbs the search most (Effect.scaffold: stops, one-sided friction) is tried as a scaffold that is taken away
+    at the end: a spring must beat one-sided friction to be kept, and what was found under the scaffold stays as an
+    anchor for later fits.
     """
-    chosen = _structured(traces, known, is_angle, ((), ("end_stop",), ("asymmetric_friction",)), ((), ("end_stop",)))
+    kinds = _Kinds.of(traces, known, is_angle)
+    chosen = _simplest({kind: _searched(traces, kinds, kind) for kind in SPRINGS})
     scales = scales_of(traces, chosen.model.values, is_angle, None)
     found, traces, others = _refined(replace(chosen.model, effects=(), scales=scales), traces, jobs)
     return Start(found, traces, (*((dict(chosen.model.values),) if chosen.model.effects else ()), *others))
-
-
-def _structured(
-    traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, bare: Scaffolds, sprung: Scaffolds
-) -> Fit:
-    """The fit from guesses alone without springs, with a spring or with a preload beside it, whichever is the simplest
-    that the data supports.
-
-    ``bare`` and ``sprung`` are the scaffolds, names of effects, under which a search without and with springs is tried.
-    """
-    kinds = _Kinds.of(traces, known, is_angle)
-    scales = kinds.scales
-    at = {
-        "end_stop": BY_NAME["end_stop"].starts(scales)[-1],
-        "asymmetric_friction": BY_NAME["asymmetric_friction"].starts(scales)[0],
-    }
-    bare, sprung = ([tuple((name, at[name]) for name in names) for names in scaffolds] for scaffolds in (bare, sprung))
-    return _simplest(
-        {kind: _searched(traces, kinds, kind, sprung if springs else bare) for kind, springs in SPRINGS.items()}
-    )
 
 
 def _simplest(found: Mapping[str, Fit]) -> Fit:
     """The fit with the fewest springs that the data supports."""
     kinds = [kind for kind in SPRINGS if kind in found]
     chosen = found[kinds[0]]
-    price = SUPPORT * chosen.misfit.size
+    price = POLICY.support * chosen.misfit.size
     for kind in kinds[1:]:
         if chosen.cost - found[kind].cost > price:
             chosen = found[kind]
@@ -310,10 +290,12 @@ class _Kinds:
         return [self.prepared(kind, values) for values in pool[:STARTS]]
 
 
-def _searched(traces: Sequence[Trace], kinds: _Kinds, kind: str, scaffolds: Sequence[tuple]) -> Fit:
+def _searched(traces: Sequence[Trace], kinds: _Kinds, kind: str) -> Fit:
     """The best of the guesses with these spring terms, under the scaffold that serves it best, of the two that open
     best.
     """
+    at = ((effect.name, effect.scaffold(kinds.scales, bool(SPRINGS[kind]))) for effect in BY_NAME.values())
+    scaffolds = [(), *(((name, start),) for name, start in at if start is not None)]
     tries = []
     for values in kinds.places(kind):
         for effects in scaffolds:

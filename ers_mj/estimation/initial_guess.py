@@ -1,5 +1,6 @@
 """Eq. (6)'s coefficients from a recording alone: where a fit starts when there is no datasheet.
- Weak form: Eq. (6) is multiplied by a bump that vanishes with its slope at both ends of a window, and integrated by
+
+Weak form: Eq. (6) is multiplied by a bump that vanishes with its slope at both ends of a window, and integrated by
 parts, so that the output is never differentiated twice. What is left is linear in a_1, a_2, b, c_1, c_2 once theta_0 is
 given, and theta_0 is scanned over the travel.
 """

@@ -22,8 +22,8 @@ HELD_SIGMAS, HELD_STEPS, HELD_LEAP = (
 MOVED, WITHIN = (
     0.25,
     17,
-    # [s] from the first threshold of a coarse converter, up to which it tells a start; how many places within its step are
-    # tried
+    # [s] from the first threshold of a coarse converter, up to which it tells a start; how many places within its step
+    # are tried
 )
 FEWEST_SPIKES = 3  # that the recordings must show by themselves before the model's error is searched
 

@@ -1,9 +1,11 @@
 """Intervals that survive model error: a jackknife over recordings and a sandwich over blocks.
- What is too small to be found moves the parameters as well, further than the noise does: ``unseen_widths`` tells how
+
+What is too small to be found moves the parameters as well, further than the noise does: ``unseen_widths`` tells how
 far.
- (J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what
-differs between recordings, but a refit may rest in the dent of the cost where it begins, and then says nothing; the
-sandwich only sees the scatter within them.
+
+(J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what
+differs between recordings, but a refit may rest in the local minimum of the cost where it begins, and then says
+nothing; the sandwich only sees the scatter within them.
 """
 
 from __future__ import annotations
@@ -14,11 +16,12 @@ import numpy as np
 from scipy.special import stdtrit
 
 from ers_mj.data.prepared import Blocks, Trace
-from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import central_jacobian, residuals
+from ers_mj.effects import BY_NAME, Effect
+from ers_mj.estimation.jacobian import central_jacobian
+from ers_mj.estimation.objective import residuals
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
-UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (race.LEAST_GAIN is what it must)
+UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (decisions.policy.least_gain is what it must)
 UNSEEN = 1.0  # effects of that size that act, on average
 FEWEST_RECORDS = 3
 LOST = 1e6  # sigmas that a run leaves where it ran away
@@ -70,6 +73,11 @@ def _left(model: Model, traces: Sequence[Trace]) -> np.ndarray:
     return np.nan_to_num(residuals(model, traces, OBSERVER_RATE), nan=LOST)
 
 
+def _is_in(effect: Effect, model: Model) -> bool:
+    """Whether a model's baseline has a number of its own for an effect."""
+    return any(model.values[name] > 0 for name in effect.absorbs)
+
+
 def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
     """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move
     to make up for them.
@@ -83,9 +91,8 @@ def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: n
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     hessian = jacobian.T @ (weight[:, None] * jacobian)
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
-    known = (*model.names, *(("inductance",) if model.values["tau_e"] > 0 else ()))
     shifts = []
-    for effect in (effect for name, effect in BY_NAME.items() if name not in known and not effect.once):
+    for effect in (e for e in BY_NAME.values() if not (e.name in model.names or e.once or _is_in(e, model))):
         found = []
         for start in (starts := effect.starts(model.scales))[:1] + starts[1:][-1:]:
             secant = residuals(model.with_effect(effect.name, start), traces, OBSERVER_RATE) - e

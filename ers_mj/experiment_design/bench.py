@@ -15,7 +15,8 @@ import numpy as np
 from ers_mj.data.excitation import Limits, signal
 from ers_mj.data.prepared import Blocks, Signals, Trace, make_trace
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import Fit, step_of
+from ers_mj.estimation.jacobian import step_of
+from ers_mj.estimation.objective import Fit
 from ers_mj.servo.model import OBSERVER_RATE, STATES, Free, Model
 
 VAGUE = 3.0  # standard deviation (of a logarithm, or over the value) of a number of which nothing is known

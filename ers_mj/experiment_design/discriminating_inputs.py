@@ -16,7 +16,7 @@ import numpy as np
 
 from ers_mj.data.excitation import GENTLE, SHARES, excitations
 from ers_mj.data.prepared import Blocks, Trace
-from ers_mj.estimation.fit import step_of
+from ers_mj.estimation.jacobian import step_of
 from ers_mj.experiment_design.bench import VAGUE, Bench, Explanation
 from ers_mj.experiment_design.refits import drawn, refitted, remains
 

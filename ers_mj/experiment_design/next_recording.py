@@ -16,7 +16,8 @@ import numpy as np
 from ers_mj.data.excitation import GENTLE, SHARES, Limits, excitations
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import Fit, step_of, tau_of
+from ers_mj.estimation.jacobian import step_of
+from ers_mj.estimation.objective import Fit, tau_of
 from ers_mj.experiment_design.bench import VAGUE, Bench, Explanation, is_lasting
 from ers_mj.experiment_design.discriminating_inputs import (
     CHANNELS,

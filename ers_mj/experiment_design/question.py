@@ -20,8 +20,10 @@ import numpy as np
 from ers_mj.data.excitation import ASKING, Limits
 from ers_mj.data.prepared import Channel, Signals, Trace, make_trace
 from ers_mj.errors import InputError
-from ers_mj.estimation.fit import SQUARES, descend, fit, jacobian_of, residuals, run_of
+from ers_mj.estimation.fit import SQUARES, descend, fit
+from ers_mj.estimation.jacobian import jacobian_of
 from ers_mj.estimation.known_model import model_of
+from ers_mj.estimation.objective import residuals, run_of
 from ers_mj.experiment_design.bench import VAGUE
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import OBSERVER_RATE, Model

@@ -5,7 +5,7 @@ sentence.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,42 +14,14 @@ from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.data.recording import Recording
 from ers_mj.identification.finding import FOLLOWED, Settings
 from ers_mj.identification.minimisers import Minimum
-from ers_mj.identification.misfit import IN_PROPORTION, STEP, Misfit, Search, Simulator, central
+from ers_mj.identification.misfit import STEP, Misfit, Search, Simulator, central
 from ers_mj.identification.precision import WEAK, Precision, Profile, precision_of, profile
+from ers_mj.identification.rows import Row, Rows, factor_of
 from ers_mj.identification.structure import Structure
-from ers_mj.identification.unknowns import LETTERS, Unknowns, unit_of_letter
+from ers_mj.identification.unknowns import Unknowns
 from ers_mj.servo.datasheet import LUMPED, Datasheet
 
-WIDEST = 3.0  # relative half-width beyond which a profile says no more
-TELLING = 1.0  # relative 95 % half-width from which a number is not told
 WRONG = 1.5  # mean squared residual in sigmas from which the model is said to be wrong
-NEAR_BOUND = 1e-3  # of a coordinate's range
-PRINTED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
-
-
-@dataclass(frozen=True)
-class Row:
-    """One line of the answer: a letter, a combination, or a letter of Eq. (6); None for what is not told."""
-
-    name: str
-    value: float | None
-    unit: str
-    ci95: tuple[float | None, float | None]
-    datasheet: float | None
-    identifiable: bool
-    fixed: bool = False
-    why: str = ""
-
-    def as_document(self) -> dict:
-        """As diagnosis.json has it, with what was fixed and why a number is not told."""
-        return {
-            "value": self.value,
-            "unit": self.unit,
-            "ci95": list(self.ci95),
-            "datasheet": self.datasheet,
-            "identifiable": self.identifiable,
-            "fixed": self.fixed,
-        } | ({"why": self.why} if self.why else {})
 
 
 @dataclass(frozen=True)
@@ -122,7 +94,9 @@ def answer(
     )
     profiles = () if simulate or misfit > WRONG else _profiles(reduced, open_ended, slopes, x, precision)
     y, u = recordings[0].output_unit, {"pct": "%"}.get(recordings[0].input_unit, recordings[0].input_unit)
-    rows = _rows(search, letters, precision, profiles, datasheet, y, u)
+    sheet = {**datasheet.to_lumped(), **datasheet.parameters} if datasheet is not None else {}
+    ends = {p.name: tuple(None if z is None else factor_of(p.name, z) for z in p.ends) for p in profiles}
+    rows = Rows(search, letters, precision, ends, sheet, y, u).all()
     predicted = _predicted(search, letters, free / weight)
     return Identified(
         settings,
@@ -151,7 +125,7 @@ def _profiles(
     out = []
     for k, name in enumerate(search.names):
         half = 1.96 * math.sqrt(precision.fisher[k, k])
-        if name != "theta_0" and WEAK < half < WIDEST:
+        if name != "theta_0" and WEAK < half < 3.0:  # beyond, a profile says no more
             unit = np.eye(x.size)[k]
             out.append(
                 profile(InSigmas(objective), slopes, x, k, name, half, precision.half_width(unit) / half, search.bounds)
@@ -168,140 +142,6 @@ class InSigmas:
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Residuals (N,) in sigmas."""
         return self._misfit.residuals(x) / self._weight
-
-
-def _rows(
-    search: Search,
-    letters: np.ndarray,
-    precision: Precision,
-    profiles: Sequence[Profile],
-    datasheet: Datasheet | None,
-    y: str,
-    u: str,
-) -> list[Row]:
-    """Eq. (6)'s letters, then Eq. (1)'s, then the combinations that stand for those which cannot be told."""
-    unknowns, structure = search.unknowns, search.structure
-    sheet = {**datasheet.to_lumped(), **datasheet.parameters} if datasheet is not None else {}
-    ends = {
-        p.name: tuple(None if end is None else _from_coordinate(search, p.name, end) for end in p.ends)
-        for p in profiles
-    }
-
-    def row(name, function, unit, known, own=None):
-        return _row(name, function, unit, known, search, letters, precision, ends.get(own))
-
-    rows = [
-        row(name, lambda v, name=name: unknowns.values(v)[name], unit_of_letter(name, y, u), sheet.get(name))
-        for name in PRINTED
-    ]
-    rows += [
-        row(name, lambda v, name=name: unknowns.values(v)[name], unit_of_letter(name, y, u), sheet.get(name))
-        for name in ("tau_e", "emf_share", "ampere")
-        if unknowns.is_lumped and name in unknowns.names
-    ]
-    if unknowns.is_lumped:
-        return rows
-    for name in (n for n in LETTERS if n != "theta_0" and n in (*unknowns.names, *unknowns.known)):
-        unit = unit_of_letter(name, y, u)
-        if name in unknowns.names:
-            k = unknowns.names.index(name)
-            own = name if structure.told(np.eye(len(letters))[k]) else None
-            rows.append(row(name, lambda v, k=k: v[k], unit, sheet.get(name), own))
-        else:
-            value = unknowns.known[name]
-            rows.append(
-                Row(
-                    name,
-                    value,
-                    unit,
-                    (value, value) if name in unknowns.fixed else (None, None),
-                    sheet.get(name),
-                    True,
-                    True,
-                    "held",
-                )
-            )
-    for k in structure.kept:
-        powers, label = structure.exponents(k), structure.combination(k)
-        if powers is not None and np.count_nonzero(powers) > 1:
-            known = [sheet.get(name) for name in unknowns.names]
-            told = (
-                float(np.prod([p**q for p, q in zip(known, powers) if q]))
-                if all(p for p, q in zip(known, powers) if q)
-                else None
-            )
-            product = lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0]))
-            rows.append(row(label, product, _unit(unknowns.names, powers, y, u), told, unknowns.names[k]))
-    return rows
-
-
-def _from_coordinate(search: Search, name: str, z: float) -> float:
-    """The factor to the reference that a coordinate means."""
-    return z if name in IN_PROPORTION else math.exp(z)
-
-
-def _row(name, function, unit, known, search, letters, precision, profiled) -> Row:
-    """One line: the value of a function of the letters (k,), its interval, or null where the null space or the noise
-    moves it.
-    """
-    value, by_letter, by_coordinate = float(function(letters)), _gradient(search, letters, function), None
-    if value == 0.0 and not np.any(by_letter):
-        return Row(name, 0.0, unit, (None, None), known, True, True, "absent")
-    if not search.structure.told(by_letter / (abs(value) or 1.0)):
-        return Row(
-            name, None, unit, (None, None), known, False, why="these recordings tell it in combination with others only"
-        )
-    by_coordinate = _by_coordinate(search, letters, by_letter)
-    half = precision.half_width(
-        np.concatenate([by_coordinate, np.zeros(precision.fisher.shape[0] - by_coordinate.size)])
-    )
-    relative = half / abs(value) if name != "theta_0" else half / search.scale
-    if not relative < TELLING:
-        return Row(
-            name,
-            None,
-            unit,
-            (None, None),
-            known,
-            False,
-            why=f"too weak in these recordings: its 95 % half-width would be {relative:.0%} of it",
-        )
-    low, high = value - half, value + half
-    if profiled is not None:
-        k = search.names.index(name.partition("/")[0]) if name.partition("/")[0] in search.names else None
-        here = search.coordinates(letters)[k] if k is not None else None
-        if here is not None:
-            scale = value / _from_coordinate(search, search.names[k], here)
-            low, high = (x * scale if x is not None else other for x, other in zip(profiled, (low, high)))
-    return Row(name, value, unit, (low, high), known, True)
-
-
-def _gradient(search: Search, letters: np.ndarray, function: Callable[[np.ndarray], float]) -> np.ndarray:
-    """Slopes (k,) of a function of the letters by their logarithms (theta_0: by half travels)."""
-    angle = np.array([name == "theta_0" for name in search.unknowns.names])
-    return central(
-        lambda z: np.array([function(np.where(angle, letters + search.scale * z, letters * np.exp(z)))]),
-        np.zeros(letters.size),
-        STEP,
-    )[0]
-
-
-def _by_coordinate(search: Search, letters: np.ndarray, by_letter: np.ndarray) -> np.ndarray:
-    """The same by the search's coordinates (r,)."""
-    here = search.coordinates(letters)
-    return np.array(
-        [
-            by_letter[k] / here[i] if name in IN_PROPORTION else by_letter[k]
-            for i, (k, name) in enumerate(zip(search.structure.kept, search.names))
-        ]
-    )
-
-
-def _unit(names: Sequence[str], powers: np.ndarray, y: str, u: str) -> str:
-    """The unit of a product of powers, as the letters' units stand."""
-    above = [unit_of_letter(n, y, u) for n, q in zip(names, powers) if q > 0]
-    below = [unit_of_letter(n, y, u) for n, q in zip(names, powers) if q < 0 for _ in range(round(-q))]
-    return "/".join([" ".join(above), *(f"({unit})" if " " in unit else unit for unit in below)])
 
 
 def _predicted(search: Search, letters: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -363,7 +203,7 @@ def _warnings(search: Search, x: np.ndarray, misfit: float) -> list[str]:
         for name in search.unknowns.absent
     ]
     for name, z, low, high in zip(search.names, x, lower, upper):
-        if min(z - low, high - z) < NEAR_BOUND * (high - low):
+        if min(z - low, high - z) < 1e-3 * (high - low):
             end, wanted = ("lower", "less") if z - low < high - z else ("upper", "more")
             out.append(
                 f"{name} rests at the {end} end of its bounds: these recordings ask for {wanted} of it; widen them"

@@ -20,23 +20,38 @@ from ers_mj.identification.unknowns import FACTORS, Unknowns
 from ers_mj.plants.mechanical import TIMESTEP
 
 BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is asked for
-MOST_PLACES = 8  # beside the reference, at which the rank is looked for
-SEARCH_GAIN, POLISH_GAIN, MUJOCO_GAIN = (
-    1e-4,
-    1e-9,
-    1e-4,
-)  # shares of the value below which a step ends a search by squares
-NOISY_GAIN, NOISY = (
-    1e-7,
-    0.5,
-)  # that of a polish where more than this share of the noise's own misfit is left: of chi^2 it is next to nothing
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Shares of the value below which a step ends a search by squares."""
+
+    search: float = 1e-4
+    polish: float = 1e-9
+    mujoco: float = 1e-4
+    # that of a polish where more than noisy_from of the noise's own misfit is left: of chi^2 it is next to
+    # nothing
+    noisy: float = 1e-7
+    noisy_from: float = 0.5
+
+
+GAINS = Gains()
+
+
+@dataclass(frozen=True)
+class Trials:
+    """How often something is tried."""
+
+    places: int = 8  # beside the reference, at which the rank is looked for
+    after_opening: int = 2  # attempts where the reference is the end of a search from many guesses already
+    budget: int = 200  # evaluations of a polish
+    polishes: int = 4
+    worth: float = 1e-4  # share of the value that another polish must have been worth
+
+
+TRIALS = Trials()
+
 FOLLOWED = (60.0, 30.0)  # [1/s] observer rates of the polish in MuJoCo; the answer is judged by the last
-AFTER_OPENING = 2  # attempts where the reference is the end of a search from many guesses already
-POLISH_BUDGET, POLISHES, POLISH_WORTH = (
-    200,
-    4,
-    1e-4,
-)  # the last: share of the value that another polish must have been worth
 
 
 @dataclass(frozen=True)
@@ -61,7 +76,7 @@ def best_structure(unknowns: Unknowns, traces: Sequence[Trace], scale: float, se
     rudder sticks less can be told.
     """
     random, found = np.random.default_rng(seed), [structure_at(unknowns, traces, unknowns.reference, scale)]
-    for _ in range(MOST_PLACES):
+    for _ in range(TRIALS.places):
         found.append(structure_at(unknowns, traces, unknowns.drawn(random), scale))
         best = max(found, key=lambda s: s.rank)
         if best.rank == len(unknowns.names) or sum(s.rank == best.rank for s in found) > 1 and best.rank:
@@ -107,7 +122,7 @@ def _minimum(search: Search, settings: Settings, simulate: Simulator | None, att
     objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
     lower, upper = search.bounds
     method = (
-        LS(gain=SEARCH_GAIN, attempts=attempts or (AFTER_OPENING if search.unknowns.guessed else ATTEMPTS))
+        LS(gain=GAINS.search, attempts=attempts or (TRIALS.after_opening if search.unknowns.guessed else ATTEMPTS))
         if by_squares
         else MINIMISERS[settings.method]
     )
@@ -132,11 +147,11 @@ def polished(search: Search, x: np.ndarray, value: float, simulate: Simulator | 
     evaluations.
     """
     used = 0
-    for _ in range(POLISHES):  # a kink, as where theta_0 meets a resting rudder, may end one
+    for _ in range(TRIALS.polishes):  # a kink, as where theta_0 meets a resting rudder, may end one
         x, search, ended = _polished(search, x, value, None, FOLLOWED[0] if simulate else 0.0)
         used += ended.evaluations
         value, gain = ended.value, value - ended.value
-        if gain < POLISH_WORTH * value:
+        if gain < TRIALS.worth * value:
             break
     for rate in FOLLOWED if simulate is not None else ():
         x, search, ended = _polished(search, x, value, simulate, rate)
@@ -155,7 +170,7 @@ def _polished(
     lower, upper = begun.bounds
     own = np.concatenate([x, np.zeros(lower.size - x.size)])
     objective = Misfit(begun, rate, simulate=simulate, robust=simulate is not None)
-    gain = MUJOCO_GAIN if simulate else NOISY_GAIN if value > NOISY * objective.target else POLISH_GAIN
-    found = LS(attempts=1, staged=False, gain=gain).minimise(objective, lower, upper, budget=POLISH_BUDGET, start=own)
+    gain = GAINS.mujoco if simulate else GAINS.noisy if value > GAINS.noisy_from * objective.target else GAINS.polish
+    found = LS(attempts=1, staged=False, gain=gain).minimise(objective, lower, upper, budget=TRIALS.budget, start=own)
     around = begun.unknowns.around(begun.letters(found.x))
     return found.x[: x.size], replace(begun, unknowns=around, traces=begun.started(found.x), with_starts=False), found

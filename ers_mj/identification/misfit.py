@@ -17,24 +17,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
-from ers_mj.estimation.fit import residuals
+from ers_mj.estimation.objective import residuals
 from ers_mj.identification.structure import Structure, structure_of
 from ers_mj.identification.unknowns import Unknowns
 
 STAGES = (60.0, 15.0)  # [1/s] observer rates of the objectives that are gone through before the free run
 IN_PROPORTION = ("B",)
 STEP = 1e-5  # of the letters' logarithms, for sensitivities
-COARSER, FORKS, FEWEST = (
-    3.0,
-    0.01,
-    0.5,
-)  # a second step, the share of a slope's size by which both may differ, and the samples' share that must be left
-START, HOME = (
-    0.01,
-    0.02,
-)  # half travels by which the angle at the start may be off, and within which of theta_0 a start is at home
-SHY = 0.02  # share of a coordinate's range, within which it rests at its end
-EXPLAINED = 1.3  # mean squared residual in sigmas up to which a fit is good enough for no further start
+
+
+@dataclass(frozen=True)
+class Near:
+    """What counts as near, in an identification."""
+
+    coarser: float = 3.0  # times STEP, a second step
+    forks: float = 0.01  # share of a slope's size by which both may differ
+    fewest: float = 0.5  # the samples' share that must be left
+    start: float = 0.01  # half travels by which the angle at the start may be off
+    home: float = 0.02  # half travels of theta_0 within which a start is at home
+    shy: float = 0.02  # share of a coordinate's range, within which it rests at its end
+
+
+NEAR = Near()
+
 
 Simulator = Callable[[Unknowns, Sequence[np.ndarray], Sequence[Trace], float], list[np.ndarray]]
 
@@ -63,7 +68,7 @@ class Search:
         """
         values = self.unknowns.values(letters)
         holds = values["c_1"] > (values["c_2"] if surely else 0.0)
-        near = HOME * self.scale
+        near = NEAR.home * self.scale
         return replace(
             self,
             home=tuple(
@@ -139,7 +144,7 @@ class Search:
                 low, high = low + reach[0], high + reach[1]
             ends.append((math.exp(low), math.exp(high)) if name in IN_PROPORTION else (low, high))
         for r, i in self._moved:
-            far = max(START, 5.0 * self.traces[r].sigma / self.scale) * (1.0 if i == 0 else 50.0)
+            far = max(NEAR.start, 5.0 * self.traces[r].sigma / self.scale) * (1.0 if i == 0 else 50.0)
             ends.append((-far, far))
         lower, upper = np.array(ends).T
         return lower, upper
@@ -148,7 +153,7 @@ class Search:
         """Whether a searched letter rests at its lower bound at the coordinates x (r,)."""
         k = self.names.index(name)
         lower, upper = self.bounds
-        return x[k] - lower[k] < SHY * (upper[k] - lower[k])
+        return x[k] - lower[k] < NEAR.shy * (upper[k] - lower[k])
 
     def started(self, x: np.ndarray) -> tuple[Trace, ...]:
         """The traces with the starts of the coordinates x."""
@@ -215,9 +220,9 @@ class Misfit:
 
     @property
     def target(self) -> float:
-        """The value that noise alone would leave, and a little more."""
+        """The value that noise alone would leave, and a little more: 1.3 times a mean squared residual of one sigma."""
         seen = np.concatenate([t.seen for t in self.search.traces])
-        return EXPLAINED * float(np.sum(self.weight[seen] ** 2))
+        return 1.3 * float(np.sum(self.weight[seen] ** 2))
 
     @property
     def slopes(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray] | None:
@@ -268,8 +273,10 @@ def structure_at(unknowns: Unknowns, traces: Sequence[Trace], letters: np.ndarra
     def moved(z):
         return residuals(unknowns.model(np.where(angle, letters + scale * z, letters * np.exp(z))), traces, 0.0)
 
-    slopes, coarser = (np.nan_to_num(central(moved, np.zeros(len(letters)), step)) for step in (STEP, COARSER * STEP))
+    slopes, coarser = (
+        np.nan_to_num(central(moved, np.zeros(len(letters)), step)) for step in (STEP, NEAR.coarser * STEP)
+    )
     size = np.abs(slopes).max(axis=0) + 1e-300
-    smooth = np.max(np.abs(slopes - coarser) / size, axis=1) < FORKS  # elsewhere stick and slip fork at a touch
-    smooth = smooth if smooth.mean() > FEWEST else np.ones_like(smooth)
+    smooth = np.max(np.abs(slopes - coarser) / size, axis=1) < NEAR.forks  # elsewhere stick and slip fork at a touch
+    smooth = smooth if smooth.mean() > NEAR.fewest else np.ones_like(smooth)
     return structure_of(slopes[smooth], unknowns.names, slopes[smooth] - coarser[smooth])

@@ -1,5 +1,6 @@
 """How sure fitted numbers are: Fisher's information, resampled blocks, and the profile of what is weak.
- sensitivities J (N, r), residuals e (N,), both in sigmas -> covariance (r, r) -> 95 % half-width of anything that
+
+sensitivities J (N, r), residuals e (N,), both in sigmas -> covariance (r, r) -> 95 % half-width of anything that
 follows from the numbers
 """
 
@@ -15,13 +16,32 @@ from scipy.stats import t as student
 from ers_mj.data.prepared import Trace
 from ers_mj.identification.minimisers import LS
 
-BLOCKS = 60  # pieces of all recordings together that are resampled
-SHORTEST = 5  # samples of a piece
-RECORDINGS = 8  # from which whole recordings are resampled
-DRAWS = 400
+
+@dataclass(frozen=True)
+class Resampling:
+    """How pieces of the recordings are drawn anew."""
+
+    blocks: int = 60  # pieces of all recordings together
+    shortest: int = 5  # samples of a piece
+    recordings: int = 8  # from which whole recordings are drawn
+    draws: int = 400
+
+
+RESAMPLING = Resampling()
+
+
+@dataclass(frozen=True)
+class Profiling:
+    """How the profile of a weak coordinate is followed."""
+
+    places: tuple[float, ...] = (0.35, 0.7, 1.0, 1.4, 2.0)  # half-widths either way at which it is minimised
+    budget: int = 30  # simulations for each
+    gain: float = 1e-6  # share of chi^2 below which a step ends one
+
+
+PROFILING = Profiling()
+
 WEAK = 0.05  # half-width from which a coordinate's profile is taken
-PLACES = (0.35, 0.7, 1.0, 1.4, 2.0)  # half-widths either way at which a profile is minimised
-PROFILE_BUDGET, PROFILE_GAIN = 30, 1e-6  # simulations for each, and the share of chi^2 below which a step ends one
 
 
 @dataclass(frozen=True)
@@ -58,14 +78,14 @@ def precision_of(slopes: np.ndarray, e: np.ndarray, traces: Sequence[Trace], see
         information, rcond=1e-14, hermitian=True
     )
     random, steps = np.random.default_rng(seed), []
-    for _ in range(DRAWS):
+    for _ in range(RESAMPLING.draws):
         weight = np.bincount(random.integers(0, count, count), minlength=count)
         steps.append(np.linalg.lstsq(np.tensordot(weight, outer, 1), weight @ pull, rcond=1e-14)[0])
     spread = np.array(steps)
     low, high = np.quantile(spread, (0.16, 0.84), axis=0)
     sigma = 0.5 * (high - low)  # a draw that leaves out what tells a coordinate is no measure of its spread
     ranks = np.clip(spread - np.median(spread, axis=0), -4.0 * sigma, 4.0 * sigma)
-    resampled = ranks.T @ ranks / DRAWS * count / max(count - r, 1)
+    resampled = ranks.T @ ranks / RESAMPLING.draws * count / max(count - r, 1)
     for matrix in (fisher, resampled):
         matrix.setflags(write=False)
     return Precision(fisher, resampled, max(count - r, 1))
@@ -75,9 +95,9 @@ def _pieces(traces: Sequence[Trace]) -> np.ndarray:
     """(N,) which piece each row belongs to: pieces of time, all channels together, or whole recordings where there are
     enough.
     """
-    if len(traces) >= RECORDINGS:
+    if len(traces) >= RESAMPLING.recordings:
         return np.concatenate([np.full(t.rows, k) for k, t in enumerate(traces)])
-    length = max(SHORTEST, sum(t.t.size for t in traces) // BLOCKS)
+    length = max(RESAMPLING.shortest, sum(t.t.size for t in traces) // RESAMPLING.blocks)
     out, base = [], 0
     for trace in traces:
         own = np.minimum(np.arange(trace.t.size) // length, max(trace.t.size // length - 1, 0)) + base
@@ -143,13 +163,13 @@ def profile(
     places, rises, keep = [float(x[k])], [0.0], np.arange(x.size) != k
     for way in (-1.0, 1.0):
         rest = x[keep]
-        for share in PLACES:
+        for share in PROFILING.places:
             at = float(np.clip(x[k] + way * share * half * inflation, lower[k], upper[k]))
             if at in places:
                 break
             held = Pinned(objective, slopes, k, at)
-            found = LS(attempts=1, staged=False, gain=PROFILE_GAIN).minimise(
-                held, lower[keep], upper[keep], budget=PROFILE_BUDGET, start=rest
+            found = LS(attempts=1, staged=False, gain=PROFILING.gain).minimise(
+                held, lower[keep], upper[keep], budget=PROFILING.budget, start=rest
             )
             places.append(at)
             rises.append(max(found.value - least, 0.0))

@@ -1,6 +1,7 @@
 """What the data can tell at all: the rank of the sensitivities, and the combinations that are left where it falls
 short.
- Sensitivities are simulated slopes by the logarithm of each letter, so that an exponent is a number: where a null
+
+Sensitivities are simulated slopes by the logarithm of each letter, so that an exponent is a number: where a null
 vector v of them has whole entries, prod p_i^{v_i s} changes nothing, and with one letter (the pivot) of each null
 vector held, every other one stands for the combination p_i / prod pivot_j^{v_ji}.
 """
@@ -12,8 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-RANK = 1e-6  # singular value, of columns of length one, over the largest, below which a direction does nothing
-SURE = 3.0  # times what it is off by, which a singular value must be
 WHOLE = 0.02  # from a whole number, within which an exponent is one
 HELD_FIRST = (
     "J",
@@ -106,7 +105,8 @@ def structure_of(slopes: np.ndarray, names: Sequence[str], doubt: np.ndarray | N
     _, singular, turn = np.linalg.svd(slopes / scale, full_matrices=len(slopes) < len(names))
     singular = np.concatenate([singular, np.zeros(len(names) - singular.size)])
     unsure = np.linalg.norm(doubt / scale @ turn.T, axis=0) if doubt is not None else np.zeros(len(names))
-    null = turn[singular <= np.maximum(RANK * singular[0], SURE * unsure)] / scale
+    # a direction does nothing whose singular value is that small, or no more than three times what it is off by
+    null = turn[singular <= np.maximum(1e-6 * singular[0], 3.0 * unsure)] / scale
     null, pivots = _reduced(null / np.maximum(np.abs(null).max(axis=1, keepdims=True), 1e-300), names)
     for array in (null, singular):
         array.setflags(write=False)

@@ -19,8 +19,6 @@ from ers_mj.servo.model import BASE, Model
 LETTERS = ("L", "R", "k_s", "T_LH", "F_c", "J", "B", "K_t", "K_e", "theta_0")  # Eq. (1), in the paper's order
 NEEDED = ("J", "B", "K_t", "K_e", "R")  # without them Eq. (1) cannot run
 FACTORS = (0.2, 3.0)  # of what is known beforehand, between which a positive one is searched
-# of the sample time: a winding that is quicker moves no sample, and takes a simulation that many times as long
-QUICKEST = 0.03
 REST = {"a_1": 0.0, "a_2": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0}
 UNITS = {
     "J": "kg m^2",
@@ -154,15 +152,77 @@ def unknowns_of(
     both = fixed.keys() & bounds.keys()
     if both:
         raise InputError(f"{sorted(both)[0]} is fixed and has bounds, one of both was expected")
+    is_lumped, known = _known(traces, datasheet, fixed, bounds, is_angle)
+    _refuse_others((*fixed, *bounds), is_lumped, datasheet)
+    ends = _searched(traces, known, is_lumped, fixed, bounds, factors)
+    if not ends:
+        raise InputError("every letter is fixed, there is nothing to identify")
+    own = () if datasheet is not None else tuple(name for name in ends if name not in bounds and name != "theta_0")
+    lower, upper = np.array([*ends.values()], float).T.copy()
+    reference = np.clip([known[name] for name in ends], lower, upper)
+    held = {name: x for name, x in known.items() if name not in ends}
+    return Unknowns(tuple(ends), reference, lower, upper, held, tuple(fixed), is_lumped, own, tuple(factors))
+
+
+def _searched(
+    traces: Sequence[Trace],
+    known: Mapping[str, float],
+    is_lumped: bool,
+    fixed: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    factors: tuple[float, float],
+) -> dict[str, tuple[float, float]]:
+    """The letters that are searched, in their order, and the ends between which."""
+    y, ends = np.concatenate([t.y[t.valid] for t in traces]), {}
+    for name in (n for n in (BASE if is_lumped else LETTERS) if n in known and n not in fixed):
+        if name in bounds:
+            ends[name] = _given(name, bounds[name], traces, known)
+        elif name == "theta_0":
+            if _has_spring(known, is_lumped):
+                ends[name] = float(y.min()), float(y.max())
+        elif known[name] != 0.0 and _matters(name, traces, known, is_lumped):
+            ends[name] = tuple(sorted((factors[0] * known[name], factors[1] * known[name])))
+    return ends
+
+
+def _known(
+    traces: Sequence[Trace],
+    datasheet: Datasheet | None,
+    fixed: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    is_angle: bool,
+) -> tuple[bool, dict[str, float]]:
+    """(whether these are Eq. (6)'s letters, all of them as they are known beforehand)."""
     sheet = dict(datasheet.parameters) if datasheet is not None else {}
     middle = {name: _middle(name, ends) for name, ends in bounds.items()}
     known = {"n": 1.0, **middle, **sheet, **fixed}
     if all(name in known for name in NEEDED) and not (datasheet is not None and datasheet.lumped and not sheet):
-        is_lumped, known = False, {name: x for name, x in known.items() if name in (*LETTERS, "n")}
-    else:
-        is_lumped, known = True, {**_lumped(traces, datasheet, is_angle), **fixed}
+        return False, {name: x for name, x in known.items() if name in (*LETTERS, "n")}
+    return True, {**_lumped(traces, datasheet, is_angle), **fixed}
+
+
+def _given(
+    name: str, ends: tuple[float, float], traces: Sequence[Trace], known: Mapping[str, float]
+) -> tuple[float, float]:
+    """The bounds that were asked for; a winding no quicker than a share of the sample time: such a one moves no sample,
+    and takes a simulation that many times as long.
+    """
+    if name not in ("L", "tau_e"):
+        return ends
+    least = 0.03 * min(t.sample_time for t in traces) * (known["R"] if name == "L" else 1.0)
+    return max(ends[0], least), max(ends[1], 2.0 * least)
+
+
+def _has_spring(known: Mapping[str, float], is_lumped: bool) -> bool:
+    """Whether anything brings the rudder home."""
+    return any(known.get(name, 0.0) for name in (("a_1", "c_1") if is_lumped else ("k_s", "T_LH")))
+
+
+def _refuse_others(names: Sequence[str], is_lumped: bool, datasheet: Datasheet | None) -> None:
+    """Raise InputError where one of these is no letter that is searched."""
     allowed = LUMPED if is_lumped else LETTERS
-    for name in (*fixed, *bounds):
+    sheet = datasheet.parameters if datasheet is not None else {}
+    for name in names:
         if name not in allowed:
             why = (
                 f"without {', '.join(x for x in NEEDED if x not in sheet)} of a datasheet"
@@ -170,38 +230,6 @@ def unknowns_of(
                 else "where a datasheet gives those of Eq. (1)"
             )
             raise InputError(f"{name} cannot be fixed or bounded {why}: these are identified, {', '.join(allowed)}")
-    y = np.concatenate([t.y[t.valid] for t in traces])
-    names, ends, guessed = [], [], []
-    order = [name for name in (BASE if is_lumped else LETTERS) if name in known and name not in fixed]
-    springs = known.get("a_1" if is_lumped else "k_s", 0.0) or known.get("c_1" if is_lumped else "T_LH", 0.0)
-    for name in order:
-        if name in bounds:
-            names.append(name)
-            least = (
-                QUICKEST * min(t.sample_time for t in traces) * (known["R"] if name == "L" else 1.0)
-                if name in ("L", "tau_e")
-                else -math.inf
-            )
-            ends.append((max(bounds[name][0], least), max(bounds[name][1], 2.0 * least)))
-        elif name == "theta_0":
-            if springs:
-                names.append(name)
-                known[name] = min(max(known[name], float(y.min())), float(y.max()))
-                ends.append((float(y.min()), float(y.max())))
-        elif known[name] != 0.0 and _matters(name, traces, known, is_lumped):
-            names.append(name)
-            low, high = sorted((factors[0] * known[name], factors[1] * known[name]))
-            ends.append((low, high))
-            if datasheet is None:
-                guessed.append(name)
-    lower, upper = np.array(ends, float).reshape(-1, 2).T.copy()
-    reference = np.clip([known[name] for name in names], lower, upper)
-    if not names:
-        raise InputError("every letter is fixed, there is nothing to identify")
-    held = {name: x for name, x in known.items() if name not in names}
-    return Unknowns(
-        tuple(names), reference, lower, upper, held, tuple(fixed), is_lumped, tuple(guessed), (factors[0], factors[1])
-    )
 
 
 def _matters(name: str, traces: Sequence[Trace], known: Mapping[str, float], is_lumped: bool) -> bool:

@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.prepared import Blocks, Signals, Trace, make_trace
-from ers_mj.estimation.fit import Run, jacobian_of
+from ers_mj.estimation.jacobian import jacobian_of
+from ers_mj.estimation.objective import Run
 from ers_mj.online.horizon import HORIZON
 from ers_mj.servo.model import OBSERVER_RATE, Free, Model
 

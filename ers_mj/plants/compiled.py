@@ -1,84 +1,327 @@
-"""Where compiled code is kept: one folder for each state of the sources, so that an edited law is never run stale."""
+"""Compiling: functions that are compiled each on its own and call each other by symbol, and laws called by their
+address.
+
+    inline   put into its callers, for what is small or called in one place
+    unit     compiled once, apart from its callers, neither linked nor inlined into them
+    kernel   what Python calls; it compiles, or fetches, itself and every unit that it needs when it is first called
+
+A unit is kept under its own fingerprint, so that an edited one compiles anew alone; what only calls it stays as it is.
+All that leans on numba's inside is in this file: its calling convention, its records of compiled code and its cache
+(numba 0.61 to 0.68). Under NUMBA_DISABLE_JIT=1 every decorator leaves the plain function. An address holds in one
+process only, so none is kept in anything that may go to another.
+"""
 
 from __future__ import annotations
 
-import hashlib
+import inspect
 import logging
-import os
-import subprocess
+import math
 import sys
-import tempfile
-from contextlib import contextmanager
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache, cached_property, wraps
 from pathlib import Path
 
+import llvmlite.binding as llvm
 import numba
+import numpy as np
+from numba.core import cgutils, types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.extending import intrinsic
 
-COMPILING = "ERS_MJ_COMPILING"  # in the environment of the process that compiles
-EVERY_MODULE = (
-    "import importlib, pkgutil, ers_mj.plants as plants\n"
-    "for module in pkgutil.iter_modules(plants.__path__):\n    importlib.import_module(f'ers_mj.plants.{module.name}')"
-)
+from ers_mj.plants.code_folder import code_folder, one_at_a_time
+from ers_mj.plants.fingerprint import fingerprint, read_by
 
-
-def cache_folder() -> Path:
-    """A writable folder named after the sources that are compiled (effects and plants)."""
-    package = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256()
-    for source in sorted([*package.glob("effects/*.py"), *package.glob("plants/*.py")]):
-        digest.update(source.name.encode() + source.read_bytes())
-    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ers_mj"
-    folder = root / digest.hexdigest()[:16]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        folder = Path(tempfile.gettempdir()) / f"ers_mj-{digest.hexdigest()[:16]}"
-        folder.mkdir(parents=True, exist_ok=True)
-    return folder
+MANY = 4  # parts to compile of which it is worth saying so
+SECONDS_EACH = 0.4
+THIS_FILE = Path(__file__).read_text()
+IS_PLAIN = bool(numba.config.DISABLE_JIT)
+# without counts of who holds an array, atomic additions that cost more than the arithmetic of a small function
+UNCOUNTED = {"nogil": True, "_nrt": False}
 
 
-def part(function):
-    """Compile a function that compiled ones call, and that makes no arrays of its own.
+@dataclass(eq=False)
+class Piece:
+    """A function that is compiled apart: a unit, a kernel or a law.
 
-    Numba counts who holds an array at every call, in atomic additions that cost more than the arithmetic of a small
-    function: a simulation without them takes a half to a third of the time.
+    Attributes:
+        name: of the module and the function; a unit's symbol.
+        signature: numba's, the only one that it is compiled for.
+        options: of numba's compiler.
+        stand: what its callers' code names in its place, of a unit.
+        dispatcher: numba's, once it is compiled.
     """
-    return numba.njit(nogil=True, _nrt=False)(function)
+
+    function: Callable
+    name: str
+    signature: object
+    options: dict
+    stand: object = field(default=None, init=False)
+    dispatcher: object = field(default=None, init=False)
+
+    @property
+    def told(self) -> str:
+        """What a caller's code depends on."""
+        return f"{self.name} {self.signature}"
+
+    @property
+    def address(self) -> int:
+        """Where its code lies in this process."""
+        (result,) = self.dispatcher.overloads.values()
+        return result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
+
+    @cached_property
+    def stem(self) -> str:
+        """Of the names of its files in the cache: they hold for one state of the code, one numba and one processor."""
+        made_by = (numba.__version__, numba.config.CPU_NAME or llvm.get_host_cpu_name(), THIS_FILE)
+        made = fingerprint(self.function, _told, str(self.signature), str(self.options), *made_by)
+        return f"{self.name}-{made}.py{sys.version_info[0]}{sys.version_info[1]}"
+
+    def reached(self) -> list[object]:
+        """The units that its code calls and the functions that are put into it, those that others name before them."""
+        found = {}
+
+        def visit(function: Callable) -> None:
+            for _, value in read_by(function):
+                if id(value) not in found and (id(value) in _PIECES or hasattr(value, "py_func")):
+                    if hasattr(value, "py_func"):
+                        visit(value.py_func)
+                    found[id(value)] = value
+
+        visit(self.function)
+        return list(found.values())
+
+    def needs(self) -> Iterator[Piece]:
+        """The units that its code calls, and those of what is put into it."""
+        return (_PIECES[id(value)] for value in self.reached() if id(value) in _PIECES)
 
 
-def inlined(function):
-    """As ``part``, put into its callers: for what is small or called in one place."""
-    return numba.njit(nogil=True, _nrt=False, forceinline=True)(function)
+_PIECES: dict[int, Piece] = {}  # units, by the identity of what stands for them in code
+_TOLD: dict[int, str] = {}  # what a fingerprint says of an intrinsic of this file, by its identity
+_SIGNATURES: dict[int, tuple] = {}  # what is put into callers for one signature alone, with it, by its identity
+_COMPILING = threading.RLock()
 
 
-def _compile_once() -> None:
-    """Have another process compile all of plants/, once for each state and place of the sources: what a compiler has
-    taken of memory it does not give back.
+def _told(value: object) -> str | None:
+    return _PIECES[id(value)].told if id(value) in _PIECES else _TOLD.get(id(value))
 
-    Where that fails each module compiles for itself when it is imported.
+
+def inline(function: Callable) -> Callable:
+    """Compile a function that makes no arrays of its own into those that call it."""
+    return numba.njit(forceinline=True, **UNCOUNTED)(function)
+
+
+def inline_as(signature) -> Callable[[Callable], Callable]:
+    """As ``inline``, compiled for this signature alone: of what is called with numbers written out, of which numba
+    would make a copy each.
     """
-    package = Path(__file__).resolve().parent.parent
-    done = cache_folder() / f"done-{hashlib.sha256(str(package).encode()).hexdigest()[:16]}"
-    if COMPILING in os.environ or not sys.executable or done.exists():
-        return
-    logging.getLogger(__name__).warning("ers-mj: compiling the simulator for this machine, once: one to three minutes")
-    path = os.pathsep.join([str(package.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
-    compiled = subprocess.run(
-        [sys.executable, "-c", EVERY_MODULE],
-        env={**os.environ, COMPILING: "1", "PYTHONPATH": path},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    if compiled.returncode == 0:
-        done.touch()
+
+    def declare(function: Callable) -> Callable:
+        compiled = inline(function)
+        if IS_PLAIN:
+            return compiled
+        _SIGNATURES[id(compiled)] = (compiled, signature)
+        return compiled
+
+    return declare
 
 
-@contextmanager
-def compiled_cache():
-    """Numba keeps what is decorated inside this block in :func:`cache_folder`, where it has been compiled before."""
-    _compile_once()
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_folder())
-    try:
-        yield
-    finally:
-        numba.config.CACHE_DIR = before
+def unit(signature) -> Callable[[Callable], Callable]:
+    """Compile a function that makes no arrays of its own once, apart from its callers, which call it by its symbol."""
+
+    def declare(function: Callable) -> Callable:
+        if IS_PLAIN:
+            return function
+        piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, UNCOUNTED)
+
+        def find(builder, function_type, arguments):
+            return cgutils.get_or_insert_function(builder.module, function_type, piece.name), arguments
+
+        stand = _intrinsic(signature.args, lambda *_: (signature, _calling(signature, find)))
+        piece.stand = stand
+        _PIECES[id(stand)] = piece
+        return stand
+
+    return declare
+
+
+def kernel(signature) -> Callable[[Callable], Callable]:
+    """A function that Python calls, compiled or fetched with all that it needs when it is first called."""
+
+    def declare(function: Callable) -> Callable:
+        if IS_PLAIN:
+            return function
+        piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, {"nogil": True})
+
+        @wraps(function)
+        def called(*arguments):
+            if piece.dispatcher is None:
+                make(piece)
+            return piece.dispatcher(*arguments)
+
+        called.piece = piece
+        return called
+
+    return declare
+
+
+@cache
+def address_of(function: Callable, signature) -> int:
+    """Of a law, compiled now where it was not before; where nothing is compiled a number that stands for it."""
+    if IS_PLAIN:
+        _PLAIN_LAWS.append(function)
+        return len(_PLAIN_LAWS)
+    function = getattr(function, "py_func", function)
+    piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, UNCOUNTED)
+    make(piece)
+    return piece.address
+
+
+_PLAIN_LAWS: list[Callable] = []
+
+
+def by_address(record: types.Record, place: str, signature) -> Callable:
+    """A call of the function whose address a ``record`` holds at ``place``; the first that it is given are the record's
+    ``constants``.
+    """
+    if IS_PLAIN:
+        return lambda law, *rest: _PLAIN_LAWS[law[place] - 1](law["constants"], *rest)
+
+    def find(builder, function_type, arguments):
+        law, rest = arguments[0], arguments[1:]
+        held = cgutils.pointer_add(builder, law, record.offset(place), cgutils.intp_t.as_pointer())
+        constants = cgutils.pointer_add(builder, law, record.offset("constants"), cgutils.ir.DoubleType().as_pointer())
+        return builder.inttoptr(builder.load(held), function_type.as_pointer()), [constants, *rest]
+
+    given = (record, *signature.args[1:])
+    stand = _intrinsic(given, lambda *_: (signature.return_type(*given), _calling(signature, find)))
+    _TOLD[id(stand)] = f"{place} {record} {signature}"
+    return stand
+
+
+def record_in(dtype: np.dtype) -> Callable:
+    """A function that sees an array of numbers as a record of this ``dtype``, without a copy."""
+    if IS_PLAIN:
+        return lambda array: array.view(dtype)[0]
+    record = numba.from_dtype(dtype)
+
+    def typing(_, array):
+        def generate(context, builder, signature, arguments):
+            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+            return builder.bitcast(data, context.get_value_type(record))
+
+        return record(array), generate
+
+    stand = _intrinsic((None,), typing)
+    _TOLD[id(stand)] = f"record {record}"
+    return stand
+
+
+def _intrinsic(arguments: tuple, typing: Callable) -> Callable:
+    """Numba's intrinsic of as many parameters as there are ``arguments``."""
+
+    def typed(*given):
+        return typing(*given)
+
+    names = ["context", *(f"a_{k}" for k in range(len(arguments)))]
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    typed.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
+    return intrinsic(typed)
+
+
+def _calling(signature, find: Callable) -> Callable:
+    """What writes the call of the function that ``find`` finds; an error there is passed on as one here."""
+
+    def generate(context, builder, _, arguments):
+        convention, result, given = context.call_conv, signature.return_type, signature.args
+        function, passed = find(builder, convention.get_function_type(result, given), arguments)
+        status, value = convention.call_function(builder, function, result, given, passed)
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return value
+
+    return generate
+
+
+def make(piece: Piece) -> None:
+    """Compile a piece and all that it needs, or fetch what is kept."""
+    with _COMPILING:
+        if all(_is_kept(each) for each in _in_order(piece)):
+            _make_all(piece)
+            return
+        with one_at_a_time():
+            missing = sum(not _is_kept(each) for each in _in_order(piece))
+            if missing >= MANY:
+                logging.getLogger(__name__).warning(
+                    f"ers-mj: compiling {missing} parts of the simulator ({piece.name}) for this machine, once: "
+                    f"about {math.ceil(SECONDS_EACH * missing)} s"
+                )
+            _make_all(piece)
+
+
+def _in_order(piece: Piece) -> list[Piece]:
+    """A piece and those that it needs, and has not yet, callees before their callers: a missing symbol ends the
+    process.
+    """
+    found = {}
+
+    def visit(each: Piece) -> None:
+        if each.dispatcher is None and each not in found:
+            for other in each.needs():
+                visit(other)
+            found[each] = None
+
+    visit(piece)
+    return list(found)
+
+
+def _is_kept(piece: Piece) -> bool:
+    return (code_folder() / f"{piece.stem}.nbi").exists()
+
+
+def _make_all(piece: Piece) -> None:
+    for each in _in_order(piece):
+        if not _is_kept(each):
+            _prepare(each)
+        dispatcher = numba.njit(**each.options)(each.function)
+        dispatcher._cache = _cache_of(each)
+        dispatcher.compile(each.signature)
+        dispatcher.disable_compile()  # for other arguments: these convert
+        each.dispatcher = dispatcher
+        if each.stand is not None:
+            llvm.add_symbol(each.name, each.address)
+
+
+def _prepare(piece: Piece) -> None:
+    """Compile what is put into a piece for one signature alone, before numba finds others."""
+    for value in piece.reached():
+        if id(value) in _SIGNATURES and not value.signatures:
+            value.compile(_SIGNATURES[id(value)][1])
+            value.disable_compile()
+
+
+def _cache_of(piece: Piece) -> FunctionCache:
+    """Numba's cache of one function, under a name of ours."""
+
+    class Kept(FunctionCache):
+        _impl_class = staticmethod(lambda _: _Place(piece))
+
+    return Kept(piece.function)
+
+
+class _Place(CompileResultCacheImpl):
+    """Where numba keeps a piece; it is its own locator."""
+
+    def __init__(self, piece: Piece):
+        self._locator, self._filename_base, self._lineno = self, piece.stem, piece.function.__code__.co_firstlineno
+        self._py_file = piece.function.__code__.co_filename
+
+    def ensure_cache_path(self) -> None:
+        """The folder is there."""
+
+    def get_cache_path(self) -> str:
+        return str(code_folder())
+
+    def get_source_stamp(self) -> str:
+        return self._filename_base

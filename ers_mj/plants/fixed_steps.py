@@ -1,5 +1,6 @@
 """A play or a shaft beside a bristle: two bodies by fixed steps, every force taken in the middle of the step.
- State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead.
+
+State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead.
 Its friction is k z + d exp(-(w / w_d)^2) z', its bend goes the way of Dahl's exactly under a speed that is constant
 over the step. What gives like a spring needs no event; what is left of set-valued terms, the motor side's dry friction
 and the preload's corner, is solved for with the speeds at the end of the step, as in Moreau's time
@@ -11,51 +12,16 @@ of second order where nothing switches; dampers are implicit.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit, types
 
-from ers_mj.plants.compiled import compiled_cache, inlined, part
-from ers_mj.plants.events import (
-    A_1,
-    A_EMF,
-    A_MINUS,
-    A_PLUS,
-    BETA,
-    BIAS,
-    C_1,
-    C_MINUS,
-    C_PLUS,
-    D_BRISTLE,
-    D_STOP,
-    D_TWIST,
-    DAHL,
-    DELAY,
-    FADE,
-    FALL,
-    GAP,
-    HARDEN,
-    K_BRISTLE,
-    K_STOP,
-    K_TWIST,
-    LAWS,
-    LEAST_LEVEL,
-    LOWER,
-    PHI,
-    READ,
-    READ_BOOL,
-    RHO,
-    ROWS,
-    RUNAWAY,
-    TAU,
-    THETA_0,
-    UPPER,
-    VECTOR,
-    B,
-    _faster,
-    _motor_level,
-)
-from ers_mj.plants.laws import drive_torque, friction_level, is_lawful, remember, total_torque
+from ers_mj.plants.compiled import inline, kernel, unit
+from ers_mj.plants.cuts import split_delay
+from ers_mj.plants.forces import LEAST_LEVEL, motor_level
+from ers_mj.plants.laws import drive_torque, friction_level, remember, total_torque
+from ers_mj.plants.march import faster
+from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, C, F, I, L, is_bounded, plant_in, types
 
 LONGEST = 2e-4  # [s] of a step
 SPRING_STEP = 0.35  # frequency [rad/s] of the stiffest spring times the step
@@ -65,20 +31,34 @@ RESTING = 1e-9  # [output unit, and that per second] from the corner, and of spe
 SWEEPS = 3  # over the two set-valued forces, which only the contact's damper couples
 
 
-@inlined
+class Bent(NamedTuple):
+    """Angle and speed of the rudder, drive acceleration, angle and speed of the motor's side, bend of the bristle."""
+
+    theta: float
+    w: float
+    j: float
+    theta_m: float
+    w_m: float
+    z: float
+
+
+X6 = types.NamedUniTuple(F, 6, Bent)
+
+
+@inline
 def _step_length(c, refine):
     """[s] of a step at most."""
-    rest = 1.0 - c[RHO]
-    stiffest = max(c[K_TWIST] / c[RHO], c[K_BRISTLE] * (1.0 - c[PHI]), c[K_STOP]) / rest
+    rest = 1.0 - c.rho
+    stiffest = max(c.k_twist / c.rho, c.k_bristle * (1.0 - c.phi), c.k_stop) / rest
     return (min(LONGEST, SPRING_STEP / math.sqrt(stiffest)) if stiffest > 0.0 else LONGEST) / refine
 
 
-@inlined
+@inline
 def _unbent(c, left, way):
     """What is left of a bristle's share of its level to bend, which was ``left``, after a way counted in the
     displacement of its whole bend.
     """
-    delta = c[DAHL]
+    delta = c.dahl
     if delta == 1.0:
         return left * math.exp(-way)
     size = abs(left)
@@ -88,54 +68,54 @@ def _unbent(c, left, way):
     return math.copysign(after ** (1.0 / (1.0 - delta)), left) if after > 0.0 else 0.0
 
 
-@inlined
+@inline
 def _bent(c, z, w, level, h):
     """The bend after h at the speed w under this level of friction."""
     if w == 0.0:
         return z
-    end = math.copysign(level / c[K_BRISTLE], w)
-    return end * (1.0 - _unbent(c, 1.0 - z / end, abs(w) * h * c[K_BRISTLE] / level))
+    end = math.copysign(level / c.k_bristle, w)
+    return end * (1.0 - _unbent(c, 1.0 - z / end, abs(w) * h * c.k_bristle / level))
 
 
-@inlined
-def _full_level(c, on, p, lawful, theta, w, j):
+@inline
+def _full_level(c, theta, w, j):
     """Level of friction of the whole train along the motion, per total inertia."""
-    level = c[C_PLUS] if w > 0.0 else c[C_MINUS]
-    if lawful:
-        level = friction_level(on, p, level, theta, w, j, 1.0 if w > 0.0 else -1.0)
-    return max(level, LEAST_LEVEL * 0.5 * (c[C_PLUS] + c[C_MINUS]))
+    level = c.c_2_plus if w > 0.0 else c.c_2_minus
+    if c.lawful > 0:
+        level = friction_level(c, level, theta, w, j, 1.0 if w > 0.0 else -1.0)
+    return max(level, LEAST_LEVEL * 0.5 * (c.c_2_plus + c.c_2_minus))
 
 
-@inlined
+@inline
 def _damping(c, w):
     """Mechanical damping in the direction of a speed."""
-    return c[A_PLUS] if w > 0.0 else c[A_MINUS]
+    return c.a_mech_plus if w > 0.0 else c.a_mech_minus
 
 
-@inlined
+@inline
 def _contact(c, twist):
     """(force of the spring between the bodies on the rudder per total inertia, damping there) at theta_m - theta; none
     within the play.
     """
     x = twist
-    if c[GAP] > 0.0:
-        if abs(twist) <= c[GAP]:
+    if c.gap > 0.0:
+        if abs(twist) <= c.gap:
             return 0.0, 0.0
-        x -= math.copysign(c[GAP], twist)
-    return c[K_TWIST] * x * (1.0 + c[HARDEN] * x * x), c[D_TWIST]
+        x -= math.copysign(c.gap, twist)
+    return c.k_twist * x * (1.0 + c.harden * x * x), c.d_twist
 
 
-@inlined
+@inline
 def _stop(c, theta):
     """(force of the spring of the stop that is touched, damping there)."""
-    if theta > c[UPPER]:
-        return c[K_STOP] * (c[UPPER] - theta), c[D_STOP]
-    if theta < c[LOWER]:
-        return c[K_STOP] * (c[LOWER] - theta), c[D_STOP]
+    if theta > c.upper:
+        return c.k_stop * (c.upper - theta), c.d_stop
+    if theta < c.lower:
+        return c.k_stop * (c.lower - theta), c.d_stop
     return 0.0, 0.0
 
 
-@inlined
+@inline
 def _past_corner(a, push, ahead, corner):
     """(w, mean side of the corner over the step's way, 0 in it) of a w = push - corner sgn(ahead + w), sgn set-valued
     at 0.
@@ -151,7 +131,7 @@ def _past_corner(a, push, ahead, corner):
     return w, way * (1.0 - 2.0 * abs(ahead / w))
 
 
-@inlined
+@inline
 def _speeds(a, e, d, push, push_m, ahead, corner, holds):
     """(w, w_m) at the end of a step: a w - d w_m = push - corner sgn(ahead + w), e w_m - d w = push_m - holds sgn(w_m),
     sgn set-valued at 0.
@@ -179,50 +159,40 @@ def _speeds(a, e, d, push, push_m, ahead, corner, holds):
     return w, w_m
 
 
-@inlined
+@inline
 def _charged(c, j, drive, w_m, h):
     """The drive acceleration h later at the speed w_m of the motor."""
-    if c[TAU] <= 0.0:
-        return drive - c[A_EMF] * w_m
-    rate = (1.0 + (_faster(c, j) if c[FALL] > 0.0 else 0.0)) / c[TAU]
-    end = drive - c[A_EMF] * w_m
+    if c.tau_e <= 0.0:
+        return drive - c.a_emf * w_m
+    rate = (1.0 + (faster(c, j) if c.fall > 0.0 else 0.0)) / c.tau_e
+    end = drive - c.a_emf * w_m
     return end + (j - end) * math.exp(-rate * h)
 
 
-@inlined
+@inline
 def _bristle_damping(c, w, z, level):
     """Damping of a bristle that a motion bends on at the speed w."""
-    if c[D_BRISTLE] <= 0.0:
+    if c.d_bristle <= 0.0:
         return 0.0
-    left = max(1.0 - math.copysign(1.0, w) * c[K_BRISTLE] * z / level, 0.0)
-    return c[D_BRISTLE] * (left if c[DAHL] == 1.0 else left ** c[DAHL]) * math.exp(-((w / c[FADE]) ** 2))
+    left = max(1.0 - math.copysign(1.0, w) * c.k_bristle * z / level, 0.0)
+    return c.d_bristle * (left if c.dahl == 1.0 else left**c.dahl) * math.exp(-((w / c.fade) ** 2))
 
 
-@part
-def _step(c, on, p, lawful, t, x, drive, closed, load, h):
-    """The state h later under a constant drive, or in an open circuit."""
-    theta, w, j, theta_m, w_m, z = x
-    share, half = 1.0 - c[PHI], 0.5 * h
-    theta, theta_m = theta + half * w, theta_m + half * w_m
-    j = _charged(c, j, drive, w_m, half) if closed else 0.0
-    level = _full_level(c, on, p, lawful, theta, w, j)
-    force = c[BIAS] + load + c[A_1] * (c[THETA_0] - theta) - share * c[K_BRISTLE] * z
-    force_m, holds = 0.0, _motor_level(c, on, p, lawful, (theta, w, j, theta_m, w_m))
-    if lawful:
-        force += total_torque(on, p, theta, w, j, t + half)
-        force_m = drive_torque(on, p, theta_m, w_m, j, t + half)
+@inline
+def _solved(c, theta, theta_m, w, w_m, push, push_m, own, own_m, holds, h):
+    """(w, w_m) at the end of a step, under forces in its middle that do not hang on them, dampings of each body's own,
+    and what contact and stop do: neither pulls back what it has pushed.
+    """
+    half = 0.5 * h
     wall, d_wall = _stop(c, theta)
     twist, d = _contact(c, theta_m - theta)
-    own = share * _bristle_damping(c, w, z, level) + (1.0 - c[BETA]) * _damping(c, w)
-    own_m = c[BETA] * _damping(c, w_m)
-    if closed and c[TAU] <= 0.0:  # the back-EMF damps at once
-        own_m, j = own_m + c[A_EMF], drive
+    w_1, w_m1 = w, w_m
     for _ in range(2):
-        a, e = 1.0 - c[RHO] + half * (own + d_wall + d), c[RHO] + half * (own_m + d)
-        push = (2.0 * (1.0 - c[RHO]) - a) * w + half * d * w_m + h * (force + wall + twist)
-        push_m = (2.0 * c[RHO] - e) * w_m + half * d * w + h * (j + force_m - twist)
-        w_1, w_m1 = _speeds(a, e, half * d, push, push_m, (theta - c[THETA_0]) / h, h * c[C_1], h * holds)
-        pulls = c[GAP] > 0.0 and d > 0.0 and (twist + 0.5 * d * (w_m1 + w_m - w_1 - w)) * twist < 0.0
+        a, e = 1.0 - c.rho + half * (own + d_wall + d), c.rho + half * (own_m + d)
+        p = (2.0 * (1.0 - c.rho) - a) * w + half * d * w_m + h * (push + wall + twist)
+        p_m = (2.0 * c.rho - e) * w_m + half * d * w + h * (push_m - twist)
+        w_1, w_m1 = _speeds(a, e, half * d, p, p_m, (theta - c.theta_0) / h, h * c.c_1, h * holds)
+        pulls = c.gap > 0.0 and d > 0.0 and (twist + 0.5 * d * (w_m1 + w_m - w_1 - w)) * twist < 0.0
         sucks = d_wall > 0.0 and (wall - 0.5 * d_wall * (w_1 + w)) * wall < 0.0
         if not (pulls or sucks):
             break
@@ -230,103 +200,108 @@ def _step(c, on, p, lawful, t, x, drive, closed, load, h):
             twist = d = 0.0
         if sucks:
             wall = d_wall = 0.0
+    return w_1, w_m1
+
+
+@unit(X6(C, F, X6, F, L, F, F))
+def _step(c, t, x, drive, closed, load, h):
+    """The state h later under a constant drive, or in an open circuit."""
+    theta, w, j, theta_m, w_m, z = x
+    share, half = 1.0 - c.phi, 0.5 * h
+    theta, theta_m = theta + half * w, theta_m + half * w_m
+    j = _charged(c, j, drive, w_m, half) if closed else 0.0
+    level = _full_level(c, theta, w, j)
+    push = c.bias + load + c.a_1 * (c.theta_0 - theta) - share * c.k_bristle * z
+    push_m, holds = 0.0, motor_level(c, theta, j, w_m)
+    if c.lawful > 0:
+        push += total_torque(c, theta, w, j, t + half)
+        push_m = drive_torque(c, theta_m, w_m, j, t + half)
+    own = share * _bristle_damping(c, w, z, level) + (1.0 - c.beta) * _damping(c, w)
+    own_m = c.beta * _damping(c, w_m)
+    if closed and c.tau_e <= 0.0:  # the back-EMF damps at once
+        own_m, j = own_m + c.a_emf, drive
+    w_1, w_m1 = _solved(c, theta, theta_m, w, w_m, push, j + push_m, own, own_m, holds, h)
     z = _bent(c, z, w_1, level, h)
     j = _charged(c, j, drive, w_m1, half) if closed else 0.0
-    return theta + half * w_1, w_1, j, theta_m + half * w_m1, w_m1, z
+    return Bent(theta + half * w_1, w_1, j, theta_m + half * w_m1, w_m1, z)
 
 
-@inlined
+@inline
 def _is_near_corner(c, x, h):
     """Whether a rudder that does not rest there may reach the preload's corner within h."""
-    away, reach = abs(x[0] - c[THETA_0]), h * (abs(x[1]) + h * c[C_1] / (1.0 - c[RHO]))
-    return c[C_1] > 0.0 and away <= 2.0 * reach and (away > RESTING or abs(x[1]) > RESTING)
+    away, reach = abs(x.theta - c.theta_0), h * (abs(x.w) + h * c.c_1 / (1.0 - c.rho))
+    return c.c_1 > 0.0 and away <= 2.0 * reach and (away > RESTING or abs(x.w) > RESTING)
 
 
-@part
-def _through(c, on, p, lawful, t, x, drive, closed, load, span, longest):
+@unit(X6(C, F, X6, F, L, F, F, F))
+def _through(c, t, x, drive, closed, load, span, longest):
     """The state ``span`` later under a constant drive."""
     steps = int(math.ceil(span / longest - 1e-9))
     h = span / steps
     for k in range(steps):
         parts = FINER if _is_near_corner(c, x, h) else 1
         for i in range(parts):
-            x = _step(c, on, p, lawful, t + k * h + i * h / parts, x, drive, closed, load, h / parts)
+            x = _step(c, t + k * h + i * h / parts, x, drive, closed, load, h / parts)
     return x
 
 
-@inlined
+@inline
 def _bent_start(c, theta, w, j):
     """Both bodies together, and a bristle bent by as much as a motion of this speed would have left it."""
-    whole = 0.5 * (c[C_PLUS] + c[C_MINUS]) / c[K_BRISTLE]
-    return theta, w, j, theta, w, min(max(w / math.sqrt(c[K_BRISTLE]), -whole), whole)
+    whole = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_bristle
+    return Bent(theta, w, j, theta, w, min(max(w / math.sqrt(c.k_bristle), -whole), whole))
 
 
-def _simulate(t, u, enable, load, y, gain, every, c, on, p, refine, x0, out):
-    """As events.simulate_kernel, of a plant that has both a motor's side and a bristle."""
-    n, h0 = t.size, t[1] - t[0]
-    lawful, longest = is_lawful(on), _step_length(c, refine)
-    skip = int(c[DELAY] / h0 + 1e-9)
-    late = c[DELAY] - skip * h0
-    if late < 1e-9 * h0:
-        late = 0.0
+@inline
+def _moved(c, x, jump):
+    """The state after an observer has moved the angle: not in the corner, which holds the rudder."""
+    if c.c_1 > 0.0:
+        jump *= min(1.0, abs(x.theta - c.theta_0) / max(2.0 * abs(jump), 1e-300))
+    return Bent(x.theta + jump, x.w, x.j, x.theta_m + jump, x.w_m, x.z)
+
+
+@kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, I, VECTOR, I, VECTOR, TABLE))
+def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
+    """As march.simulate, of a plant that has both a motor's side and a bristle."""
+    c, n, h0 = plant_in(plant), t.size, t[1] - t[0]
+    longest, (skip, late) = _step_length(c, refine), split_delay(c, h0)
     x = _bent_start(c, x0[0], x0[1], x0[2])
     for k in range(n):
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[1], x[2], x[3]
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x.theta, x.w, x.j, x.theta_m
         if k == n - 1:
             break
         h = t[k + 1] - t[k]
-        remember(on, p, x, h)
+        remember(c, x.theta, x.w, x.j, x.theta_m, x.w_m, h)
         if gain > 0.0 and k % every == 0 and y[k] == y[k]:
-            jump = gain * (y[k] - x[0])
-            if c[C_1] > 0.0:  # none in the corner, which holds the rudder
-                jump *= min(1.0, abs(x[0] - c[THETA_0]) / max(2.0 * abs(jump), 1e-300))
-            x = (x[0] + jump, x[1], x[2], x[3] + jump, x[4], x[5])
+            x = _moved(c, x, gain * (y[k] - x.theta))
         first = min(late * h / h0, h)
         if first > 0.0:
-            x = _through(c, on, p, lawful, t[k], x, c[B] * u[max(k - skip - 1, 0)], enable[k], load[k], first, longest)
-        x = _through(
-            c, on, p, lawful, t[k] + first, x, c[B] * u[max(k - skip, 0)], enable[k], load[k], h - first, longest
-        )
-        if not (abs(x[0]) < RUNAWAY and abs(x[1]) < RUNAWAY):
+            x = _through(c, t[k], x, c.b * u[max(k - skip - 1, 0)], enable[k], load[k], first, longest)
+        x = _through(c, t[k] + first, x, c.b * u[max(k - skip, 0)], enable[k], load[k], h - first, longest)
+        if not is_bounded(x):
             out[k + 1 :, :] = np.nan
             return
 
 
-def _sample(t, h0, before, now, c, on, p, refine, x):
+@kernel(types.void(F, F, F, F, VECTOR, I, VECTOR))
+def hold(t, h0, before, now, plant, refine, x):
     """Move x (6,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first, ``now``
     afterwards.
     """
-    lawful, longest = is_lawful(on), _step_length(c, refine)
-    late = c[DELAY] - int(c[DELAY] / h0 + 1e-9) * h0
-    z = (x[0], x[1], x[2], x[3], x[4], x[5])
-    remember(on, p, x, h0)
-    if late >= 1e-9 * h0:
-        z = _through(c, on, p, lawful, t, z, c[B] * before, True, 0.0, late, longest)
-    else:
-        late = 0.0
-    z = _through(c, on, p, lawful, t + late, z, c[B] * now, True, 0.0, h0 - late, longest)
+    c = plant_in(plant)
+    longest, (_, late) = _step_length(c, refine), split_delay(c, h0)
+    z = Bent(x[0], x[1], x[2], x[3], x[4], x[5])
+    remember(c, z.theta, z.w, z.j, z.theta_m, z.w_m, h0)
+    if late > 0.0:
+        z = _through(c, t, z, c.b * before, True, 0.0, late, longest)
+    z = _through(c, t + late, z, c.b * now, True, 0.0, h0 - late, longest)
     for i in range(6):
-        x[i] = z[i] if abs(z[0]) < RUNAWAY and abs(z[1]) < RUNAWAY else np.nan
+        x[i] = z[i] if is_bounded(z) else np.nan
 
 
-def _begin(c, x):
+@kernel(types.void(VECTOR, VECTOR))
+def begin(plant, x):
     """Fill x (6,) after its first three entries, theta w j."""
-    z = _bent_start(c, x[0], x[1], x[2])
+    z = _bent_start(plant_in(plant), x[0], x[1], x[2])
     for i in range(6):
         x[i] = z[i]
-
-
-NUMBER = types.float64
-
-with compiled_cache():
-    simulate_kernel = njit(
-        types.void(
-            READ, READ, READ_BOOL, READ, READ, types.float64, types.int64, VECTOR, ROWS, LAWS, types.int64, VECTOR, LAWS
-        ),
-        nogil=True,
-        cache=True,
-    )(_simulate)
-    sample_kernel = njit(
-        types.void(NUMBER, NUMBER, NUMBER, NUMBER, VECTOR, ROWS, LAWS, types.int64, VECTOR), cache=True
-    )(_sample)
-    begin_kernel = njit(types.void(VECTOR, VECTOR), cache=True)(_begin)

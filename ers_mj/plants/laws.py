@@ -5,198 +5,136 @@ are on and no others.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import types
 
 from ers_mj.effects import EFFECTS
-from ers_mj.plants.compiled import inlined
+from ers_mj.effects.base import Coefficients
+from ers_mj.plants.compiled import address_of, by_address, inline
+from ers_mj.plants.state import LAW, MOST_LAWS, N_CONSTANTS, PLANT, C, F
 
 MEMORY = 4  # the constant of a law that may be a memory
-N_PARAMETERS = 7  # constants of a law at most
+CONSTANTS = types.CPointer(F)
+SIGNATURES = {
+    "torque": F(CONSTANTS, F, F, F, F),
+    "friction": F(CONSTANTS, F, F, F, F, F),
+    "inertia": types.UniTuple(F, 2)(CONSTANTS, F),
+    "memory": F(CONSTANTS, F, F, F, F),
+}
+_torque_of, _friction_of, _inertia_of, _memory_of = (
+    by_address(C.fields["laws"].type.dtype, kind, signature) for kind, signature in SIGNATURES.items()
+)
 
 
-def _chain_torque(laws):
-    """One compiled function that evaluates the torque of the effect in one row."""
-    if not laws:
-
-        @njit(nogil=True, inline="always")
-        def pick(k, p, theta, w, j, t):
-            return 0.0
-
-        return pick
-    (row, law), rest = laws[0], _chain_torque(laws[1:])
-
-    @njit(nogil=True, inline="always")
-    def pick(k, p, theta, w, j, t):
-        if k == row:
-            a = law(p, theta, w, j, t)
-        else:
-            a = rest(k, p, theta, w, j, t)
-        return a
-
-    return pick
-
-
-def _chain_friction(laws):
-    """One compiled function that passes the friction level through the effect in one row."""
-    if not laws:
-
-        @njit(nogil=True, inline="always")
-        def pick(k, p, level, theta, w, j, direction):
-            return level
-
-        return pick
-    (row, law), rest = laws[0], _chain_friction(laws[1:])
-
-    @njit(nogil=True, inline="always")
-    def pick(k, p, level, theta, w, j, direction):
-        if k == row:
-            a = law(p, level, theta, w, j, direction)
-        else:
-            a = rest(k, p, level, theta, w, j, direction)
-        return a
-
-    return pick
-
-
-def _chain_inertia(laws):
-    """One compiled function that evaluates the inertia of the effect in one row."""
-    if not laws:
-
-        @njit(nogil=True, inline="always")
-        def pick(k, p, theta):
-            return 1.0, 0.0
-
-        return pick
-    (row, law), rest = laws[0], _chain_inertia(laws[1:])
-
-    @njit(nogil=True, inline="always")
-    def pick(k, p, theta):
-        if k == row:
-            a = law(p, theta)
-        else:
-            a = rest(k, p, theta)
-        return a
-
-    return pick
-
-
-def _chain_memory(laws):
-    """One compiled function that evaluates the memory of the effect in one row."""
-    if not laws:
-
-        @njit(nogil=True, inline="always")
-        def pick(k, p, theta, w, j, h):
-            return 0.0
-
-        return pick
-    (row, law), rest = laws[0], _chain_memory(laws[1:])
-
-    @njit(nogil=True, inline="always")
-    def pick(k, p, theta, w, j, h):
-        if k == row:
-            a = law(p, theta, w, j, h)
-        else:
-            a = rest(k, p, theta, w, j, h)
-        return a
-
-    return pick
-
-
-_torque_of = _chain_torque([(row, e.torque) for row, e in enumerate(EFFECTS) if e.torque])
-_friction_of = _chain_friction([(row, e.friction) for row, e in enumerate(EFFECTS) if e.friction])
-_memory_of = _chain_memory([(row, e.memory) for row, e in enumerate(EFFECTS) if e.memory])
-_inertia_of = _chain_inertia([(row, e.inertia) for row, e in enumerate(EFFECTS) if e.inertia])
-
-
-@inlined
-def _constants(p, k):
-    return p[k, 0], p[k, 1], p[k, 2], p[k, 3], p[k, 4], p[k, 5], p[k, 6]
-
-
-@inlined
-def _torques(on, row, p, theta, w, j, t):
-    """Sum of the torques of the effects that a row names."""
+@inline
+def total_torque(c, theta, w, j, t):
+    """Sum of the torques of the effects that are on: those on the rudder only where the motor is a body of its own."""
     a = 0.0
-    for i in range(on[row, 0]):
-        k = on[row, i + 1]
-        a += _torque_of(k, _constants(p, k), theta, w, j, t)
+    if c.torques > 0:
+        for i in range(c.effects):
+            law = c.laws[i]
+            if law.torque != 0 and law.at_motor == 0:
+                a += _torque_of(law, theta, w, j, t)
     return a
 
 
-@inlined
-def total_torque(on, p, theta, w, j, t):
-    """Sum of the torques of the effects that are on: those on the rudder only where the motor is a body of its own."""
-    return _torques(on, 0, p, theta, w, j, t)
-
-
-@inlined
-def drive_torque(on, p, theta_m, w_m, j, t):
+@inline
+def drive_torque(c, theta_m, w_m, j, t):
     """The same on a motor that is a body of its own, at its angle and speed seen at the output."""
-    return _torques(on, 4, p, theta_m, w_m, j, t)
+    a = 0.0
+    if c.motor_torques > 0:
+        for i in range(c.effects):
+            law = c.laws[i]
+            if law.torque != 0 and law.at_motor != 0:
+                a += _torque_of(law, theta_m, w_m, j, t)
+    return a
 
 
-@inlined
-def is_lawful(on):
-    """Whether a law adds to the forces."""
-    return on[0, 0] + on[1, 0] + on[4, 0] > 0
-
-
-@inlined
-def friction_level(on, p, level, theta, w, j, direction):
+@inline
+def friction_level(c, level, theta, w, j, direction):
     """The friction level after every effect that is on."""
-    for i in range(on[1, 0]):
-        k = on[1, i + 1]
-        level = _friction_of(k, _constants(p, k), level, theta, w, j, direction)
+    if c.frictions > 0:
+        for i in range(c.effects):
+            law = c.laws[i]
+            if law.friction != 0:
+                level = _friction_of(law, level, theta, w, j, direction)
     return level
 
 
-@inlined
-def moved(on, p, theta, w, a):
+@inline
+def moved(c, theta, w, a):
     """The acceleration that is left of ``a``, per total inertia, where effects change the inertia along the travel."""
-    for i in range(on[2, 0]):
-        k = on[2, i + 1]
-        inertia, half_slope = _inertia_of(k, _constants(p, k), theta)
-        a = (a - half_slope * w * w) / inertia
+    if c.inertias > 0:
+        for i in range(c.effects):
+            law = c.laws[i]
+            if law.inertia != 0:
+                inertia, half_slope = _inertia_of(law, theta)
+                a = (a - half_slope * w * w) / inertia
     return a
 
 
-@inlined
-def remember(on, p, x, h):
-    """Bring the memories of effects, their fifth constants, on by a sample of length h from the state x = (theta, w, j,
-    theta_m, w_m, ...).
+@inline
+def remember(c, theta, w, j, theta_m, w_m, h):
+    """Bring the memories of effects, their fifth constants, on by a sample of length h from this state."""
+    for i in range(c.effects):
+        law = c.laws[i]
+        if law.memory != 0:
+            if law.at_motor == 0:
+                law.constants[MEMORY] = _memory_of(law, theta, w, j, h)
+            else:
+                law.constants[MEMORY] = _memory_of(law, theta_m, w_m, j, h)
+
+
+class Acting(NamedTuple):
+    """The effects that act by laws, their rows of EFFECTS in the order of the calls, whether the motor is a body of its
+    own, and whether any is a torque or a friction: what may go to another process, unlike the laws' addresses.
     """
-    for i in range(on[3, 0]):
-        k = on[3, i + 1]
-        p[k, MEMORY] = _memory_of(k, _constants(p, k), x[0], x[1], x[2], h)
-    for i in range(on[5, 0]):
-        k = on[5, i + 1]
-        p[k, MEMORY] = _memory_of(k, _constants(p, k), x[3], x[4], x[2], h)
+
+    rows: tuple[int, ...]
+    parted: bool
+    pushes: bool
 
 
 @lru_cache
-def rows_of(names, parted=False):
-    """A tuple of effects as the laws are called: (6, 1 + effects) their number and rows, of torques, of frictions, of
-    inertias and of memories, and where the motor is ``parted`` from the rudder of those torques and memories that are
-    its own."""
-    on = np.zeros((6, 1 + len(EFFECTS)), np.int64)
-    for kind, (law, own) in enumerate(
-        (
-            ("torque", False),
-            ("friction", False),
-            ("inertia", False),
-            ("memory", False),
-            ("torque", True),
-            ("memory", True),
-        )
-    ):
-        rows = [
-            row
-            for row, effect in reversed(list(enumerate(EFFECTS)))
-            if effect.name in names
-            and getattr(effect, law)
-            and (law not in ("torque", "memory") or own == (parted and effect.at_motor))
-        ]
-        on[kind, 0], on[kind, 1 : 1 + len(rows)] = len(rows), rows
-    return on
+def acting(names: tuple[str, ...], parted: bool) -> Acting:
+    """The effects named, of those that have a law."""
+    rows = tuple(row for row, effect in reversed(list(enumerate(EFFECTS))) if effect.name in names)
+    return Acting(rows, parted, any(EFFECTS[row].torque or EFFECTS[row].friction for row in rows))
+
+
+def laid_out(c: np.ndarray, on: Acting, p: np.ndarray) -> np.ndarray:
+    """The plant's record as an array of numbers: coefficients c (see Coefficients), the laws that are on and their
+    constants p (effects, N_CONSTANTS). The kernels change it: c.bias for a moment, memories for good.
+    """
+    flat = _without_numbers(on).copy()
+    flat[: len(Coefficients._fields)] = c
+    _rows(flat)[: len(p), -N_CONSTANTS:] = p
+    return flat
+
+
+@lru_cache
+def _without_numbers(on: Acting) -> np.ndarray:
+    """What is laid out of any plant with these laws in this process, which compiles them."""
+    if len(on.rows) > MOST_LAWS:
+        raise ValueError(f"{len(on.rows)} effects act by laws at once, of at most {MOST_LAWS}")
+    flat = np.zeros(PLANT.itemsize // np.float64().nbytes)
+    plant, effects = flat.view(PLANT)[0], [EFFECTS[row] for row in on.rows]
+    for law, effect in zip(plant.laws, effects):
+        for kind, signature in SIGNATURES.items():
+            if getattr(effect, kind):
+                law[kind] = address_of(getattr(effect, kind), signature)
+        law["at_motor"] = on.parted and effect.at_motor
+    own = sum(on.parted and effect.at_motor for effect in effects if effect.torque)
+    plant.effects, plant.motor_torques = len(effects), own
+    plant.torques = sum(effect.torque is not None for effect in effects) - own
+    plant.frictions = sum(effect.friction is not None for effect in effects)
+    plant.inertias = sum(effect.inertia is not None for effect in effects)
+    plant.lawful = plant.torques + plant.frictions + plant.motor_torques
+    return flat
+
+
+def _rows(flat: np.ndarray) -> np.ndarray:
+    """The laws of what is laid out, a row of numbers each."""
+    return flat[-MOST_LAWS * LAW.itemsize // flat.itemsize :].reshape(MOST_LAWS, -1)

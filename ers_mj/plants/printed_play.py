@@ -14,11 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ers_mj.effects.base import Coefficients
-from ers_mj.plants.compiled import compiled_cache
+from ers_mj.plants.compiled import inline, kernel
 from ers_mj.plants.reduced import Motion
+from ers_mj.plants.state import READ, TABLE, F, I, types
 
 STEP = 2e-6  # [s] at most; half of it moves theta by less than 0.01 deg RMS
 
@@ -63,7 +63,7 @@ def printed_threshold(c: Coefficients, gap: float) -> float:
     return c.a_1 * gap
 
 
-@njit(nogil=True, inline="always")
+@inline
 def _speed(slope, push, corner, friction, preload):
     """w that solves slope w + friction Sgn(w) + preload Sgn(w - corner) = push, both Sgn set-valued."""
     for side in (-1.0, 1.0):
@@ -77,7 +77,8 @@ def _speed(slope, push, corner, friction, preload):
     return 0.0 if abs(held) <= friction else corner
 
 
-def _steps(a_1, a_mech, a_emf, b, c_1, c_2, theta_0, tau, threshold, t, u, substeps, out):
+@kernel(types.void(F, F, F, F, F, F, F, F, F, READ, READ, I, TABLE))
+def _run(a_1, a_mech, a_emf, b, c_1, c_2, theta_0, tau, threshold, t, u, substeps, out):
     """Fill out (N, 3) with angle, speed, transmitted acceleration just before u[k] acts; implicit steps in the
     speed.
     """
@@ -94,7 +95,3 @@ def _steps(a_1, a_mech, a_emf, b, c_1, c_2, theta_0, tau, threshold, t, u, subst
             through = min(max(through, motor - threshold), motor + threshold)
             w = _speed(1.0 + h * (a_mech + h * a_1), w + h * (through - a_1 * phi), -phi / h, h * c_2, h * c_1)
             phi += h * w
-
-
-with compiled_cache():
-    _run = njit(nogil=True, cache=True)(_steps)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -10,11 +9,12 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Coefficients, Effect
-from ers_mj.plants.events import simulate_kernel
-from ers_mj.plants.laws import N_PARAMETERS, rows_of
-from ers_mj.plants.tangents import NUDGE, prepare_kernel, tangent_kernel
+from ers_mj.plants import fixed_steps, march
+from ers_mj.plants.effort import Effort
+from ers_mj.plants.laws import acting, laid_out
+from ers_mj.plants.state import N_CONSTANTS
+from ers_mj.plants.tangents import NUDGE, prepare, tangent
 
-ROW = {effect.name: row for row, effect in enumerate(EFFECTS)}
 PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = (
     150,
     400,
@@ -23,28 +23,6 @@ PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = (
     60,
 )  # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on
 # a bristle, of both; of a tangent
-OVERHEAD = 20  # samples whose handling takes another microsecond
-
-
-class Effort:
-    """What has been simulated so far by this process, in the microseconds that it takes a slow core, about: a clock
-    that goes alike on every machine, whatever runs beside."""
-
-    def __init__(self):
-        self._lock, self._spent = threading.Lock(), 0
-
-    @property
-    def spent(self) -> int:
-        """[us]"""
-        return self._spent
-
-    def add(self, t: np.ndarray, per_second: int) -> None:
-        """Count a simulation of the samples at t (N,) [s] that takes so many microseconds a second."""
-        with self._lock:
-            self._spent += int((t[-1] - t[0]) * per_second) + t.size // OVERHEAD
-
-
-EFFORT = Effort()
 
 
 def lumped(values: Mapping[str, float]) -> Coefficients:
@@ -81,6 +59,11 @@ class Motion:
     measured: np.ndarray
 
 
+def _step(c: np.ndarray, c_2: np.ndarray) -> np.ndarray:
+    """c_2 - c, and 0 where both are the same infinity."""
+    return np.subtract(c_2, c, out=np.zeros_like(c), where=c != c_2)
+
+
 def _touches_sensor(name: str) -> bool:
     return type(BY_NAME[name]).measure is not Effect.measure
 
@@ -90,25 +73,28 @@ class ReducedModel:
     """Eq. (6)'s coefficients and the effects on top of them.
 
     ``effects`` is a sequence of (name, parameters (k,)); torques are carried per inertia (see effects/base.py).
-    ``supply`` is what a recording measured of it [V] (N,), or None.
+    ``supply`` is what a recording measured of it [V] (N,), or None; ``effort`` counts what is simulated with it.
     """
 
     coefficients: Coefficients
     effects: Sequence[tuple[str, np.ndarray]] = ()
     supply: np.ndarray | None = field(default=None, repr=False, compare=False)
+    effort: Effort | None = field(default=None, repr=False, compare=False)
     _lowered: tuple = field(init=False, repr=False, compare=False)
 
     def __post_init__(self):
         c = self.coefficients
-        p, lawful = np.zeros((len(EFFECTS), N_PARAMETERS)), []
+        given = {}
         for name, values in self.effects:
             effect = BY_NAME[name]
             c = effect.coefficients(values, c)
             if (effect.torque or effect.friction or effect.inertia or effect.memory) and effect.is_lawful(values):
-                lawful.append(name)
-                constants = effect.constants(values, c)
-                p[ROW[name], : len(constants)] = constants
-        object.__setattr__(self, "_lowered", (np.array(c, float), rows_of(tuple(lawful), c.has_motor_side), p))
+                given[name] = effect.constants(values, c)
+        on = acting(tuple(given), c.has_motor_side)
+        p = np.zeros((len(on.rows), N_CONSTANTS))
+        for row, constants in zip(on.rows, p):
+            constants[: len(given[EFFECTS[row].name])] = given[EFFECTS[row].name]
+        object.__setattr__(self, "_lowered", (np.array(c, float), on, p))
 
     @property
     def coupled(self) -> bool:
@@ -145,28 +131,11 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         both = self.bends and self.has_motor_side
-        EFFORT.add(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on[:2, 0].any() else PLAIN)
+        self._count(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on.pushes else PLAIN)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        kernel = simulate_kernel
-        if both:
-            from ers_mj.plants.fixed_steps import (
-                simulate_kernel as kernel,
-            )  # here alone: it takes seconds to compile and is seldom needed
-        kernel(
-            t,
-            self.terminal(u),
-            enable,
-            load,
-            t if y is None else y,
-            gain,
-            every,
-            c.copy(),
-            on,
-            p.copy(),
-            refine,
-            x0,
-            out,
-        )
+        followed = t if y is None else y
+        run = fixed_steps.simulate if both else march.simulate
+        run(t, self.terminal(u), enable, load, followed, gain, every, laid_out(c, on, p), refine, x0, out)
         return out
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
@@ -254,40 +223,44 @@ class ReducedModel:
         load = np.zeros(t.size) if load is None else load
         theta, y, arriving = path[:, 0], t if y is None else y, self._arriving(t, u)
         read, followed, instant, out = self.read(t, theta), self.behind(y), self._is_instant, []
-        maps, slopes, still = np.empty((2, 3, 5, 14)), np.zeros((t.size, 3)), np.zeros(t.size)
-        prepare_kernel(t, load, path, c.copy(), on, p.copy(), maps, slopes)
-        EFFORT.add(t, TANGENT * len(others))
+        maps, slopes, still = np.empty((6, 5, 17)), np.zeros((t.size, 3)), np.zeros(t.size)
+        prepare(t, load, path, laid_out(c, on, p), maps, slopes)
+        self._count(t, TANGENT * len(others))
         for other in others:
             c_2, on_2, p_2 = other._lowered
+            dc, differ = laid_out(_step(c, c_2) * scale, acting((), False), p[:0]), on != on_2 or bool((p != p_2).any())
             change, added, dy = np.empty((t.size, 4)), still, still
             if self._touches_reading or other._touches_reading:
                 added = (other.read(t, theta) - read) * scale
                 dy = (other.behind(y) - followed) * scale if instant else -added
-            tangent_kernel(
+            du, here = (other._arriving(t, u) - arriving) * scale, followed if instant else y
+            plants = laid_out(c, on, p), laid_out(c_2, on_2, p_2)
+            tangent(
                 t,
                 arriving,
-                (other._arriving(t, u) - arriving) * scale,
+                du,
                 enable,
                 load,
-                followed if instant else y,
+                here,
                 dy,
                 path,
                 maps,
                 slopes,
                 gain,
                 every,
-                c.copy(),
-                on,
-                p.copy(),
-                c_2,
-                on_2,
-                p_2.copy(),
+                *plants,
+                dc,
+                differ,
                 scale,
                 change,
             )
             change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
             out.append(change)
         return out
+
+    def _count(self, t: np.ndarray, per_second: int) -> None:
+        if self.effort is not None:
+            self.effort.add(t, per_second)
 
     def _arriving(self, t: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Mean (N,) over each uniform sample of the input that arrives at the motor: after a dead time the impulse of a

@@ -4,98 +4,53 @@ run.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numba import njit, types
 
 from ers_mj.effects import BY_NAME
 from ers_mj.plants import fixed_steps
-from ers_mj.plants.compiled import compiled_cache
-from ers_mj.plants.events import (
-    A_EMF,
-    BRISTLE_CORNER,
-    C_1,
-    C_PLUS,
-    CONTACT_STEP,
-    CORNER,
-    D_STOP,
-    DELAY,
-    K_BRISTLE,
-    K_STOP,
-    LOWER,
-    RHO,
-    TAU,
-    TWO,
-    UPPER,
-    B,
-    _advance,
-    _bounded,
-    _cuts,
-    _has_bristle,
-    _last,
-    _start_mode,
-)
-from ers_mj.plants.laws import is_lawful, remember
+from ers_mj.plants.compiled import kernel
+from ers_mj.plants.cuts import corner_speed, cut, longest_step
+from ers_mj.plants.laws import laid_out, remember
+from ers_mj.plants.march import advance
+from ers_mj.plants.modes import start_mode, start_state
 from ers_mj.plants.reduced import ReducedModel
+from ers_mj.plants.state import MODES, PLANT, VECTOR, F, I, Mode, State, is_bounded, plant_in, types
 
 
-def _begin(t, c, on, p, x, m):
+@kernel(types.void(VECTOR, VECTOR, MODES))
+def begin(plant, x, m):
     """Fill x (5,) after its first three entries, theta w j, and the mode m (5,) that fits them: both bodies together, a
     bristle bent.
     """
-    lawful, bristle = is_lawful(on), _has_bristle(c)
-    x[3], x[4] = x[0], 0.0
-    if bristle:
-        slip = c[C_PLUS] / c[K_BRISTLE]
-        x[3] = x[0] - min(max(x[1] / math.sqrt(c[K_BRISTLE]), -slip), slip)
-    elif c[TWO] > 0:
-        x[4] = x[1]
-    mode = _start_mode(c, on, p, lawful, t, (x[0], x[1], x[2], x[3], x[4]))
-    for i in range(5):
-        m[i] = mode[i]
-
-
-def _sample(t, h0, before, now, c, on, p, refine, x, m):
-    """Move x (5,) and m (5,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first,
-    ``now`` afterwards.
-
-    The slow road of events._simulate, which goes by the same segments. A motion that runs away becomes NaN.
-    """
-    lawful, two, bristle = is_lawful(on), c[TWO] > 0, _has_bristle(c)
-    tau, a_emf = c[TAU], c[A_EMF]
-    ends, fresh, _ = _cuts(c, h0, tau, a_emf, lawful, refine)
-    last = _last(ends)
-    h_max = np.inf
-    if c[UPPER] < np.inf or c[LOWER] > -np.inf:
-        h_max = CONTACT_STEP / (math.sqrt(c[K_STOP]) + c[D_STOP])
-    if two or lawful:
-        h_max = min(h_max, last / refine)
-    corner = CORNER * (c[C_1] + c[C_PLUS]) * h0
-    if bristle:
-        corner = max(corner, BRISTLE_CORNER * c[C_1] * last * refine)
-    z, mode = (x[0], x[1], x[2], x[3], x[4]), (m[0], m[1], m[2], m[3], m[4])
-    start = 0.0
-    remember(on, p, x, h0)
-    for i in range(ends.size):
-        drive = c[B] * (now if fresh[i] == 1 else before)
-        z, mode, _ = _advance(c, on, p, lawful, t + start, z, mode, drive, tau, a_emf, ends[i] - start, h_max, corner)
-        start = ends[i]
-        if not _bounded(z):
-            z = (np.nan, np.nan, np.nan, np.nan, np.nan)
-            break
+    c = plant_in(plant)
+    z = start_state(c, x[0], x[1], x[2], c.c_2_plus)
+    mode = start_mode(c, z)
     for i in range(5):
         x[i], m[i] = z[i], mode[i]
 
 
-VECTOR, ROWS, LAWS = types.float64[::1], types.int64[:, ::1], types.float64[:, ::1]
-MODE, NUMBER = types.int64[::1], types.float64
+@kernel(types.void(F, F, F, F, VECTOR, I, VECTOR, MODES))
+def hold(t, h0, before, now, plant, refine, x, m):
+    """Move x (5,) and m (5,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first,
+    ``now`` afterwards.
 
-with compiled_cache():
-    begin_kernel = njit(types.void(NUMBER, VECTOR, ROWS, LAWS, VECTOR, MODE), cache=True)(_begin)
-    sample_kernel = njit(
-        types.void(NUMBER, NUMBER, NUMBER, NUMBER, VECTOR, ROWS, LAWS, types.int64, VECTOR, MODE), cache=True
-    )(_sample)
+    The slow road of march.simulate, which goes by the same segments. A motion that runs away becomes NaN.
+    """
+    c = plant_in(plant)
+    cuts = cut(c, h0, refine)
+    h_max, corner = longest_step(c, cuts, refine), corner_speed(c, cuts, refine)
+    z, mode = State(x[0], x[1], x[2], x[3], x[4]), Mode(m[0], m[1], m[2], m[3], m[4])
+    start = 0.0
+    remember(c, z.theta, z.w, z.j, z.theta_m, z.w_m, h0)
+    for i in range(cuts.ends.size):
+        drive = c.b * (now if cuts.fresh[i] == 1 else before)
+        z, mode, _ = advance(c, t + start, z, mode, drive, c.tau_e, c.a_emf, cuts.ends[i] - start, h_max, corner)
+        start = cuts.ends[i]
+        if not is_bounded(z):
+            z = State(np.nan, np.nan, np.nan, np.nan, np.nan)
+            break
+    for i in range(5):
+        x[i], m[i] = z[i], mode[i]
 
 
 class SampledReduced:
@@ -109,19 +64,20 @@ class SampledReduced:
 
     def __init__(self, model: ReducedModel, rate_hz: float, start: tuple[float, float]):
         self._model, self._h = model, 1.0 / rate_hz
-        c, self._on, p = model._lowered
-        self._c, self._p = c.copy(), p.copy()
+        self._plant = laid_out(*model._lowered)
+        c = self._plant.view(PLANT)[0]
+        self._b, self._a_emf, self._tau_e, self._parted = c.b, c.a_emf, c.tau_e, model.has_motor_side
         self._refine = 2 if any(BY_NAME[name].follows_current for name, _ in model.effects) else 1
         self._x, self._mode = np.array([*start, 0.0, 0.0, 0.0]), np.zeros(5, np.int64)
         self._fixed = model.bends and model.has_motor_side
-        self._skip = int(c[DELAY] * rate_hz + 1e-9)
+        self._skip = int(c.delay * rate_hz + 1e-9)
         self._sent = [0.0] * (self._skip + 2)  # what the terminals saw last, oldest first
         self._samples = 0
         if self._fixed:
             self._x = np.array([*start, 0.0, 0.0, 0.0, 0.0])
-            fixed_steps.begin_kernel(self._c, self._x)
+            fixed_steps.begin(self._plant, self._x)
         else:
-            begin_kernel(0.0, self._c, self._on, self._p, self._x, self._mode)
+            begin(self._plant, self._x, self._mode)
 
     @property
     def theta(self) -> float:
@@ -135,30 +91,17 @@ class SampledReduced:
 
     def drive(self, v: float) -> float:
         """Drive acceleration n K_t i / J [rad/s^2] with v [V] at the terminals."""
-        c, x = self._c, self._x
-        if c[TAU] > 0:
-            return float(x[2])
-        return float(c[B] * v - c[A_EMF] * (x[4] if c[TWO] > 0 and c[RHO] > 0 else x[1]))
+        if self._tau_e > 0:
+            return float(self._x[2])
+        return float(self._b * v - self._a_emf * self._x[4 if self._parted else 1])
 
     def hold(self, v: float) -> None:
         """Hold v [V] at the terminals until the next sample."""
         self._sent = [*self._sent[1:], v]
         now = self._samples * self._h
+        before, held = self._sent[:2]
         if self._fixed:
-            fixed_steps.sample_kernel(
-                now, self._h, self._sent[0], self._sent[1], self._c, self._on, self._p, self._refine, self._x
-            )
+            fixed_steps.hold(now, self._h, before, held, self._plant, self._refine, self._x)
         else:
-            sample_kernel(
-                now,
-                self._h,
-                self._sent[0],
-                self._sent[1],
-                self._c,
-                self._on,
-                self._p,
-                self._refine,
-                self._x,
-                self._mode,
-            )
+            hold(now, self._h, before, held, self._plant, self._refine, self._x, self._mode)
         self._samples += 1

@@ -1,5 +1,6 @@
 """The bodies and joints of a MuJoCo plant, before any of Eq. (6)'s numbers acts on them.
- Two roads to one set of names: the rudder system in three dimensions from the folder mjcf/, for a servo with a
+
+Two roads to one set of names: the rudder system in three dimensions from the folder mjcf/, for a servo with a
 datasheet, and one joint in output units (J = 1), for a plant of which only Eq. (6)'s coefficients are known. In both
 the joint ``rocker`` is the output of the drive, ``gap`` the play behind it, and the tendon ``rudder_angle`` their sum,
 the absolute output.

@@ -18,9 +18,20 @@ from ers_mj.proving.sizing import ALIKE, TWO_MASS, Ruler, pooled, refit
 from ers_mj.proving.strength import clutter, conceal
 
 KINDS = {"null": 0.25, "single": 0.5, "several": 0.15, "outside": 0.1}
-RATES, WEIGHTS = (200, 250, 500, 1000, 2000), (0.15, 0.1, 0.2, 0.4, 0.15)
-FINE_STEP, ROUGH_STEP = 1.5e-5, 2.5e-5  # [s] between which MuJoCo's step is drawn; the package's own is 5e-5
-ROD = 0.5  # share of the variable ratios that are the rod linkage of mjcf/
+
+
+@dataclass(frozen=True)
+class Making:
+    """What every case has."""
+
+    rates: tuple[int, ...] = (200, 250, 500, 1000, 2000)  # [Hz]
+    weights: tuple[float, ...] = (0.15, 0.1, 0.2, 0.4, 0.15)  # how often each is drawn
+    fine_step: float = 1.5e-5  # [s], MuJoCo's, drawn between this and the next; the package's own is 5e-5
+    rough_step: float = 2.5e-5  # [s]
+    rod: float = 0.5  # share of the variable ratios that are the rod linkage of mjcf/
+
+
+MAKING = Making()
 
 
 @dataclass(frozen=True)
@@ -95,14 +106,14 @@ def make(plan: Plan, seed: int) -> tuple[dict[str, str], dict]:
 
 def _made(plan: Plan, rng: np.random.Generator) -> Made:
     """The servo drawn, the effects sized in it, the recordings made."""
-    servo = draw_servo(rng, 0.0, RATES, WEIGHTS)
-    linkage = "rod" if "variable_ratio" in plan.labels and rng.random() < ROD else "constant"
+    servo = draw_servo(rng, 0.0, MAKING.rates, MAKING.weights)
+    linkage = "rod" if "variable_ratio" in plan.labels and rng.random() < MAKING.rod else "constant"
     ruler, context = Ruler(servo), servo["context"]
     concealed = [
         conceal(rng, ruler, name, context) for name in plan.labels if (name, linkage) != ("variable_ratio", "rod")
     ]
     faint = clutter(rng, ruler, [*plan.labels, *(TWO_MASS if linkage == "rod" else ())], context)
-    step = float(np.exp(rng.uniform(np.log(FINE_STEP), np.log(ROUGH_STEP))))
+    step = float(np.exp(rng.uniform(np.log(MAKING.fine_step), np.log(MAKING.rough_step))))
     runs = [
         record(
             servo["params"],

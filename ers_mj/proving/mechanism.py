@@ -1,5 +1,6 @@
 """The rudder system of mjcf/ as the generator uses it: bodies, linkage, spring, dry friction and play are MuJoCo's.
- What MuJoCo has no element for is left to `recorder.py`, which sets two torques (on the rotor, on the rudder) and the
+
+What MuJoCo has no element for is left to `recorder.py`, which sets two torques (on the rotor, on the rudder) and the
 levels of dry friction at every step. All numbers come from a record of `laws.PLANT`.
 """
 
@@ -16,7 +17,6 @@ from ers_mj.proving.plant import TABLE_1
 
 LINKAGES = ("constant", "rod")
 ARM, ROD = 0.01417, 0.042  # [m] rocker arm and rod between its pins, as mjcf/ has them
-SMALL = 3.2e-4  # of the motor's share of J in the nut and in the rocker, each
 LIGHT = 0.05  # of J left to the motor's bodies where a ratio of the generator's own moves the rest as armature
 RIGID = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 PLAY = [0.99, 0.9999, 1e-5, 0.5, 2.0]
@@ -104,7 +104,7 @@ def _gear(spec: mujoco.MjSpec, linkage: str, two: bool) -> None:
 def _inertia(spec: mujoco.MjSpec, p: np.void) -> None:
     """J shared among rotor, nut, rocker and rudder; an appendage takes its own from the rudder's."""
     motor = p["J"] * (LIGHT if p["ratio_form"] > 0 else p["share_J"])
-    nut = rocker = SMALL * motor
+    nut = rocker = 3.2e-4 * motor  # hardly anything
     rudder = p["J"] * (1.0 - p["share_J"]) - p["app_J"]
     spec.body("nut").mass = nut / ARM**2
     parts = {"motor": (motor - nut - rocker) / TABLE_1["n"] ** 2, "rocker": rocker, "rudder": rudder}

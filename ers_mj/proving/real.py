@@ -1,6 +1,7 @@
 """Conceals effects in real recordings: EMPS, a throttle valve, a Feetech servo (their README says where they come
 from).
- What is done to the untouched records of a rig, by a sealed seed: the command acts later than it says (input_delay),
+
+What is done to the untouched records of a rig, by a sealed seed: the command acts later than it says (input_delay),
 the reading lags (sensor_lag), is rounded down (sensor_quantisation) or held for a while (sensor_dropout), or a constant
 part of the command goes unrecorded, which is a constant torque (bias_torque). Each rig is also diagnosed as it is: what
 is named there is its own.

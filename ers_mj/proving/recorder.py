@@ -32,8 +32,6 @@ from ers_mj.proving.plant import APP, BRI, BUS, CUR, LAG, STATES, TABLE_1, TH, T
 from ers_mj.proving.quick import STAND_S
 from ers_mj.proving.sampling import ALONE, Run, Setup, take
 
-FINEST = 1.5e-5  # [s] the longest step of current and sensor
-TOUCH = 1e-7  # [rad] from theta_0 within which the rudder stands on it
 N = TABLE_1["n"]
 
 
@@ -124,7 +122,7 @@ def _begun(m: Mechanism) -> mujoco.MjData:
 
 def _grid(p: np.void, h: float, substeps: int) -> tuple[Grid, int]:
     """The grid, and how many of its parts the sensor is late."""
-    parts = max(1, int(np.ceil(h / FINEST - 1e-9)))
+    parts = max(1, int(np.ceil(h / 1.5e-5 - 1e-9)))  # [s] the longest step of current and sensor
     e = h / parts
     return Grid(h, parts, substeps, round(float(p["delay_s"]) / e)), round(float(p["lag_s"]) / e)
 
@@ -214,7 +212,7 @@ def preload(p, x, w, h, drive, level):
     """
     after = x + h * w
     push_on = p.J * (1.0 - p.two * p.share_J) * w / h + drive
-    near = min(abs(x), abs(after)) < TOUCH
+    near = min(abs(x), abs(after)) < 1e-7  # [rad] within which the rudder stands on theta_0
     if near or x * after < 0.0:
         if abs(push_on) <= level + p.T_LH:
             return 0.0, p.T_LH

@@ -36,7 +36,6 @@ SUBSYSTEMS = {
 }
 """All else, friction included, is load."""
 NOTHING, NO_ANSWER, UNEXPLAINED, OUTSIDE, SEVERAL = "nothing", "no answer", "unexplained", "outside", "several"
-VISIBLE = 1.0  # [sigma]
 EDGES = (0.0, 0.5, 1.0, 2.0, 5.0, 12.0, 30.0, np.inf)  # [sigma] of the accuracy against visibility
 SURE = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)  # edges of the reliability diagram
 
@@ -145,7 +144,7 @@ Counted = dict[str, tuple[int, int]]
 
 
 def _named(singles: Sequence[Mapping]) -> Counted:
-    visible = [r for r in singles if r["visibility"] >= VISIBLE]
+    visible = [r for r in singles if r["visibility"] >= 1.0]  # [sigma]
     return {
         "top1": (sum(right(r, str) for r in singles), len(singles)),
         "top1_class": (sum(map(right, singles)), len(singles)),
@@ -155,7 +154,7 @@ def _named(singles: Sequence[Mapping]) -> Counted:
 
 def _found(several: Sequence[Mapping]) -> Counted:
     concealed, found, spurious = _several(several)
-    seen = [hit for r in several for sigma, hit in _hits(r) if sigma >= VISIBLE]
+    seen = [hit for r in several for sigma, hit in _hits(r) if sigma >= 1.0]
     return {
         "pair_recall": (found, concealed),
         "pair_recall_visible": (sum(seen), len(seen)),

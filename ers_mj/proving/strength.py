@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,10 +12,22 @@ from ers_mj.proving.concealed.base import Effect
 from ers_mj.proving.forms import draw_shape
 from ers_mj.proving.sizing import Ruler
 
-LEAST, MOST = 0.5, 50.0  # [sigma] visibility after refit, drawn log-uniform
-FAINT, FAINTEST, BARELY = 0.2, 0.02, 0.3  # [sigma] clutter: drawn between the first two, left out above the third
-NEAR = 0.15  # of the logarithm of the target
-TRIES = 7
+
+@dataclass(frozen=True)
+class Visibility:
+    """How large a concealed effect is to show [sigma]."""
+
+    least: float = 0.5  # after a refit, drawn log-uniform up to the next
+    most: float = 50.0
+    faintest: float = 0.02  # clutter, drawn up to the next
+    faint: float = 0.2
+    barely: float = 0.3  # clutter that shows more is left out
+    near: float = 0.15  # of the logarithm of the target, at which a search ends
+    tries: int = 7  # of a search
+
+
+VISIBILITY = Visibility()
+
 STRUCTURAL = (
     "backlash",
     "shaft_compliance",
@@ -32,11 +45,11 @@ STRUCTURAL = (
 def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) -> dict:
     """An effect of drawn shape, its strength tuned to a drawn visibility after refit."""
     effect = CATALOGUE[name]
-    target = float(np.exp(rng.uniform(np.log(LEAST), np.log(MOST))))
+    target = float(np.exp(rng.uniform(np.log(VISIBILITY.least), np.log(VISIBILITY.most))))
     shape = draw_shape(rng, effect, context)
     low, high = np.log(_lowest(effect, ruler)), np.log(effect.high)
     as_list = lambda s: [{"label": name, "strength": float(np.exp(s)), "shape": shape}]
-    guess, _ = nearest(lambda s: ruler.projected(as_list(s)), target, 0.5 * (low + high), low, high, TRIES)
+    guess, _ = nearest(lambda s: ruler.projected(as_list(s)), target, 0.5 * (low + high), low, high, VISIBILITY.tries)
     found, left = nearest(lambda s: ruler.refitted(as_list(s)), target, guess, low, high, 3)
     return as_list(found)[0] | {
         "strength_name": effect.strength_name,
@@ -58,7 +71,7 @@ def nearest(
     for _ in range(tries):
         miss = float(np.log(max(size(guess), 1e-9) / target))
         seen.append((guess, miss))
-        if abs(miss) < NEAR or high - low < 1e-3:
+        if abs(miss) < VISIBILITY.near or high - low < 1e-3:
             break
         low, high = (low, guess) if miss > 0 else (guess, high)
         guess = _next(seen, low, high)
@@ -82,11 +95,11 @@ def clutter(rng: np.random.Generator, ruler: Ruler, taken: list[str], context: d
     out = []
     for name in rng.choice(names, int(rng.integers(4)), replace=False):
         effect = CATALOGUE[str(name)]
-        target = float(np.exp(rng.uniform(np.log(FAINTEST), np.log(FAINT))))
+        target = float(np.exp(rng.uniform(np.log(VISIBILITY.faintest), np.log(VISIBILITY.faint))))
         shape = draw_shape(rng, effect, context)
         as_list = lambda s: [{"label": effect.name, "strength": float(np.exp(s)), "shape": shape}]  # noqa: B023
         low = np.log(effect.low)
         found, size = nearest(lambda s: ruler.projected(as_list(s)), target, low, low - 6.0, low + 2.0, 4)  # noqa: B023
-        if size < BARELY:
+        if size < VISIBILITY.barely:
             out.append(as_list(found)[0] | {"strength_name": effect.strength_name, "quick_visibility_sigma": size})
     return out

@@ -1,5 +1,6 @@
-"""Which of the candidates of a round leads? What each has won, block by block, and what it may be a form of.
- Two models are compared block by block on the same noise (a paired test in the manner of Vuong 1989), so that the
+"""What a candidate has won over the model that it extends, block by block, and which of several leads.
+
+Two models are compared block by block on the same noise (a paired test in the manner of Vuong 1989), so that the
 verdict does not rest on a model of the noise.
 """
 
@@ -8,38 +9,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from ers_mj.decisions import ordering
+from ers_mj.decisions.acceptance import Offer
+from ers_mj.decisions.explained import score
+from ers_mj.decisions.policy import POLICY, Policy
 from ers_mj.effects import BY_NAME, EQUIVALENT
-from ers_mj.estimation.fit import Fit, score
-from ers_mj.selection.posterior import PARAMETER_PRICE, probabilities
+from ers_mj.estimation.objective import Fit
+from ers_mj.selection.posterior import probabilities
 from ers_mj.servo.model import STATES
-
-ALONE = 1.5  # times what the best other explanation buys, that an effect buys which stands alone
-SAME = 0.5  # share of its gain by which the scores of all blocks differ at most, summed, of one that explains the same
-LEAST_Z = (
-    1.7  # and the paired z-score of that decrease over the blocks: that of three blocks won clearly, the rest untouched
-)
-# C per block up to which a round goes on only for a candidate whose secant promises much (screening.LEAST_PROMISE)
-QUIET = 0.04
-# of C that forks of stick and slip leave: two blocks off by 5.8 sigma, as the worst of 61 servos without missing
-# physics is in one
-FORKED = 6.0
-TIE, NEAR_TIE = (
-    1.0,
-    0.02,
-    # of C, and share of the best one's gain, within which candidates are rivals, which only converged fits can tell apart
-)
-RIVAL = 0.3  # share of the leader's gain from which a candidate may take its place later
-# share of the gain of a form of another effect (Effect.really) that this other must win itself to be told in its place
-NEARLY = 0.5
-# times the probability of a torque that is constant, from which one that changes along the travel (Effect.curves) is
-# told in its place: of 54 torques of 4178 to 4192 none reaches it, of 33 gravities eight
-CURVED = 1.06
-CLOCKED = (
-    0.5  # share of the gain of an effect with its own clock that a law of the servo must explain to come before it
-)
 
 
 @dataclass(frozen=True)
@@ -59,10 +40,32 @@ class Candidate:
     best: float
     beside: Fit | None = None
 
+    @cached_property
+    def offer(self) -> Offer:
+        """What a decision reads of it."""
+        is_effect = self.name in BY_NAME
+        return Offer(
+            self.name,
+            self.gain,
+            self.z,
+            self.lost,
+            self.best,
+            self.fit.size,
+            is_effect,
+            is_effect and BY_NAME[self.name].once,
+            is_clocked(self.name),
+            kin_of(self.name),
+        )
+
     @property
     def worth(self) -> float:
         """Gain less the price of the parameters."""
-        return self.gain - PARAMETER_PRICE * self.fit.size
+        return self.offer.worth()
+
+
+def kin_of(name: str) -> frozenset[str]:
+    """The effects that are one with this one, itself among them (effects.EQUIVALENT)."""
+    return next((group for group in EQUIVALENT if name in group), frozenset({name}))
 
 
 def paired_z(better: np.ndarray, worse: np.ndarray, tau: float) -> float:
@@ -83,7 +86,7 @@ def judged(name: str, found: Fit, base: Fit, tau: float) -> Candidate:
 
 def priced(found: Fit) -> float:
     """The cost and the price of the parameters."""
-    return found.cost + PARAMETER_PRICE * found.size
+    return found.cost + POLICY.parameter_price * found.size
 
 
 def shows(candidate: Candidate) -> bool:
@@ -94,85 +97,56 @@ def shows(candidate: Candidate) -> bool:
     )
 
 
-def stands_alone(candidate: Candidate, ranked: Sequence[Candidate]) -> bool:
-    """Whether a law buys ALONE times what any other of its round does, those aside that are one with it
-    (effects.EQUIVALENT) or leave the same in all blocks, as a small imbalance and a torque do: chance, forks of stick
-    and slip and a law of somewhat another form offer much the same to several, what acts offers it to its own.
-    """
-    if candidate.name not in BY_NAME or is_clocked(candidate.name):
+def stands_alone(candidate: Candidate, ranked: Sequence[Candidate], policy: Policy = POLICY) -> bool:
+    """Whether a law buys clearly more than any other of its round (see ordering.stands_alone)."""
+    if not candidate.offer.is_effect or candidate.offer.clocked:
         return False
-    own = next((group for group in EQUIVALENT if candidate.name in group), {candidate.name})
     left = score(candidate.fit.misfit, 1.0)
-
-    def is_one(other):
-        return other.name in own or float(np.abs(score(other.fit.misfit, 1.0) - left).sum()) < SAME * candidate.gain
-
-    return all(candidate.gain >= ALONE * c.gain or is_one(c) for c in ranked)
+    apart = [float(np.abs(score(other.fit.misfit, 1.0) - left).sum()) for other in ranked]
+    return ordering.stands_alone(candidate.offer, [c.offer for c in ranked], apart, policy)
 
 
-def likeliest_first(ranked: list[Candidate]) -> list[Candidate]:
-    """Of rivals the most probable leads (see isolability.probabilities), together with those that are one with it
-    (effects.EQUIVALENT): which of them the worth prefers may rest on one stick or slip.
+def likeliest_first(ranked: Sequence[Candidate], policy: Policy = POLICY) -> list[Candidate]:
+    """The candidates, the best first, with the most probable of rivals in front (see ordering.likeliest_first)."""
+    by_name = {c.name: c for c in ranked}
 
-    What has a clock of its own (a gust, a knock) or differs from recording to recording leads only where no law of the
-    servo itself explains CLOCKED of what it does: a swing bends to whatever a repeated excitation leaves over, a
-    friction of each recording's own to any law of its speed.
-    """
-    if not ranked:
-        return ranked
-    if is_clocked(ranked[0].name):
-        lawful = [c for c in ranked if not is_clocked(c.name) and c.gain >= CLOCKED * ranked[0].gain and c.z >= LEAST_Z]
-        ranked = sorted(ranked, key=lambda c: c not in lawful)
-    gains = {c.name: c.gain for c in ranked}
-    ranked = sorted(
-        ranked, key=lambda c: (real := really(c.name, c.fit)) != c.name and gains.get(real, 0.0) >= NEARLY * c.gain
+    def chances(rivals: Sequence[Offer]) -> Mapping[str, float]:
+        return probabilities({offer.name: by_name[offer.name].fit for offer in rivals})
+
+    offers = ordering.likeliest_first(
+        [c.offer for c in ranked],
+        {c.name: really(c.name, c.fit) for c in ranked},
+        {c.name: BY_NAME[c.name].curves for c in ranked if c.offer.is_effect},
+        chances,
+        policy,
     )
-    rivals = [c for c in rivals_of(ranked) if really(c.name, c.fit) != ranked[0].name or c is ranked[0]] or ranked[:1]
-    name = likeliest({c.name: c.fit for c in rivals})
-    first = next(c for c in rivals if c.name == name)
-    return [first, *(c for c in ranked if c is not first)]
+    return [by_name[offer.name] for offer in offers]
 
 
-def likeliest(fits: Mapping[str, Fit]) -> str:
-    """The most probable of what is not clocked, or else of all; the probabilities of those that are one with it count
-    as its own, but beside what is a form of one of them that changes along the travel (CURVED)."""
-    chances = probabilities(fits)
-    kinds = {name: next((group for group in EQUIVALENT if name in group), {name}) for name in fits}
-    first = max(
-        fits,
-        key=lambda name: (
-            not is_clocked(name),
-            sum(chances[other] for other in kinds[name] if other in chances),
-            chances[name],
-        ),
-    )
-    curved = (name for name in fits if name in BY_NAME and BY_NAME[name].curves in kinds[first])
-    return next(
-        (
-            name
-            for name in curved
-            if chances[name] >= CURVED * max(chances[other] for other in kinds[first] if other in chances)
-        ),
-        first,
-    )
+def likeliest(fits: Mapping[str, Fit], policy: Policy = POLICY) -> str:
+    """The most probable of several explanations (see ordering.likeliest)."""
+    offers = [
+        Offer(name, 0.0, 0.0, 0.0, 0.0, found.size, name in BY_NAME, False, is_clocked(name), kin_of(name))
+        for name, found in fits.items()
+    ]
+    curves = {name: BY_NAME[name].curves for name in fits if name in BY_NAME}
+    return ordering.likeliest(offers, curves, probabilities(fits), policy)
 
 
-def rivals_of(ranked: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates that the best one does not beat clearly, itself among them."""
-    least = max(ranked[0].worth - max(TIE, NEAR_TIE * ranked[0].gain), 0.0)
-    return [c for c in ranked if c.worth > least]
+def rivals_of(ranked: Sequence[Candidate], policy: Policy = POLICY) -> int:
+    """How many candidates, the best first, that one does not beat clearly, itself among them."""
+    return len(ordering.rivals_of([c.offer for c in ranked], policy))
 
 
 def really(name: str, found: Fit) -> str:
     """The effect of which a fit's is a form (see Effect.really)."""
-    return (
-        BY_NAME[name].really(dict(found.model.effects)[name], found.model.values.get("c_2", 0.0))
-        if name in BY_NAME
-        else name
-    )
+    if name not in BY_NAME:
+        return name
+    return BY_NAME[name].really(dict(found.model.effects)[name], found.model.values.get("c_2", 0.0))
 
 
 def is_clocked(name: str) -> bool:
+    """Whether a thing has a clock of its own: it differs from recording to recording."""
     return name in STATES or BY_NAME[name].local
 
 
@@ -185,8 +159,3 @@ def bends_and_twists(current: Fit) -> bool:
     """Whether the model has a play or a shaft beside a bristle, whose refits take longest of all."""
     plant = current.model.plant()
     return plant.bends and plant.has_motor_side
-
-
-def is_quiet(current: Fit, tau: float) -> bool:
-    """Whether little is left."""
-    return float(score(current.misfit, tau).sum()) <= QUIET * current.misfit.size

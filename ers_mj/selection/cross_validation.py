@@ -10,25 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
+from ers_mj.decisions.explained import cost
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import columns_of, fit, residuals, residuals_in, score, tau_of
+from ers_mj.estimation.fit import Along, fit
 from ers_mj.estimation.initial_state import fitted_start
 from ers_mj.estimation.intervals import half_widths
+from ers_mj.estimation.jacobian import columns_of
+from ers_mj.estimation.objective import residuals, residuals_in, tau_of
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
-LEAST_LOSS = 0.02  # of the score, which one block's noise makes of two equal models
-NULL_GAIN, NULL_GAIN_ONCE = (
-    0.8,
-    1.5,
-)  # of C: decay of the tails of the largest gains that effect-free servos offer to laws, and to what acts once
-NULL_ALONE = (
-    0.2  # share of effect-free servos whose best law stands alone: 2 of 12 nulls of seed 4141, one by its own clutter
-)
-NULL_PEAK, PEAK_TAIL = (
-    0.63,
-    1.2,
-)  # the worst block's (1 + misfit) / 2 of effect-free servos exceeds x in a share (x / NULL_PEAK)^-PEAK_TAIL of them
 RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
 REFIT_STEPS, REFIT_END = 12, 1e-3  # steps at most of a fold's refit, and gain in C of one at which it ends
 LAST_PART = 0.7  # where the only recording is cut into training and held out
@@ -177,7 +168,8 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[M
     slopes = columns_of(model, whole, OBSERVER_RATE, by_tangents=False) if whole else {}
 
     def along(begun: Model, fold: Fold, known: Columns) -> Model:
-        return fit(begun, fold.training, tau=tau, steps=REFIT_STEPS, known=known, renewals=0, tolerance=REFIT_END).model
+        slopes = Along(known=known, renewals=0)
+        return fit(begun, fold.training, tau=tau, steps=REFIT_STEPS, along=slopes, tolerance=REFIT_END).model
 
     def one(fold: Fold) -> Model:
         if fold.training is None:
@@ -220,7 +212,7 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     misfit = Blocks.of([blank, head]).misfit(residuals(pair, [blank, head], OBSERVER_RATE))
     tau = tau_of(misfit[blank.counts.size :])
     found = fit(pair, [blank, head], tau=tau, steps=10)
-    if float(score(misfit, tau).sum() - score(found.misfit, tau).sum()) < 0.5 * found.size:
+    if cost(misfit, tau) - cost(found.misfit, tau) < 0.5 * found.size:
         found = replace(found, model=pair)
     layout = found.model.layout()
     widths = half_widths(found.model, [blank, head], (), tau)
@@ -228,29 +220,3 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     return scored(found.model, trace, 1, cut), {
         name: (float(v[1]), *ends[name]) for name, v in found.model.states.items()
     }
-
-
-def paired_p(better: np.ndarray, worse: np.ndarray, once: bool = False, alone: bool = False) -> float:
-    """One-sided p-value that ``better`` predicts held-out blocks no better than ``worse``: wins against losses over
-    blocks.
-
-    If neither is better the differences d of the scores lie alike on both sides of zero, so that the losses alone tell
-    their scatter: sum(d) / sqrt(2 sum of the squared losses) is near normal. An effect that acts in a few blocks and
-    harms nowhere is not punished for being rare, as it is by the scatter of all. A loss of LEAST_LOSS a block is taken
-    for granted.
-
-    Blocks are not independent, and the best of many effects was taken: the p-value is never below the share of servos
-    without missing physics in which as large a gain is offered, by an exponential tail (analysis/null_gains.py: of 48
-    the largest gain of a law is 1.8; stick and slip that fork offer what acts ``once`` 2.2 to 3.6 in four of them). A
-    knock is also known by the block that it serves best: the worst one of 61 such servos is off by 3.7 to 5.8 sigma in
-    three, by more than 2 in twelve. A law whose round offers no other nearly as much, ``alone`` (ranking.stands_alone),
-    has what chance offers to one only, in a share NULL_ALONE of them.
-    """
-    d = score(worse, 1.0) - score(better, 1.0)
-    losses = float(np.sum(np.minimum(d, 0.0) ** 2)) + d.size * LEAST_LOSS**2
-    chance = (NULL_ALONE if alone else 1.0) * math.exp(
-        -max(float(np.sum(d)), 0.0) / (NULL_GAIN_ONCE if once else NULL_GAIN)
-    )
-    if once:
-        chance = min(chance, math.exp(-PEAK_TAIL * max(float(np.max(d)) - math.log(NULL_PEAK), 0.0)))
-    return max(chance, 0.5 * math.erfc(float(np.sum(d)) / math.sqrt(2.0 * losses) / math.sqrt(2.0)))

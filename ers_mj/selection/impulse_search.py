@@ -1,99 +1,118 @@
-"""What happens once: a knock on a rudder, found where it acts. Tried as it is and brought nearer, since no secant of it
-may be scaled.
+"""What happens once: an impulse on a rudder, found where it acts. Tried as it is and brought nearer, since no secant of
+it may be scaled.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
 
 from ers_mj.data.prepared import BLOCK, Blocks, Trace
+from ers_mj.decisions.explained import cost
 from ers_mj.effects import Effect
-from ers_mj.estimation.fit import Run, residuals_in, score
+from ers_mj.estimation.objective import Run, residuals_in
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
-NEARER, NEAR = (
-    60,
-    0.05,
-    # simulations in which a knock is brought nearer at most, and of C, within which all that were tried last are near
-    # enough
-)
-# how far the mean misfit of blocks may lie above their geometric mean before one of them hides what a knock does to the
-# others
-OUTWEIGHED = 5.0
-LEAD, TAIL = 0.1, 2.0  # [s] before a knock begins and after, in which it is tried
-IDLE, HALVINGS = (
-    0.1,
-    6,
-)  # of C that a push which moves little changes; of the way from it to the next that throws the rudder
+
+@dataclass(frozen=True)
+class Nearing:
+    """How an impulse is looked for and brought nearer.
+
+    It is tried from ``lead`` [s] before it begins until ``tail`` after; in ``simulations`` at most it is brought
+    nearer, until all that were tried last are ``within`` so much of C. A block hides what it does to the others where
+    the mean misfit is ``outweighing`` times the geometric mean. A push is ``idle`` that changes so much of C, and so
+    often the way from it to the next, that throws the rudder, is halved (``halvings``).
+    """
+
+    lead: float = 0.1
+    tail: float = 2.0
+    simulations: int = 60
+    within: float = 0.05
+    outweighing: float = 5.0
+    idle: float = 0.1
+    halvings: int = 6
 
 
-def knocks(
-    run: Run, effect: Effect, starts: Sequence[np.ndarray], target: np.ndarray, traces: Sequence[Trace], tau: float
+NEARING = Nearing()
+Gain = Callable[[np.ndarray], float]
+
+
+def impulses(
+    run: Run, effect: Effect, starts: Sequence[np.ndarray], power: float, traces: Sequence[Trace], tau: float
 ) -> list[tuple[float, Model]]:
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all
     for a small one, so that no secant may be scaled. The best starts of different side, length or recording, brought
-    nearer, with what they gain in C as a share of the residual. They are compared and brought nearer at a tau that the
-    recording's part around them gives (see fit): at the last one C has a dent wherever one block is met. Where one
-    block is so bad that it outweighs all others they are brought nearer at that one's own level first: any push that
-    throws the rudder about as far as it was thrown leaves much in the next blocks until it is met. What a coarse
-    converter's thresholds tell counts as rounding here: a knock bends to when one of them was passed.
+    nearer, with what they gain in C as a share of the residual's ``power``.
+
+    They are compared and brought nearer at a tau that the recording's part around them gives (see fit): at the last one
+    C has a local minimum wherever one block is met. Where one block is so bad that it outweighs all others they are
+    brought nearer at that one's own level first: any push that throws the rudder about as far as it was thrown leaves
+    much in the next blocks until it is met. What a coarse converter's thresholds tell counts as rounding here: an
+    impulse bends to when one of them was passed.
     """
-    place = run.model
-    column = [p.name for p in effect.parameters].index("record")
-    near = Surroundings(run, traces, tau)
-
-    def gains(start):
-        """What a start gains at tau, at the level of its surroundings, and at that of the worst of them."""
-        k = int(start[column])
-        trace, *levels = near.of(k, start[1])
-        misfit = near.misfit(trace, residuals_in(place.with_effect(effect.name, start), trace, k, OBSERVER_RATE))
-        won = [without - float(np.sum(score(misfit, level))) for level, without in levels]
-        return won if np.all(np.isfinite(won)) else [-math.inf] * len(won)
-
+    place, near = run.model, Surroundings(run, traces, tau)
+    search = _Pushes(effect, near)
     tried: dict[tuple, list[tuple[list[float], np.ndarray]]] = {}
     for start in starts:
-        tried.setdefault((start[0] > 0, *start[1:]), []).append((gains(start), start))
-    nearer = []
-    for levels, most in (((1,), effect.tries), ((2, 1), 1)):
+        tried.setdefault((start[0] > 0, *start[1:]), []).append((search.gains(start), start))
+    nearer = search.nearer(tried.values(), (1,), effect.tries)
+    outweighed = [pushes for pushes in tried.values() if search.is_outweighed(pushes[0][1])]
+    nearer += search.nearer(outweighed, (2, 1), 1)
+    gained = ((search.gains(start)[0], start) for start in nearer)
+    return [(2.0 * won / power, place.with_effect(effect.name, start)) for won, start in gained if won > 0]
 
-        def gain(start):
-            return gains(start)[levels[0]]  # noqa: B023
 
+class _Pushes:
+    """The pushes of an effect that acts once, and what they gain."""
+
+    def __init__(self, effect: Effect, near: Surroundings):
+        self.effect, self.near, self.place = effect, near, near.run.model
+        self.column = [p.name for p in effect.parameters].index("record")
+
+    def gains(self, start: np.ndarray) -> list[float]:
+        """What a start gains at tau, at the level of its surroundings, and at that of the worst of them."""
+        k = int(start[self.column])
+        trace, *levels = self.near.of(k, start[1])
+        model = self.place.with_effect(self.effect.name, start)
+        misfit = self.near.misfit(trace, residuals_in(model, trace, k, OBSERVER_RATE))
+        won = [without - cost(misfit, level) for level, without in levels]
+        return won if np.all(np.isfinite(won)) else [-math.inf] * len(won)
+
+    def is_outweighed(self, start: np.ndarray) -> bool:
+        return self.near.is_outweighed(start[self.column], start[1])
+
+    def nearer(self, tried, levels: Sequence[int], most: int) -> list[np.ndarray]:
+        """The ``most`` best of the pushes of different side, length or recording, in each of their forms, brought
+        nearer at each of the ``levels`` in turn.
+        """
         best: dict[tuple, tuple[float, np.ndarray]] = {}
-        for pushes in tried.values():
-            if levels[0] == 2 and not near.is_outweighed(pushes[0][1][column], pushes[0][1][1]):
-                continue
-            pushes = [(won[levels[0]], start) for won, start in pushes]
-            for won, start in (*pushes, *between(gain, pushes)):
-                kind = int(start[column]), start[0] > 0, start[2]
+        for alike in tried:
+            pushes = [(won[levels[0]], start) for won, start in alike]
+            for won, start in (*pushes, *between(lambda p: self.gains(p)[levels[0]], pushes)):
+                kind = int(start[self.column]), start[0] > 0, start[2]
                 best[kind] = max(best.get(kind, (0.0, start)), (won, start), key=lambda found: found[0])
         likely = [start for won, start in sorted(best.values(), key=lambda found: -found[0])[:most] if won > 0]
-        for start in (form for push in likely for form in (push, *effect.grown(effect.name, push, place.scales))):
+        out, scales = [], self.place.scales
+        for form in (f for start in likely for f in (start, *self.effect.grown(self.effect.name, start, scales))):
             for level in levels:
-                start = _nearer(lambda p: gains(p)[level], effect, start)  # noqa: B023
-            nearer.append(start)
-    return [
-        (2.0 * won / float(target @ target), place.with_effect(effect.name, start))
-        for start in nearer
-        if (won := gains(start)[0]) > 0
-    ]
+                form = _nearer(lambda p, level=level: self.gains(p)[level], self.effect, form)
+            out.append(form)
+        return out
 
 
 class Surroundings:
-    """The part of a recording around a moment, from LEAD before it to TAIL after, begun in the state that a run had
-    there: what a knock changes is in it, and simulated in a fraction of the time. All of the recording where that state
-    is more than position, speed and current.
+    """The part of a recording around a moment, begun in the state that a run had there: what an impulse changes is in
+    it, and simulated in a fraction of the time. All of the recording where that state is more than position, speed and
+    current.
     """
 
-    def __init__(self, run: Run, traces: Sequence[Trace], tau: float):
-        self.run, self.traces, self.tau, self.known = run, traces, tau, {}
-        place = run.model
-        self.whole = not place.plant().is_told_by_motion
+    def __init__(self, run: Run, traces: Sequence[Trace], tau: float, nearing: Nearing = NEARING):
+        self.run, self.traces, self.tau, self.nearing, self.known = run, traces, tau, nearing, {}
+        self.whole = not run.model.plant().is_told_by_motion
 
     def misfit(self, trace: Trace, e: np.ndarray) -> np.ndarray:
         """Misfits (B,) of the residuals (rows,) of a trace, its converter's thresholds aside."""
@@ -106,50 +125,54 @@ class Surroundings:
         misfits and for their plain mean.
         """
         trace = self.traces[record]
-        begin, end = 0, trace.t.size
-        if not self.whole and trace.converter is None:
-            blocks = math.floor((moment - LEAD - trace.t[0]) / BLOCK), math.ceil((moment + TAIL - trace.t[0]) / BLOCK)
-            begin, end = (
-                int(np.searchsorted(trace.block, min(block, trace.block[-1] + after)))
-                for after, block in enumerate(blocks)
-            )
+        begin, end = self._bounds(trace, moment)
         if (record, begin, end) not in self.known:
             theta, omega = self.run.motions[record][begin, :2]
             start = (theta + self.run.model.offset(record), omega) if begin else trace.start
-            part = trace if (begin, end) == (0, trace.t.size) else replace(trace.part(begin, end), start=start)
+            is_all = (begin, end) == (0, trace.t.size)
+            part = trace if is_all else replace(trace.part(begin, end), start=start)
             misfit = self.misfit(part, residuals_in(self.run.model, part, record, OBSERVER_RATE))
-            levels = self.tau, float(np.exp(np.mean(np.log(misfit + self.tau)))), float(np.mean(misfit)) + self.tau
-            self.known[record, begin, end] = part, *((level, float(np.sum(score(misfit, level)))) for level in levels)
+            geometric = float(np.exp(np.mean(np.log(misfit + self.tau))))
+            levels = self.tau, geometric, float(np.mean(misfit)) + self.tau
+            self.known[record, begin, end] = part, *((level, cost(misfit, level)) for level in levels)
         return self.known[record, begin, end]
 
-    def is_outweighed(self, record: int, moment: float) -> bool:
-        """Whether the worst blocks around a moment are OUTWEIGHED times as bad as most."""
+    def _bounds(self, trace: Trace, moment: float) -> tuple[int, int]:
+        """The samples of a trace from which and to which the part around a moment goes, whole blocks."""
+        if self.whole or trace.converter is not None:
+            return 0, trace.t.size
+        first = math.floor((moment - self.nearing.lead - trace.t[0]) / BLOCK)
+        last = math.ceil((moment + self.nearing.tail - trace.t[0]) / BLOCK)
+        ends = (min(first, trace.block[-1]), min(last, trace.block[-1] + 1))
+        begin, end = (int(np.searchsorted(trace.block, block)) for block in ends)
+        return begin, end
+
+    def is_outweighed(self, record: float, moment: float) -> bool:
+        """Whether the worst blocks around a moment outweigh the others."""
         _, _, (usual, _), (worst, _) = self.of(int(record), moment)
-        return worst > OUTWEIGHED * usual
+        return worst > self.nearing.outweighing * usual
 
 
-def between(
-    gain: Callable[[np.ndarray], float], pushes: Sequence[tuple[float, np.ndarray]]
-) -> list[tuple[float, np.ndarray]]:
+def between(gain: Gain, pushes: Sequence[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:
     """Pushes alike but for their size, between the largest that moves little (a shaft twists under it) and the next,
     which throws the rudder too far: what a rudder at rest was moved by is often within a few per cent of what moves it
     at all.
     """
     ordered = sorted(pushes, key=lambda push: abs(push[1][0]))
-    k = next((k for k, (won, _) in enumerate(ordered) if abs(won) > IDLE), 0)
+    k = next((k for k, (won, _) in enumerate(ordered) if abs(won) > NEARING.idle), 0)
     if k == 0 or ordered[k][0] > 0.0:
         return []
     idle, thrown, found = ordered[k - 1][1], ordered[k][1], []
-    for _ in range(HALVINGS):
+    for _ in range(NEARING.halvings):
         middle = np.append(np.sign(idle[0]) * math.sqrt(idle[0] * thrown[0]), idle[1:])
         won = gain(middle)
         found.append((won, middle))
-        idle, thrown = (middle, thrown) if won > -IDLE else (idle, middle)
+        idle, thrown = (middle, thrown) if won > -NEARING.idle else (idle, middle)
     return found
 
 
-def _nearer(gain: Callable[[np.ndarray], float], effect: Effect, start: np.ndarray) -> np.ndarray:
-    """A knock's size, beginning and length, or how it fades, brought nearer: a time has no slope before the knock
+def _nearer(gain: Gain, effect: Effect, start: np.ndarray) -> np.ndarray:
+    """An impulse's size, beginning and length, or how it fades, brought nearer: a time has no slope before it
     overlaps the mismatch.
     """
     free = [k for k, parameter in enumerate(effect.parameters) if parameter.fitted and np.isfinite(start[k])]
@@ -167,6 +190,6 @@ def _nearer(gain: Callable[[np.ndarray], float], effect: Effect, start: np.ndarr
         first[0],
         method="Nelder-Mead",
         bounds=bounds,
-        options={"initial_simplex": first, "maxfev": NEARER, "xatol": np.inf, "fatol": NEAR},
+        options={"initial_simplex": first, "maxfev": NEARING.simulations, "xatol": np.inf, "fatol": NEARING.within},
     )
     return whole(found.x)

@@ -6,48 +6,49 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ers_mj.data.prepared import Trace
-from ers_mj.effects import BY_NAME, EQUIVALENT
-from ers_mj.estimation.fit import Fit
-from ers_mj.selection.comparison import is_clocked, priced
+from ers_mj.effects import BY_NAME
+from ers_mj.estimation.objective import Fit
+from ers_mj.selection.bench import Bench
+from ers_mj.selection.comparison import is_clocked, kin_of, priced
 from ers_mj.selection.screening import Begin, screen
+from ers_mj.selection.search import SEARCH, Search
 from ers_mj.servo.model import Model
 
-FEW_STARTS = 4  # of an effect's own, up to which it is refitted from them as they are
-ANEW, ANEW_FROM = 8, 0.2  # starts from which a wave is fitted again that leaves so much C per block
 
-
-def anew(finished: Mapping[str, Fit], traces: Sequence[Trace], tau: float) -> list[tuple[str, Begin]]:
+def anew(bench: Bench, finished: Mapping[str, Fit]) -> list[tuple[str, Begin]]:
     """More starts of the finished waves along the travel that leave much, from where they have brought the baseline:
     which of many periods is the true one shows badly beside parameters that stand for all of it.
     """
     out = []
     for name, found in finished.items():
-        if _waves_along(name) and found.cost > ANEW_FROM * found.misfit.size:
-            others = [other for other in BY_NAME if other != name]
-            places = screen(
-                [found.model.without_effect(name)], traces, tau, others, True, False, tries=ANEW
-            ).begins.get(name, [])
-            out += [(name, begin) for begins in places for begin in begins]
+        if _waves_along(name) and found.cost > bench.search.anew_from * found.misfit.size:
+            alone = replace(bench, exclude=[other for other in BY_NAME if other != name])
+            screened = screen(alone, [found.model.without_effect(name)], True, False, tries=bench.search.anew)
+            out += [(name, begin) for begins in screened.begins.get(name, []) for begin in begins]
     return out
 
 
 def more_starts(
-    base: Model, names: Sequence[str], promising: Sequence[str], starts: Mapping[tuple[str, int], Sequence[Begin]]
+    base: Model,
+    names: Sequence[str],
+    promising: Sequence[str],
+    starts: Mapping[tuple[str, int], Sequence[Begin]],
+    search: Search = SEARCH,
 ) -> list[tuple[str, Begin]]:
     """More starts of what is simulated fast and lasts: those of the screening of what is ``promising``, and of all that
-    have few their own as large as they are, since a secant across forks of stick and slip may ask for a dent, or
-    promise nothing of what acts.
+    have few their own as large as they are, since a secant across forks of stick and slip may ask for a local minimum,
+    or promise nothing of what acts.
     """
     out = []
     for effect in (BY_NAME[name] for name in names if not (BY_NAME[name].dear or BY_NAME[name].once)):
         own = effect.starts(base.scales)
         begins = [
             *(starts.get((effect.name, 0), ()) if effect.name in promising else ()),
-            *(Begin(base.with_effect(effect.name, p), {}) for p in own if len(own) <= FEW_STARTS),
+            *(Begin(base.with_effect(effect.name, p), {}) for p in own if len(own) <= search.few_starts),
         ]
         out += [(effect.name, begin) for begin in begins if begin.model.has_tangents]
     return out
@@ -114,7 +115,7 @@ def other_waves(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tup
         return []
     out, without = [], model.without_effect(leader)
     period = dict(model.effects)[leader][_column_of_period(leader)]
-    kin = next((group for group in EQUIVALENT if leader in group), {leader})
+    kin = kin_of(leader)
     for effect in (e for e in BY_NAME.values() if _waves_along(e.name) and e.name not in (*exclude, *kin)):
         column = _column_of_period(effect.name)
         waves = [p for p in effect.starts(model.scales) if np.isfinite(p[column])]

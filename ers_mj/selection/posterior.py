@@ -11,15 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.data.prepared import Trace
+from ers_mj.decisions.explained import score
+from ers_mj.decisions.policy import POLICY, Policy
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import Fit, residuals_in, score
+from ers_mj.estimation.objective import Fit, residuals_in
 from ers_mj.servo.model import OBSERVER_RATE
 
 RUN = 4  # neighbouring blocks that chance strikes together: 1 s, as the intervals take it
-PARAMETER_PRICE = 0.25  # of C for each further parameter, when explanations are compared
-# of what has another as its limit and is not seen to be more (with the price of the parameter that opens it as much as
-# Akaike asks), or else of that other
-WIDER_PRICE = 0.75
 DRAWS = 1000  # of weights, in which each run of blocks counts more or less
 
 
@@ -62,7 +60,7 @@ def isolability(leader: Fit, others: Sequence[Fit], traces: Sequence[Trace]) -> 
     return out
 
 
-def probabilities(fits: Mapping[str, Fit]) -> dict[str, float]:
+def probabilities(fits: Mapping[str, Fit], policy: Policy = POLICY) -> dict[str, float]:
     """How probable each of these explanations is, if one of them is true; they sum to one.
 
     C is a logarithm of a likelihood, so exp(-C) weighs, less the price of the parameters, but those that only stand in
@@ -76,8 +74,9 @@ def probabilities(fits: Mapping[str, Fit]) -> dict[str, float]:
     runs = np.array([_runs(score(f.misfit, 1.0)) for f in fits.values()])
     price = np.array(
         [
-            PARAMETER_PRICE * (f.size - sum(BY_NAME[name].redundant for name in f.model.names))
-            + WIDER_PRICE * any(_is_limit(other, f, False) or _is_limit(f, other, True) for other in fits.values())
+            policy.parameter_price * (f.size - sum(BY_NAME[name].redundant for name in f.model.names))
+            + policy.wider_price
+            * any(_is_limit(other, f, False) or _is_limit(f, other, True) for other in fits.values())
             for f in fits.values()
         ]
     )

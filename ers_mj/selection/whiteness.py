@@ -3,28 +3,26 @@ does not.
 
     what a run leaves, e(t) = noise + mismatch -> products e(t) e(t + k h), k = 1, 2, 3 -> their mean in each block is
     the mismatch's power there
- The size of the noise need not be known for that, so that a mismatch of a third of the noise shows. What a converter
+
+The size of the noise need not be known for that, so that a mismatch of a third of the noise shows. What a converter
 makes of a slow motion has a memory, too: that of the simulated motion read with the same step is taken off.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from ers_mj.data.prepared import BLOCK, Trace
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.estimation.fit import residuals_in
+from ers_mj.estimation.objective import residuals_in
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
 LAGS = (1, 2, 3)  # samples
 FEWEST = 20  # samples in a block; at low sample rates several blocks are one
 FEWEST_PAIRS = 12  # a lag, in a block that is judged
-# of what is left, from which it is a mismatch (0.3 noise levels): of 100 servos without one three leave more than 0.06
-SIGNIFICANT = 0.085
-REST = 0.3  # share of what the baseline leaves that another form of the right law may leave in the output
 LEAST = -0.9  # power of a block, in those of the noise, that chance does not go below
 
 
@@ -67,16 +65,6 @@ def _told(model: Model, trace: Trace, record: int) -> dict[str, np.ndarray]:
 
 def _mean(logs: np.ndarray) -> float:
     return float(np.mean(logs[np.isfinite(logs)])) if np.isfinite(logs).any() else 0.0
-
-
-def more_is_missing(left: Mapping[str, float], without: Mapping[str, float] | None) -> bool:
-    """Whether what a model leaves is more than noise, or, of one with effects that leaves so much ``without`` them,
-    more than another form of the same law would: the mimic of an unknown effect takes a part only.
-
-    A mimic in the output is seldom one in the current, which no form of the right law leaves amiss.
-    """
-    least = {"output": max(SIGNIFICANT, REST * without["output"])} if without else {}
-    return any(power > least.get(kind, SIGNIFICANT) for kind, power in left.items())
 
 
 def remembered(e: np.ndarray, known: np.ndarray, block: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from ers_mj.data.prepared import Trace
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Scales
+from ers_mj.plants.effort import Effort
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.free import MOST_TAU as MOST_TAU
 from ers_mj.servo.free import STATES, Free, of_base, of_effects, of_recordings, of_states
@@ -68,6 +69,7 @@ class Model:
     infinite parameters are absent, not fitted. ``states`` maps a record state to its value in each recording, ``local``
     an effect to its parameters that are ``per_record`` (recordings, k), in rows of NaN where the effect is absent from
     a recording. ``frozen`` names effects that are not fitted, and with ", local" those whose ``local`` is not.
+    ``effort`` counts what is simulated with this model and those made of it.
     """
 
     values: Mapping[str, float]
@@ -78,6 +80,7 @@ class Model:
     priors: Mapping[str, tuple[float, float]] | None = None
     frozen: tuple[str, ...] = ()
     local: Mapping[str, np.ndarray] | None = None
+    effort: Effort | None = field(default=None, repr=False, compare=False)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -184,12 +187,12 @@ class Model:
             gain = self.states["gain"][record] if "gain" in self.states else 1.0
             level = self.states["friction_level"][record] if "friction_level" in self.states else 1.0
             c = c._replace(b=c.b * gain, c_2_plus=c.c_2_plus * level, c_2_minus=c.c_2_minus * level)
-        return ReducedModel(c, self.effects_of(record), supply)
+        return ReducedModel(c, self.effects_of(record), supply, self.effort)
 
     @cached_property
     def _anywhere(self) -> ReducedModel:
         """The plant without what differs between recordings; made once, since a fit asks for it in each of them."""
-        return ReducedModel(lumped(self.values), self.effects)
+        return ReducedModel(lumped(self.values), self.effects, effort=self.effort)
 
     def effects_of(self, record: int | None = None) -> tuple[tuple[str, np.ndarray], ...]:
         """The effects that act in one recording (None: in any), with their values there (in the first where they

@@ -1,5 +1,6 @@
 """What every minimiser is: a search for the least value of any callable within bounds, by seed, within a budget.
- An objective is called with many points at once, x (M, k) -> values (M,). One that is a sum of squares may also have
+
+An objective is called with many points at once, x (M, k) -> values (M,). One that is a sum of squares may also have
 ``residuals(x (k,)) -> (N,)``, which `ls` needs, ``slopes(x, residuals there) -> (N, k)`` where they are cheaper than
 differences, ``stages``, easier objectives to go through first, ``draw(random)``, a point to begin again from, and
 ``target``, a value that is good enough. Nothing here knows of servos.

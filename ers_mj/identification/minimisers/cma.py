@@ -14,7 +14,6 @@ class CMA(Minimiser):
 
     name = "cma"
     sentence = "CMA-ES (library cma), restarted with twice the population"
-    SPREAD = 0.25
 
     def _search(self, meter: Meter, random: np.random.Generator, start: np.ndarray | None) -> None:
         with warnings.catch_warnings():
@@ -33,7 +32,7 @@ class CMA(Minimiser):
                     "tolfunhist": 0,
                     "maxfevals": np.inf,
                 }
-                search = cma.CMAEvolutionStrategy(centre, self.SPREAD, options)
+                search = cma.CMAEvolutionStrategy(centre, 0.25, options)  # of the box, the first spread
                 while not search.stop():
                     points = np.array(search.ask())
                     search.tell(points, np.minimum(meter(np.clip(points, 0.0, 1.0)), 1e300))

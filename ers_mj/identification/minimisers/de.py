@@ -13,13 +13,12 @@ class DE(Minimiser):
 
     name = "de"
     sentence = "differential evolution (scipy)"
-    SIZE = 5  # times the number of parameters
 
     def _search(self, meter: Meter, random: np.random.Generator, start: np.ndarray | None) -> None:
         differential_evolution(
             lambda x: np.minimum(meter(x.T), 1e300),
             [(0.0, 1.0)] * meter.size,
-            popsize=self.SIZE,
+            popsize=5,  # times the number of parameters
             tol=0.0,
             atol=0.0,
             polish=False,

@@ -24,7 +24,7 @@ class IGA(Minimiser):
     probabilities (18).
 
     The paper gives neither population nor probabilities nor the unit of (17)'s sigma; these are the best settings that
-    were found (see analysis/table_2.py). sigma is SPREAD of the range times 1 - 0.9 t/G, the mutation acts gene by
+    were found (see analysis/table_2.py). sigma is a tenth of the range times 1 - 0.9 t/G, the mutation acts gene by
     gene, and one elite survives.
 
     Args:
@@ -35,8 +35,7 @@ class IGA(Minimiser):
 
     name = "iga"
     sentence = "the paper's genetic algorithm: crossover and mutation whose probabilities and size adapt"
-    SPREAD = 0.1
-    PRESSURE = 1.5  # eta+
+    pressure = 1.5  # eta+
 
     def __init__(
         self,
@@ -55,7 +54,7 @@ class IGA(Minimiser):
         cube = population(meter, random, start, self.size)
         values = meter(cube)
         generations = max(meter.budget // self.size - 1, 1)
-        chances = ranked(self.size, self.PRESSURE)
+        chances = ranked(self.size, self.pressure)
         for generation in range(generations + 1):
             share = generation / generations
             P_c, P_m = self.probabilities(share)
@@ -77,5 +76,5 @@ class IGA(Minimiser):
 
     def _mutated(self, children: np.ndarray, P_m: float, share: float, random: np.random.Generator) -> np.ndarray:
         """Eq. (16) with (17), within the cube."""
-        moved = self.SPREAD * (1.0 - 0.9 * share) * random.standard_normal(children.shape)
+        moved = 0.1 * (1.0 - 0.9 * share) * random.standard_normal(children.shape)
         return np.clip(children + np.where(random.random(children.shape) < P_m, moved, 0.0), 0.0, 1.0)

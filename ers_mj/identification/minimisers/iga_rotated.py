@@ -24,7 +24,7 @@ class RotatedIGA(IGA):
 
     name = "iga-rotated"
     sentence = "our variant of iga: the same adaptive probabilities, in the population's principal axes"
-    PRESSURE = 1.9  # eta+
+    pressure = 1.9  # eta+
     SCALE = (0.3, 0.9)  # of c_2
 
     def __init__(
@@ -35,7 +35,7 @@ class RotatedIGA(IGA):
     def _search(self, meter: Meter, random: np.random.Generator, start: np.ndarray | None) -> None:
         cube = population(meter, random, start, self.size)
         values, generations = meter(cube), max(meter.budget // self.size - 1, 1)
-        chances = ranked(self.size, self.PRESSURE)
+        chances = ranked(self.size, self.pressure)
         for generation in range(generations + 1):
             P_c, P_m = self.probabilities(generation / generations)
             order = np.argsort(values, kind="stable")

@@ -1,6 +1,7 @@
 """Least squares: a bounded trust region (Levenberg-Marquardt) from many starts, for objectives that are sums of
 squares.
- Slopes are forward differences at first, then Broyden's updates as long as the decrease keeps what it promised. An
+
+Slopes are forward differences at first, then Broyden's updates as long as the decrease keeps what it promised. An
 objective's ``stages`` are gone through before it, each until a step gains little.
 """
 

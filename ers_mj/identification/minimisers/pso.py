@@ -15,21 +15,21 @@ class PSO(Minimiser):
 
     name = "pso"
     sentence = "particle swarm"
-    INERTIA, PULL, FASTEST = (0.9, 0.4), 2.0, 0.2
+    inertia, pull, fastest = (0.9, 0.4), 2.0, 0.2
 
     def __init__(self, size: int = 40):
         self.size = size
 
     def _search(self, meter: Meter, random: np.random.Generator, start: np.ndarray | None) -> None:
         x = population(meter, random, start, self.size)
-        v = self.FASTEST * (2.0 * random.random(x.shape) - 1.0)
+        v = self.fastest * (2.0 * random.random(x.shape) - 1.0)
         best, values = x.copy(), meter(x)
         generations = max(meter.budget // self.size - 1, 1)
         for generation in range(generations + 1):
-            w = self.INERTIA[0] + (self.INERTIA[1] - self.INERTIA[0]) * generation / generations
+            w = self.inertia[0] + (self.inertia[1] - self.inertia[0]) * generation / generations
             swarm = best[int(np.argmin(values))]
-            v = w * v + self.PULL * (random.random(x.shape) * (best - x) + random.random(x.shape) * (swarm - x))
-            v = np.clip(v, -self.FASTEST, self.FASTEST)
+            v = w * v + self.pull * (random.random(x.shape) * (best - x) + random.random(x.shape) * (swarm - x))
+            v = np.clip(v, -self.fastest, self.fastest)
             moved = np.clip(x + v, 0.0, 1.0)
             x, v = moved, np.where(moved == x + v, v, 0.0)
             now = meter(x)

@@ -1,0 +1,6 @@
+"""What is decided, by numbers alone: policy -> explained -> ordering -> acceptance -> confirmation -> conclusion.
+
+Nothing here simulates, fits or knows an effect by name, so that every decision can be replayed on tables of what it
+read (analysis/golden.py). Every threshold stands in ``policy.Policy``, with its unit, what it protects and how it was
+set.
+"""

@@ -1,0 +1,165 @@
+"""What is said in the end: the share that is explained, whether more is missing, the verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ers_mj.decisions.policy import POLICY, Policy
+
+Left = Mapping[str, float]  # ln(1 + power) beyond the noise, by sensor (selection/whiteness.py)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A held-out recording, or half of one: its free-run error without and with the named effects, that of its noise
+    [output unit], and the mean block misfit, the noise at the least, without and with them.
+    """
+
+    before: float
+    after: float
+    noise: float
+    misfit_before: float
+    misfit_after: float
+
+
+class Findings(Protocol):
+    """What the conclusion reads.
+
+    ``names`` are the effects of the model, ``sensors`` those that show in the data itself, ``suspects`` the laws
+    without a name that act here; ``explained`` is the share of the squared held-out error that goes with the names,
+    ``heldout_cost`` C without and with them, ``left_before`` and ``left`` what memory tells without and with them,
+    ``left_elsewhere`` the same in the recordings but the worst, ``free_train`` and ``free_held`` the free-run errors
+    after and ``least_astray`` the smallest of a recording before, in noise levels; ``datasheet_explains`` whether the
+    datasheet as it stands does.
+    """
+
+    @property
+    def names(self) -> Sequence[str]: ...
+    @property
+    def sensors(self) -> Sequence[str]: ...
+    @property
+    def suspects(self) -> Sequence[object]: ...
+    @property
+    def explained(self) -> float: ...
+    @property
+    def heldout_cost(self) -> tuple[float, float]: ...
+    @property
+    def left_before(self) -> Left: ...
+    @property
+    def left(self) -> Left: ...
+    @property
+    def left_elsewhere(self) -> float: ...
+    @property
+    def free_train(self) -> float: ...
+    @property
+    def free_held(self) -> float: ...
+    @property
+    def least_astray(self) -> float: ...
+    @property
+    def datasheet_explains(self) -> bool: ...
+
+
+def share(before: float, after: float, noise: float) -> float:
+    """Share of a squared error ``before`` that is gone ``after``, above the squared ``noise``."""
+    return min(max(1.0 - (after - noise) / (before - noise), 0.0), 1.0) if before > noise else 0.0
+
+
+def is_more_than_noise(left: Left, without: Left | None, policy: Policy = POLICY) -> bool:
+    """Whether what a model leaves is more than noise, or, of one with effects that leaves so much ``without`` them,
+    more than another form of the same law would: the mimic of an unknown effect takes a part only.
+
+    A mimic in the output is seldom one in the current, which no form of the right law leaves amiss.
+    """
+    least = {"output": max(policy.mismatch, policy.other_form * without["output"])} if without else {}
+    return any(power > least.get(kind, policy.mismatch) for kind, power in left.items())
+
+
+def explained_each(shown: Sequence[Shown], left_before: Left, left: Left, policy: Policy = POLICY) -> float:
+    """The mean share that goes, over the recordings whose error without the effects is above the noise.
+
+    One whose free run is lost with and without them tells nothing, as long as there are others: ``astray``, or, where
+    the effects leave nothing beyond the noise, ``fork_lost``, since stick and slip must have forked then. Where there
+    are no others the observer's held-out misfit tells their share. Where no error is above the noise, of which the
+    estimate may be too large, and memory tells of a mismatch, memory tells the share.
+    """
+    forked = not is_more_than_noise(left, None, policy)
+    above = [s for s in shown if s.before > policy.visible * s.noise]
+    if not above and is_more_than_noise(left_before, None, policy):
+        kind = max(left_before, key=lambda k: left_before[k])
+        return share(math.expm1(left_before[kind]), math.expm1(left[kind]), 0.0)
+    most = policy.fork_lost if forked else policy.astray
+    told = [s for s in above if min(s.before, s.after) < most * s.noise]
+    if told or not forked:
+        shares = [share(s.before**2, s.after**2, s.noise**2) for s in told or above]
+    else:
+        shares = [share(s.misfit_before, s.misfit_after, 1.0) for s in above]
+    return float(np.mean(shares)) if shares else 0.0
+
+
+def told_effects(f: Findings, policy: Policy = POLICY) -> Sequence[str]:
+    """The effects that are named: those of the model, if they account for half of what the baseline leaves, in free run
+    or, beyond doubt, in blocks or memory.
+    """
+    enough = f.explained >= policy.half or goes_in_blocks(f, policy) or goes_from_memory(f, policy)
+    return f.names if enough else ()
+
+
+def goes_in_blocks(f: Findings, policy: Policy = POLICY) -> bool:
+    """Whether nearly all of a large held-out C goes with the named effects: stick and slip that fork have lost the free
+    runs then.
+    """
+    before, after = f.heldout_cost
+    return before > policy.much and after < (1.0 - policy.nearly_gone) * before
+
+
+def goes_from_memory(f: Findings, policy: Policy = POLICY) -> bool:
+    """Whether nearly all that the output remembers of a mismatch goes with the named effects, and a ``fair`` share of
+    the free-run error.
+    """
+    before, after = (max(left["output"], 0.0) for left in (f.left_before, f.left))
+    is_gone = after < (1.0 - policy.nearly_gone) * before
+    return f.explained >= policy.fair and is_more_than_noise(f.left_before, None, policy) and is_gone
+
+
+def is_more_missing(f: Findings, policy: Policy = POLICY) -> bool:
+    """Whether the model leaves more than noise: of the output nothing where free runs leave none, whatever forks in the
+    observer.
+    """
+    free = f.free_train < policy.free_train and f.free_held < policy.free_held
+    left = {**f.left, "output": 0.0} if free else f.left
+    if is_more_than_noise(left, f.left_before if f.names else None, policy):
+        return True
+    return not (free or f.names) and f.left_elsewhere > policy.elsewhere
+
+
+def is_a_part(f: Findings, policy: Policy = POLICY) -> bool:
+    """Whether memory and held-out error agree that the named effects are a part only, as the mimic of an unknown effect
+    is.
+    """
+    is_left = f.explained < policy.nearly_all and f.left["output"] > policy.part
+    return bool(told_effects(f, policy)) and is_left and f.free_held < policy.fork_lost
+
+
+def verdict(f: Findings, policy: Policy = POLICY) -> str:
+    """One of diagnosis.json's verdicts.
+
+    Where no held-out recording is met by a free run something is missing, though the observer, which is set right on
+    the way, sees nothing amiss.
+    """
+    if told_effects(f, policy) or f.sensors:
+        return "missing_physics"
+    if f.names or f.suspects or is_more_missing(f, policy) or f.least_astray > policy.astray:
+        return "unexplained"
+    return "consistent" if f.datasheet_explains else "parameters_only"
+
+
+def is_more_left(f: Findings, policy: Policy = POLICY) -> bool:
+    """Whether a mismatch stays that nothing named accounts for."""
+    if verdict(f, policy) == "unexplained" or f.suspects or tuple(told_effects(f, policy)) != tuple(f.names):
+        return True
+    return is_more_missing(f, policy) or is_a_part(f, policy)

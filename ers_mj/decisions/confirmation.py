@@ -1,0 +1,108 @@
+"""Does held-out data confirm an effect?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ers_mj.decisions.policy import POLICY, Policy
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What held-out recordings say of an effect.
+
+    ``p`` is its p-value; ``rmse`` the free-run error with and without it [output unit], ``noise`` that of the sensor;
+    ``cost`` the held-out C with and without it. Of the scores in which it was judged in the end (by halves, where one
+    recording teaches most of it): ``ratio``, the error that no converter has made with it over that without, and
+    ``log_ratio``, the mean over recordings of the same ratio's logarithm.
+    """
+
+    p: float
+    rmse: tuple[float, float]
+    noise: float
+    cost: tuple[float, float]
+    ratio: float
+    log_ratio: float
+
+
+@dataclass(frozen=True)
+class Won:
+    """What an effect won of the score over held-out blocks: in all, the sum of its squared losses, in its best block,
+    and how many blocks there are.
+    """
+
+    total: float
+    losses: float
+    best: float
+    blocks: int
+
+    @classmethod
+    def of(cls, gain: np.ndarray) -> Won:
+        """Of the gain (B,) in each block."""
+        return cls(float(np.sum(gain)), float(np.sum(np.minimum(gain, 0.0) ** 2)), float(np.max(gain)), gain.size)
+
+
+def paired_p(won: Won, once: bool = False, alone: bool = False, policy: Policy = POLICY) -> float:
+    """One-sided p-value that what won this predicts held-out blocks no better.
+
+    If neither is better the gains lie alike on both sides of zero, so that the losses alone tell their scatter: sum(d)
+    / sqrt(2 sum of the squared losses) is near normal. An effect that acts in a few blocks and harms nowhere is not
+    punished for being rare, as it is by the scatter of all. A loss of ``least_loss`` a block is taken for granted.
+
+    Blocks are not independent, and the best of many effects was taken: the p-value is never below the share of servos
+    without missing physics in which as large a gain is offered, by an exponential tail (analysis/null_gains.py: of 48
+    the largest gain of a law is 1.8; stick and slip that fork offer what acts ``once`` 2.2 to 3.6 in four of them). An
+    impulse is also known by the block that it serves best: the worst one of 61 such servos is off by 3.7 to 5.8 sigma
+    in three, by more than 2 in twelve. A law whose round offers no other nearly as much, ``alone``
+    (ordering.stands_alone), has what chance offers to one only, in a share ``null_alone`` of them.
+    """
+    losses = won.losses + won.blocks * policy.least_loss**2
+    tail = policy.null_gain_once if once else policy.null_gain
+    chance = (policy.null_alone if alone else 1.0) * math.exp(-max(won.total, 0.0) / tail)
+    if once:
+        beyond = max(won.best - math.log(policy.null_peak), 0.0)
+        chance = min(chance, math.exp(-policy.peak_tail * beyond))
+    return max(chance, 0.5 * math.erfc(won.total / math.sqrt(2.0 * losses) / math.sqrt(2.0)))
+
+
+def is_doubtful(held: HeldOut, policy: Policy = POLICY) -> bool:
+    """Whether neither the blocks nor the free runs confirm an effect."""
+    return held.p > policy.largest_p or is_no_closer(held, policy)
+
+
+def is_no_closer(held: HeldOut, policy: Policy = POLICY) -> bool:
+    """Whether an effect brings the free runs no closer.
+
+    Where its blocks leave no doubt, an error that forks of stick and slip make somewhat larger counts as closer, and so
+    does one that falls in the geometric mean of the recordings: one of them may teach so much that the others, without
+    it, know the rest of the model badly.
+    """
+    if held.p >= policy.sure_p or held.ratio < policy.worse:
+        return held.ratio >= (policy.worse if held.p < policy.sure_p else 1.0)
+    return held.log_ratio >= 0.0
+
+
+def is_halved(held: HeldOut, policy: Policy = POLICY) -> bool:
+    """Whether half of the squared free-run error above the noise goes, in a clear case, and the blocks speak for it on
+    balance.
+
+    An effect that one recording shows best is known less well without that recording: it helps there, and is not exact
+    to the noise.
+    """
+    after, without = held.rmse
+    above, left = without**2 - held.noise**2, after**2 - held.noise**2
+    is_clear = without > policy.clear * held.noise
+    return is_clear and left < policy.half * above and held.cost[0] < held.cost[1]
+
+
+def is_confirmed(held: HeldOut, halves_recalibrated: Callable[[], bool], policy: Policy = POLICY) -> bool:
+    """Whether an effect is confirmed: by blocks and free runs, by an error that is halved, or by one that is once gain,
+    offset and friction level of another day are known (asked for only where nothing else confirms it).
+    """
+    if not is_doubtful(held, policy) or is_halved(held, policy):
+        return True
+    return held.rmse[0] <= policy.worse * held.rmse[1] and halves_recalibrated()

@@ -1,0 +1,97 @@
+"""How a sample is cut into segments: at the end of a delay, and as short as the forces within it ask for."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ers_mj.plants.compiled import inline
+from ers_mj.plants.state import MODES, VECTOR, F, I, has_bristle, types
+
+FALL_STEP = 0.1  # length of a segment over the electrical time constant where the inductance falls with the current
+LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
+CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
+CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
+BRISTLE_CORNER = 0.1  # the same for a rudder that no friction slows: share of c_1 h below which it bounces out of sight
+
+
+class Cuts(NamedTuple):
+    """Ends (k,) of a sample's segments [s], whether the input of this sample (1) or the one before (0) acts in each,
+    the whole samples that the delay swallows, the length of a sample and of its last segment.
+    """
+
+    ends: np.ndarray
+    fresh: np.ndarray
+    skip: int
+    h0: float
+    last: float
+
+
+CUTS = types.NamedTuple([VECTOR, MODES, I, F, F], Cuts)
+
+
+@inline
+def law_step(c, a_emf):
+    """Length of a segment [s] at most under a law."""
+    return LAW_STEP / (max(abs(c.a_mech_plus), abs(c.a_mech_minus)) + math.sqrt(abs(c.a_1)) + a_emf)
+
+
+@inline
+def _longest(c, h0):
+    """Length of a segment [s] at most."""
+    step = h0
+    if c.lawful > 0:
+        step = min(step, law_step(c, c.a_emf))
+    if c.fall > 0 and c.tau_e > 0:
+        step = min(step, FALL_STEP * c.tau_e)
+    if c.two_body > 0:
+        stiffness = c.k_twist / (c.rho * (1.0 - c.rho)) if c.rho > 0 else c.k_bristle
+        step = min(step, CONTACT_STEP / math.sqrt(stiffness))
+    return step
+
+
+@inline
+def split_delay(c, h0):
+    """(whole samples, rest [s]) of the delay."""
+    skip = int(c.delay / h0 + 1e-9)
+    late = c.delay - skip * h0
+    return skip, 0.0 if late < 1e-9 * h0 else late
+
+
+@njit(nogil=True)
+def cut(c, h0, refine):
+    """A uniform sample's cuts, ``refine`` times as many."""
+    step = _longest(c, h0) / refine
+    skip, late = split_delay(c, h0)
+    before, after = int(math.ceil(late / step - 1e-9)), int(math.ceil((h0 - late) / step - 1e-9))
+    ends, fresh = np.empty(before + after), np.zeros(before + after, np.int64)
+    for k in range(before):
+        ends[k] = late * (k + 1) / before
+    for k in range(after):
+        ends[before + k] = late + (h0 - late) * (k + 1) / after
+        fresh[before + k] = 1
+    last = ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
+    return Cuts(ends, fresh, skip, h0, last)
+
+
+@inline
+def longest_step(c, cuts, refine):
+    """Length of a step [s] at most that looks for events."""
+    h_max = np.inf
+    if c.upper < np.inf or c.lower > -np.inf:
+        h_max = CONTACT_STEP / (math.sqrt(c.k_stop) + c.d_stop)
+    if c.two_body > 0 or c.lawful > 0:
+        h_max = min(h_max, cuts.last / refine)
+    return h_max
+
+
+@inline
+def corner_speed(c, cuts, refine):
+    """Speed below which a rudder that crosses theta_0 may end there."""
+    corner = CORNER * (c.c_1 + c.c_2_plus) * cuts.h0
+    if has_bristle(c):
+        corner = max(corner, BRISTLE_CORNER * c.c_1 * cuts.last * refine)
+    return corner

@@ -1,0 +1,42 @@
+"""Successive halving: go a few steps with all, keep what is near, go on with that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+S, T = TypeVar("S"), TypeVar("T")
+Each = Callable[[Callable[[T], T], Iterable[T]], list[T]]  # a function of every item, side by side
+
+
+@dataclass(frozen=True)
+class Stage(Generic[T]):
+    """A few steps for each that is left, and those of them that go on, in the order in which they do."""
+
+    advance: Callable[[T], T]
+    keep: Callable[[Sequence[T]], Sequence[T]] = lambda ended: ended
+
+
+def halved(begun: Iterable[T], stages: Sequence[Stage[T]], each: Each[T]) -> list[T]:
+    """What is left of all that was begun after the last stage."""
+    left: Sequence[T] = list(begun)
+    for stage in stages:
+        left = stage.keep(each(stage.advance, left))
+    return list(left)
+
+
+def carried_on(
+    begun: Iterable[S],
+    first: Callable[[S], T],
+    is_near: Callable[[T], bool],
+    then: Callable[[T], T],
+    each: Callable[[Callable[[S], T], Iterable[S]], list[T]],
+) -> list[T]:
+    """Everything that was begun, a few steps on, and further where it ``is_near`` then."""
+
+    def gone(item: S) -> T:
+        ended = first(item)
+        return then(ended) if is_near(ended) else ended
+
+    return each(gone, begun)
