@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.data.checks import LIMITS
+from ers_mj.data.checks import GAP
 from ers_mj.data.prepared import Signals, make_trace, noise_sigma
 from ers_mj.data.sensor_faults import converter_step
 from ers_mj.estimation.baseline import baseline
@@ -122,13 +122,13 @@ class Tracker:
         while t.size:
             if self._t.size > 1:
                 usual = float(np.median(np.diff(self._t[-20:])))
-                if t[0] - self._t[-1] > max(LIMITS.gap * usual, HORIZON.hop):
+                if t[0] - self._t[-1] > max(GAP * usual, HORIZON.hop):
                     self._restart()
             if not self._t.size:
                 self._due, self._begin, self._fine = t[0] + self._shortest, t[0], t[0] + self._shortest - HORIZON.hop
             cut = min(int(np.searchsorted(t, self._due - 1e-9)) + 1, t.size)
             if (
-                gaps := np.flatnonzero(np.diff(t[:cut]) > max(LIMITS.gap * self._model.scales.sample_time, HORIZON.hop))
+                gaps := np.flatnonzero(np.diff(t[:cut]) > max(GAP * self._model.scales.sample_time, HORIZON.hop))
             ).size:
                 cut = int(gaps[0]) + 1
             self._t, self._u, self._y = (np.append(a, b[:cut]) for a, b in ((self._t, t), (self._u, u), (self._y, y)))
