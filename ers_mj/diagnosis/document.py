@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import math
 import platform
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ers_mj import __version__
 from ers_mj.data.prepared import Trace
 from ers_mj.decisions.explained import cost
-from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
-from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map, shaded
+from ers_mj.diagnosis.evidence import Evidence
+from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
+from ers_mj.diagnosis.record_state import record_state
+from ers_mj.diagnosis.sentences import remainder, sentence, shown
 from ers_mj.diagnosis.verdict import Case
+from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.selection.confirmation import delta_bic
-from ers_mj.selection.cross_validation import free_run, pooled, recalibrated
+from ers_mj.selection.cross_validation import pooled
+from ers_mj.selection.moves import Move
 from ers_mj.selection.posterior import isolability
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.model import BASE, STATES
+from ers_mj.servo.model import BASE
 from ers_mj.servo.simulation import PER_INERTIA, unit_of
 
 SHEET_UNITS = {
@@ -54,7 +58,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
     """The document, the evidence and the model."""
     base, model, traces = case.start.fit.model, case.model, case.start.traces
     samples = gather(base, model, traces)
-    verdict, missing, record_state = case.verdict, _missing(case), _record_state(case, held)
+    verdict, missing, states = case.verdict, _missing(case), record_state(case, held)
     spectrum = over_frequency(samples, traces)
     found = places(
         samples,
@@ -69,24 +73,24 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
     document = {
         "version": 1,
         "verdict": verdict,
-        "sentence": _sentence(case, missing, found),
+        "sentence": sentence(case, missing, found),
         "where": [] if verdict == "consistent" else [_place(p) for p in found],
         "missing": missing,
-        "remainder": _remainder(case),
-        "record_state": record_state,
+        "remainder": remainder(case),
+        "record_state": states,
         "fit": case.fits,
         "parameters": _parameters(case),
         "next_recording": next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit),
         "data": _data(case),
+        "trail": [_move(move) for move in case.selection.trail],
         "seed": case.seed,
         "versions": _versions(),
     }
     if verdict == "unexplained" or case.suspects:
         document["suspects"] = _suspects(case)
-    views = _views(case, samples)
     evidence = Evidence(
-        tuple(views),
-        tuple(_ladder(case)),
+        tuple(views(case, samples)),
+        tuple(ladder(case)),
         residual_map(samples),
         case.noise,
         case.output_unit,
@@ -120,7 +124,7 @@ def _effect(case: Case, name: str) -> dict:
     parameters = {p["name"]: p["entry"] for p in _effect_parameters(case, name)}
     without = c.without[name]
     with_and_without = (None, None) if effect.local else (pooled(c.after).rmse, without.rmse)
-    shown = {k: _shown(e["value"], e["unit"]) for k, e in parameters.items()}
+    shown = {k: shown(e["value"], e["unit"]) for k, e in parameters.items()}
     return {
         "effect": name,
         "sentence": effect.describe(shown),
@@ -182,7 +186,7 @@ def _symptom(case: Case, name: str, values: np.ndarray) -> dict:
     }
     return {
         "effect": name,
-        "sentence": effect.describe({k: _shown(e["value"], e["unit"]) for k, e in entries.items()}),
+        "sentence": effect.describe({k: shown(e["value"], e["unit"]) for k, e in entries.items()}),
         "subsystem": effect.subsystem,
         "parameters": entries,
         "evidence": {
@@ -267,90 +271,15 @@ def _combinations(case: Case, rows: dict) -> dict:
     return {combination: rows[name] for combination, name in named.items() if name in rows}
 
 
-def _record_state(case: Case, held: list[Trace]) -> list[dict]:
-    """What differs between recordings beyond chance: training ones as fitted, held-out ones as recalibrated."""
-    out, unknown = [], (None, None)
-    states, errors = dict(case.model.states or {}), case.state_errors()
-    later = [recalibrated(model, h)[1] for model, h in zip(case.confirmed.models, held)]
-    count = len(case.start.traces)
-    for name in STATES:
-        rest = 0.0 if name == "offset" else 1.0
-        values = [*(states[name] if name in states else [rest] * count), *(s.get(name, (rest,))[0] for s in later)]
-        ci95 = [
-            *(errors.get((name, k), unknown) for k in range(count)),
-            *(s[name][1:] if name in s else unknown for s in later),
-        ]
-        travel, policy = case.start.fit.model.scales.position, case.policy
-        least = policy.state_offset * travel if name == "offset" else policy.state_factor
-        if any(
-            abs(v - rest) > least and not low <= rest <= high for v, (low, high) in zip(values, ci95) if low is not None
-        ):
-            unit = case.output_unit if name == "offset" else "-"
-            spread = _shown(max(values), unit), _shown(min(values), unit)
-            out.append(
-                {
-                    "name": name,
-                    "unit": unit,
-                    "values": [float(v) for v in values],
-                    "ci95": [list(ends) for ends in ci95],
-                    "sentence": (
-                        f"{name.replace('_', ' ')} differs between the recordings: from {spread[1]} to {spread[0]}"
-                    ),
-                }
-            )
-    return out
-
-
-def _sentence(case: Case, missing: list, found: list[Place]) -> str:
-    fits, verdict = case.fits, case.verdict
-    before, after = (_shown(fits[f"heldout_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
-    if verdict == "consistent":
-        return "The datasheet's model explains these recordings within their noise: nothing is missing."
-    if verdict == "parameters_only":
-        return (
-            "Only the numbers were off: with refitted parameters the model explains these recordings within their"
-            " noise."
-        )
-    if verdict == "missing_physics":
-        names = "; ".join(m["sentence"] for m in missing)
-        if not case.told_effects:
-            return (
-                f"The sensor shows: {names}. Beside it a mismatch is left that no effect of the library accounts for."
-                if case.more_is_left
-                else f"Only the sensor shows: {names}."
-            )
-        told = "held-out error"
-        if (
-            fits["heldout_rmse_after_rad"] > math.sqrt(case.policy.half) * fits["heldout_rmse_before_rad"]
-            and case.holdout
-        ):
-            told = "held-out error, once gain, offset and friction level of that day are known,"
-            before, after = (_shown(fits[f"recalibrated_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
-        return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
-    place = next((p.sentence for p in found if p.axis != "subsystem"), "")
-    much = (
-        f"; it acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}"
-        if case.suspects
-        else f" (the best explains {case.explained:.0%} of the held-out error)"
-    )
-    return (
-        f"Something acts here that no effect of the library accounts for{much};"
-        f" {place or 'it is spread over the whole record'}."
-    )
-
-
-def _remainder(case: Case) -> dict:
-    words = (
-        "a mismatch is left that nothing named accounts for"
-        if case.more_is_left
-        else "nothing beyond the noise is left"
-    )
-    left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
+def _move(move: Move) -> dict:
+    """One move of the selection."""
     return {
-        "explained_share": case.explained,
-        "significant": case.more_is_left,
-        "left_sigma": left_sigma,
-        "sentence": f"{case.explained:.0%} of the squared held-out error above the noise is explained; {words}.",
+        "kind": move.kind,
+        "before": list(move.before),
+        "after": list(move.after),
+        "gain": move.gain,
+        "accepted": move.accepted,
+        "because": move.because,
     }
 
 
@@ -386,51 +315,6 @@ def _degrees(case: Case) -> list[str]:
     return []
 
 
-def _views(case: Case, samples) -> list[RecordView]:
-    out = []
-    for model, base, fold in zip(case.confirmed.models, case.confirmed.base_models, case.confirmed.parts):
-        t = fold.held_out
-        out.append(RecordView(t.name, True, t.t, t.u, t.y, free_run(base, t), free_run(model, t), ()))
-    held_names = {v.name for v in out}
-    for k, t in enumerate(case.start.traces):
-        spans = shaded(t, k, samples) if case.verdict in ("missing_physics", "unexplained") else ()
-        if t.name in held_names and case.confirmed.parts[0].training is not None and len(case.start.traces) > 1:
-            i = [v.name for v in out].index(t.name)
-            out[i] = replace(out[i], shaded=spans)
-        else:
-            out.append(
-                RecordView(
-                    t.name,
-                    False,
-                    t.t,
-                    t.u,
-                    t.y,
-                    free_run(case.start.fit.model, t, k),
-                    free_run(case.model, t, k),
-                    spans,
-                )
-            )
-    return out
-
-
-def _ladder(case: Case):
-    c = case.confirmed
-    yield Rung((), 0.0, 0.0, pooled(c.before).rmse, not case.model.names, "refitted baseline", case.start.fit.size)
-    for ranked in case.selection.rounds:
-        for candidate in ranked:
-            names = candidate.fit.model.names
-            chosen = names == case.model.names
-            yield Rung(
-                names or (candidate.name,),
-                candidate.gain,
-                candidate.z,
-                pooled(c.after).rmse if chosen else None,
-                chosen,
-                "" if candidate.name in BY_NAME else "differs between recordings",
-                candidate.fit.size,
-            )
-
-
 def _improved(case: Case) -> Datasheet:
     """The improved model: refitted lumped values in [lumped], effects in a reader's units."""
     model = case.model if case.told_effects or not case.model.names else case.start.fit.model
@@ -446,15 +330,6 @@ def _improved(case: Case) -> Datasheet:
     ]
     parameters = dict(case.datasheet.parameters) if case.datasheet is not None else {}
     return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
-
-
-def _shown(value: float | None, unit: str) -> str:
-    """A number for a sentence: radians as degrees."""
-    if value is None:
-        return "none"
-    if unit.startswith("rad") and not unit.startswith("rad/s^2"):
-        return f"{math.degrees(value):.3g} deg{unit[3:]}"
-    return f"{value:.3g}" if unit == "-" else f"{value:.3g} {unit}"
 
 
 def _versions() -> dict:

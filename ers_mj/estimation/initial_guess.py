@@ -67,20 +67,23 @@ def guesses(traces: Sequence[Trace]) -> list[dict[str, float]]:
     y = np.concatenate([t.y[t.valid] for t in traces])
     speed = np.concatenate([np.abs(np.diff(savgol_filter(t.y[t.valid], 9, 2))) / t.sample_time for t in traces])
     still = max(0.02 * float(np.quantile(speed, 0.98)), 1e-12)
-    found = []
-    for window in WINDOWS:
-        rows = [r for r in (_rows(t, window, still) for t in traces) if r is not None]
-        if not rows:
-            continue
-        right = np.concatenate([r[0] for r in rows])
-        columns = np.vstack([r[1] for r in rows])
-        for theta_0 in (None, *np.quantile(y, PLACES)):
-            for spring in (False, True) if theta_0 is None else (True,):
-                with np.errstate(all="ignore"):  # of a constant input next to nothing follows
-                    found.append(_solve(right, columns, rows, theta_0, spring, float(np.median(y))))
+    found = [one for window in WINDOWS for one in _by_window(traces, window, still, y)]
     found.sort(key=lambda item: item[0])
     most, peak = FASTEST * float(np.quantile(speed, 0.98)), max(float(np.max(np.abs(t.u))) for t in traces)
     return [values for _, values in found if abs(values["b"]) * peak <= most]
+
+
+def _by_window(traces: Sequence[Trace], window: float, still: float, y: np.ndarray) -> list[tuple[float, dict]]:
+    """The regressions over windows of one length [s], without spring and with one at each place, as (misfit,
+    values).
+    """
+    rows = [r for r in (_rows(t, window, still) for t in traces) if r is not None]
+    if not rows:
+        return []
+    right, columns = np.concatenate([r[0] for r in rows]), np.vstack([r[1] for r in rows])
+    places = [(None, False), (None, True), *((theta_0, True) for theta_0 in np.quantile(y, PLACES))]
+    with np.errstate(all="ignore"):  # of a constant input next to nothing follows
+        return [_solve(right, columns, rows, at, spring, float(np.median(y))) for at, spring in places]
 
 
 def _solve(right, columns, rows, theta_0, spring, middle):

@@ -127,9 +127,8 @@ class Tracker:
             if not self._t.size:
                 self._due, self._begin, self._fine = t[0] + self._shortest, t[0], t[0] + self._shortest - HORIZON.hop
             cut = min(int(np.searchsorted(t, self._due - 1e-9)) + 1, t.size)
-            if (
-                gaps := np.flatnonzero(np.diff(t[:cut]) > max(GAP * self._model.scales.sample_time, HORIZON.hop))
-            ).size:
+            most = max(GAP * self._model.scales.sample_time, HORIZON.hop)
+            if (gaps := np.flatnonzero(np.diff(t[:cut]) > most)).size:
                 cut = int(gaps[0]) + 1
             self._t, self._u, self._y = (np.append(a, b[:cut]) for a, b in ((self._t, t), (self._u, u), (self._y, y)))
             t, u, y = t[cut:], u[cut:], y[cut:]

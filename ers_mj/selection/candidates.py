@@ -100,18 +100,22 @@ class _Race(Refits):
             : self.bench.search.foremost
         ]
         ahead = self._ahead({*foremost, *self._not_dear_beside_an_effect()}) if self.bent and not self.spent() else []
-        begun = [(label, begin) for label in ahead for begin in self.starts[label]]
-        ends = self.fitted(begun, 20, Along(renewals=20))
-        early = [(label, begin, found) for (label, begin), (_, found) in zip(begun, ends)]
-        for label, _, found in early:
-            self.best[label] = min(self.best[label], found, key=self.total)
+        early = self._run_ahead(ahead)
         worth = self._worth_other_starts(failed, foremost, most)
-        more = self.starts.items() if not self.spent() else ()
-        others = [(label, b[1:]) for label, b in more if label[0] in worth and label not in ahead]
-        again = self.quick([(label, begin) for label, begins in others for begin in begins])
+        more = [] if self.spent() else [label for label in self.starts if label[0] in worth and label not in ahead]
+        again = self.quick([(label, begin) for label in more for begin in self.starts[label][1:]])
         self.best |= {label: min(self.best[label], found, key=self.total) for label, found in again.items()}
         if not self.bent:
             self.best = {(name, 0): found for name, found in leaders(self.best, self.total).items()}
+        return early
+
+    def _run_ahead(self, labels: Sequence[Label]) -> list[Early]:
+        """All starts of these fitted to the end, on Jacobians of their own."""
+        begun = [(label, begin) for label in labels for begin in self.starts[label]]
+        ends = self.fitted(begun, 20, Along(renewals=20))
+        early = [(label, begin, found) for (label, begin), (_, found) in zip(begun, ends, strict=True)]
+        for label, _, found in early:
+            self.best[label] = min(self.best[label], found, key=self.total)
         return early
 
     def _not_dear_beside_an_effect(self) -> list[str]:

@@ -14,7 +14,7 @@ from ers_mj.selection.comparison import is_clocked, is_dear, kin_of
 from ers_mj.selection.multistart import more_starts
 from ers_mj.selection.refits import Label, Named, Refits, cheapest
 from ers_mj.selection.screening import Begin, Screened
-from ers_mj.servo.model import OBSERVER_RATE
+from ers_mj.servo.model import OBSERVER_RATE, Model
 from ers_mj.solvers.successive_halving import Stage, halved
 
 Starts = Mapping[Label, Sequence[Begin]]
@@ -56,15 +56,25 @@ def _overlooked(
         return []
     laws = [effect for effect in BY_NAME.values() if _is_in_the_shade(effect, leader, refits, best)]
     if model.plant().coupled and is_clocked(leader):
-        seen = refits.bench.search.seen * screened.promises.get(leader, math.inf)
-        known = [e.name for e in laws if e.name in screened.begins and screened.promises.get(e.name, 0.0) >= seen]
-        own = {name: list(screened.begins[name][0][:1]) for name in known}
+        own = _screened(refits, screened, laws, leader)
     else:
-        whole = [effect for effect in laws if not (effect.sized or model.plant().coupled)]
-        own = {e.name: [Begin(model.with_effect(e.name, p), {}) for p in e.starts(model.scales)] for e in whole}
+        own = _whole(model, laws)
     twists = model.plant().has_motor_side  # a play or a shaft, which takes longest, is no impulse
     begun = [(e.name, begin) for e in laws for begin in starts.get((e.name, 0), own.get(e.name, []))]
     return [(name, begin) for name, begin in begun if begin.model.plant().has_motor_side == twists]
+
+
+def _screened(refits: Refits, screened: Screened, laws: Sequence[Effect], leader: str) -> dict[str, list[Begin]]:
+    """The best starts of those laws that were screened, and promise something of what leads."""
+    least = refits.bench.search.seen * screened.promises.get(leader, math.inf)
+    known = [e.name for e in laws if e.name in screened.begins and screened.promises.get(e.name, 0.0) >= least]
+    return {name: list(screened.begins[name][0][:1]) for name in known}
+
+
+def _whole(model: Model, laws: Sequence[Effect]) -> dict[str, list[Begin]]:
+    """The own starts of those laws that are in proportion to no number, beside one body."""
+    whole = [effect for effect in laws if not (effect.sized or model.plant().coupled)]
+    return {e.name: [Begin(model.with_effect(e.name, p), {}) for p in e.starts(model.scales)] for e in whole}
 
 
 def _is_in_the_shade(effect: Effect, leader: str, refits: Refits, best: Mapping[str, Fit]) -> bool:

@@ -82,7 +82,18 @@ def beside_a_rival(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate,
     names = current.model.names
     if not current.model.plant().coupled or len(names) != 1 or rounds[0][0].name not in names:
         return None
-    leader, *others = rounds[0]
+    ends = _rounds_beside_rivals(bench, rounds[0])
+    if not ends:
+        return None
+    rival, ranked = min(ends, key=lambda end: priced(end[1][0].fit))
+    if priced(ranked[0].fit) >= priced(current) - bench.policy.tie:
+        return None
+    return ranked[0].fit, [(rival, *(c for c in rounds[0] if c is not rival)), tuple(ranked)]
+
+
+def _rounds_beside_rivals(bench: Bench, first: Sequence[Candidate]) -> list[tuple[Candidate, list[Candidate]]]:
+    """The best rivals of one body of a round's leader, and what a round finds beside each, if anything."""
+    leader, *others = first
     least = bench.policy.rival * leader.gain
     rivals = [c for c in others if c.name in BY_NAME and c.gain >= least and _is_quick(c)]
     ends = []
@@ -91,12 +102,7 @@ def beside_a_rival(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate,
         ranked = candidates(bench.without((rival.name, *coupling)), rival.fit)
         if ranked:
             ends.append((rival, ranked))
-    if not ends:
-        return None
-    rival, ranked = min(ends, key=lambda end: priced(end[1][0].fit))
-    if priced(ranked[0].fit) >= priced(current) - bench.policy.tie:
-        return None
-    return ranked[0].fit, [(rival, *(c for c in rounds[0] if c is not rival)), tuple(ranked)]
+    return ends
 
 
 def _is_quick(candidate: Candidate) -> bool:

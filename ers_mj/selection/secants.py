@@ -127,6 +127,18 @@ def first_order(view: View, effect: Effect, starts: Sequence[np.ndarray]) -> lis
     bends = view.place.plant().bends
     if not starts or effect.once or not effect.tangible or bends and not is_chosen(effect, starts):
         return []
+    waves, ends, changes = 2 if effect.wave else 1, view.ends(effect), _tangents(view, effect, starts)
+    told = [_shares(changes, waves, ends, target, effect.signed) for target in view.targets]
+    return [
+        max((float(shares[k]), 1.0 if bends else _size(multiples[k])) for shares, multiples in told)
+        for k in range(len(starts))
+    ]
+
+
+def _tangents(view: View, effect: Effect, starts: Sequence[np.ndarray]) -> np.ndarray:
+    """What each start changes to first order of what the run leaves (starts, N), a wave a quarter period on as well; 0
+    where the tangent has run away.
+    """
     place, motions = _of_one_body(view.place), view.run.motions
     if effect.at_motor and place is not view.place:  # along the motor's angle, of which its law is
         motions = tuple(np.ascontiguousarray(motion[:, [3, 1, 2, 3]]) for motion in motions)
@@ -134,12 +146,7 @@ def first_order(view: View, effect: Effect, starts: Sequence[np.ndarray]) -> lis
     others = [place.with_effect(effect.name, s) for s in every]
     changes = -place.changes(view.traces, OBSERVER_RATE, others, 1.0, motions).T
     changes[~(np.max(np.abs(changes), axis=1) < RUNAWAY)] = 0.0
-    waves, ends = 2 if effect.wave else 1, view.ends(effect)
-    told = [_shares(changes, waves, ends, target, effect.signed) for target in view.targets]
-    return [
-        max((float(shares[k]), 1.0 if bends else _size(multiples[k])) for shares, multiples in told)
-        for k in range(len(starts))
-    ]
+    return changes
 
 
 def is_chosen(effect: Effect, starts: Sequence[np.ndarray], tries: int | None = None) -> bool:

@@ -138,7 +138,7 @@ class _Stepwise:
         bench, current = self.bench, self.current
         self.progress(f"round {len(self.rounds) + 1}: comparing effects", 0.15 + 0.12 * len(self.rounds))
         bar = self._bar()
-        slow = () if self._may_sweep() else _bending_and_twisting(current.model)
+        slow = () if self._may_sweep() else bending_and_twisting(current.model)
         last = bench.budget.raced if is_dear(current) else math.inf
         anchors = self.anchors if not self.rounds else ()
         ranked = candidates(bench.without((*current.model.names, *slow)), current, anchors, bar.faint, last)
@@ -191,21 +191,27 @@ class _Stepwise:
         takes most of the time, once a case.
         """
         current, bench = self.current, self.bench
-        offer = ranked[0].offer if ranked else None
-        nothing = offer is None or not acceptance.is_asked_for(offer, bar, bench.policy)
-        rough = "sweep" not in self.tried and self._may_sweep() and self._is_rough_and_wrong()
-        rough = rough and not (ranked and explained.is_quiet(ranked[0].fit.misfit, bench.tau, bench.policy))
-        beside, end = bench.without(current.model.names), bench.budget.sweeps
+        nothing = not (ranked and acceptance.is_asked_for(ranked[0].offer, bar, bench.policy))
+        beside, end, rough = bench.without(current.model.names), bench.budget.sweeps, self._is_rough_and_unswept(ranked)
         if rough or nothing and self._may_sweep() and self._is_cheap_and_wrong():
             kinds = of_one_body if "sweep" in self.tried else any_body
             self.tried.add("sweep")
             return joined(ranked, swept(beside, current, ranked, end, kinds, rough))
-        if ranked and self._may_sweep() and self._may_twist() and not ranked[0].fit.model.plant().has_motor_side:
+        if self._may_sweep() and self._may_twist(ranked):
             return joined(ranked, swept(beside, current, ranked, end, of_two_bodies))
         if nothing and bench.is_doubtful(current) or self._is_an_impulse_beside(ranked):
             end = bench.budget.longest  # what has a threshold no secant shows
             return joined(ranked, swept(beside.without(SIZED), current, ranked, end, of_one_body))
         return ranked
+
+    def _is_rough_and_unswept(self, ranked: Sequence[Candidate]) -> bool:
+        """Whether a model is wrong behind a coarse converter, of which nothing was swept yet and nothing explains
+        all.
+        """
+        if "sweep" in self.tried or not self._may_sweep() or not self._is_rough_and_wrong():
+            return False
+        bench = self.bench
+        return not (ranked and explained.is_quiet(ranked[0].fit.misfit, bench.tau, bench.policy))
 
     def _is_cheap_and_wrong(self) -> bool:
         """Whether a model of one body, which is simulated fast, leaves more than noise (see whiteness.py)."""
@@ -227,13 +233,14 @@ class _Stepwise:
         ]
         return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) > self.bench.policy.beyond_rounding
 
-    def _may_twist(self) -> bool:
+    def _may_twist(self, ranked: Sequence[Candidate]) -> bool:
         """Whether a rudder whose friction bends a bristle is explained so badly that a play or a shaft may be there,
         which beside it no secant shows.
         """
         current = self.current
         near = explained.is_near_noise(current.misfit, self.bench.policy)
-        return current.model.plant().bends and not bends_and_twists(current) and not near
+        bends = current.model.plant().bends and not bends_and_twists(current) and not near
+        return bool(ranked) and bends and not ranked[0].fit.model.plant().has_motor_side
 
     def _is_an_impulse_beside(self, ranked: Sequence[Candidate]) -> bool:
         """Whether an impulse leads beside effects of one body: in the blocks where a law is missed most it may do what
@@ -352,7 +359,7 @@ def _restarted(model: Model, traces: Sequence[Trace]) -> Sequence[Trace]:
     return with_starts(model, traces) if is_rough(traces) else traces
 
 
-def _bending_and_twisting(model: Model) -> list[str]:
+def bending_and_twisting(model: Model) -> list[str]:
     """The effects that make a plant whose friction bends a bristle and whose shaft twists, which the model's has only
     one of.
     """

@@ -1,0 +1,57 @@
+"""What differs between recordings of one rig: its record state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ers_mj.data.prepared import Trace
+from ers_mj.diagnosis.sentences import shown
+from ers_mj.diagnosis.verdict import Case
+from ers_mj.selection.cross_validation import recalibrated
+from ers_mj.servo.model import STATES
+
+Ends = tuple[float | None, float | None]  # of a 95 % interval
+
+
+def record_state(case: Case, held: Sequence[Trace]) -> list[dict]:
+    """What differs between recordings beyond chance: training ones as fitted, held-out ones as recalibrated."""
+    later = [recalibrated(model, h)[1] for model, h in zip(case.confirmed.models, held)]
+    errors = case.state_errors()
+    found = ((name, *_values(case, name, errors, later)) for name in STATES)
+    return [_told(case, name, values, ci95) for name, values, ci95 in found if _differs(case, name, values, ci95)]
+
+
+def _rest(name: str) -> float:
+    """The value of a state that differs from nothing."""
+    return 0.0 if name == "offset" else 1.0
+
+
+def _values(case: Case, name: str, errors: dict, later: Sequence[dict]) -> tuple[list[float], list[Ends]]:
+    """The values of a state in each recording, training ones first, and their intervals."""
+    count, rest, unknown = len(case.start.traces), _rest(name), (None, None)
+    fitted = (case.model.states or {}).get(name, [rest] * count)
+    values = [*fitted, *(s.get(name, (rest,))[0] for s in later)]
+    ci95 = [errors.get((name, k), unknown) for k in range(count)]
+    ci95 += [tuple(s[name][1:]) if name in s else unknown for s in later]
+    return values, ci95
+
+
+def _differs(case: Case, name: str, values: Sequence[float], ci95: Sequence[Ends]) -> bool:
+    """Whether a recording's state is off beyond its interval, and by enough to be worth a line."""
+    rest, policy = _rest(name), case.policy
+    travel = case.start.fit.model.scales.position
+    least = policy.state_offset * travel if name == "offset" else policy.state_factor
+    known = ((v, low, high) for v, (low, high) in zip(values, ci95) if low is not None)
+    return any(abs(v - rest) > least and not low <= rest <= high for v, low, high in known)
+
+
+def _told(case: Case, name: str, values: Sequence[float], ci95: Sequence[Ends]) -> dict:
+    unit = case.output_unit if name == "offset" else "-"
+    lowest, highest = shown(min(values), unit), shown(max(values), unit)
+    return {
+        "name": name,
+        "unit": unit,
+        "values": [float(v) for v in values],
+        "ci95": [list(ends) for ends in ci95],
+        "sentence": f"{name.replace('_', ' ')} differs between the recordings: from {lowest} to {highest}",
+    }

@@ -1,0 +1,70 @@
+"""What a diagnosis says in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ers_mj.diagnosis.localisation import Place
+from ers_mj.diagnosis.verdict import Case
+from ers_mj.effects import BY_NAME
+
+
+def sentence(case: Case, missing: Sequence[dict], found: Sequence[Place]) -> str:
+    """One plain sentence that a mechanic would understand."""
+    if case.verdict == "consistent":
+        return "The datasheet's model explains these recordings within their noise: nothing is missing."
+    if case.verdict == "parameters_only":
+        return (
+            "Only the numbers were off: with refitted parameters the model explains these recordings within their"
+            " noise."
+        )
+    if case.verdict == "missing_physics":
+        return _of_what_is_missing(case, "; ".join(m["sentence"] for m in missing))
+    place = next((p.sentence for p in found if p.axis != "subsystem"), "it is spread over the whole record")
+    much = (
+        f"; it acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}"
+        if case.suspects
+        else f" (the best explains {case.explained:.0%} of the held-out error)"
+    )
+    return f"Something acts here that no effect of the library accounts for{much}; {place}."
+
+
+def _of_what_is_missing(case: Case, names: str) -> str:
+    if not case.told_effects:
+        return (
+            f"The sensor shows: {names}. Beside it a mismatch is left that no effect of the library accounts for."
+            if case.more_is_left
+            else f"Only the sensor shows: {names}."
+        )
+    fits, told, kind = case.fits, "held-out error", "heldout"
+    halved = math.sqrt(case.policy.half) * fits["heldout_rmse_before_rad"]
+    if fits["heldout_rmse_after_rad"] > halved and case.holdout:
+        told, kind = "held-out error, once gain, offset and friction level of that day are known,", "recalibrated"
+    before, after = (shown(fits[f"{kind}_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
+    return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
+
+
+def remainder(case: Case) -> dict:
+    """What the answer explains, and whether a mismatch is left that nothing named accounts for."""
+    words = (
+        "a mismatch is left that nothing named accounts for"
+        if case.more_is_left
+        else "nothing beyond the noise is left"
+    )
+    left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
+    return {
+        "explained_share": case.explained,
+        "significant": case.more_is_left,
+        "left_sigma": left_sigma,
+        "sentence": f"{case.explained:.0%} of the squared held-out error above the noise is explained; {words}.",
+    }
+
+
+def shown(value: float | None, unit: str) -> str:
+    """A number for a sentence: radians as degrees."""
+    if value is None:
+        return "none"
+    if unit.startswith("rad") and not unit.startswith("rad/s^2"):
+        return f"{math.degrees(value):.3g} deg{unit[3:]}"
+    return f"{value:.3g}" if unit == "-" else f"{value:.3g} {unit}"
