@@ -12,6 +12,8 @@ from ers_mj.commands.recordings import refuse_mixed_units, refuse_twice
 
 if TYPE_CHECKING:
     from ers_mj.data.recording import Recording
+    from ers_mj.diagnosis.pipeline import Diagnosis
+    from ers_mj.report.display import Unit
     from ers_mj.servo.datasheet import Datasheet
 
 FITS = (("training", "train"), ("held out", "heldout"), ("recalibrated", "recalibrated"))
@@ -74,7 +76,7 @@ def diagnose_and_tell(
     return 0
 
 
-def _write(folder: Path, document: dict, found: object, progress: Progress) -> list[Path]:
+def _write(folder: Path, document: dict, found: Diagnosis, progress: Progress) -> list[Path]:
     from ers_mj.report.diagnosis_report import report_page
     from ers_mj.servo.datasheet import write_model
     from ers_mj.view.frames import frames_of
@@ -153,7 +155,7 @@ def _told_effects(document: dict) -> list[str]:
     return [bold("missing physics"), *lines, ""] if lines else []
 
 
-def _told_interval(entry: dict, unit: object) -> str:
+def _told_interval(entry: dict, unit: Unit) -> str:
     from ers_mj.report.display import NONE, interval
 
     told = interval(entry.get("ci95"), unit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from ers_mj.commands.options import angle_deg, number, swing_deg, whole
 from ers_mj.commands.output import Progress, as_json, bold
@@ -103,10 +103,11 @@ def _settle(datasheet: Datasheet, arguments: argparse.Namespace):
     from ers_mj.control.metrics import settling_time
     from ers_mj.control.references import named
     from ers_mj.control.trial import Conditions, run_once
+    from ers_mj.plants.reduced import ReducedModel
     from ers_mj.servo.simulation import build_plant
 
-    known, plant = Servo.of(datasheet), build_plant(datasheet)
     amplitude, start = math.radians(arguments.amplitude_deg), math.radians(arguments.start_deg)
+    known, plant = Servo.of(datasheet), cast(ReducedModel, build_plant(datasheet))
     aim = named("step", amplitude, start, arguments.rate_hz)
 
     def settle(gains: Gains) -> float | None:

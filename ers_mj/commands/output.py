@@ -10,11 +10,12 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from ers_mj.errors import InputError
 
 
-def plain(x: object) -> object:
+def plain(x: object) -> Any:
     """x for JSON: numpy to Python, what is not finite to null."""
     if isinstance(x, Mapping):
         return {str(key): plain(value) for key, value in x.items()}

@@ -56,8 +56,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped."""
     if arguments.out is None and arguments.json:
-        with tempfile.TemporaryDirectory(prefix="ers-prove-") as folder:
-            return _run(Path(folder), arguments, keeps=False)
+        with tempfile.TemporaryDirectory(prefix="ers-prove-") as passing:
+            return _run(Path(passing), arguments, keeps=False)
     folder = Path(DEFAULT_OUT if arguments.out is None else arguments.out)
     if arguments.out == "":
         raise InputError("--out is empty, a folder was expected")
@@ -123,9 +123,9 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
         }
     from ers_mj.proving import case
 
-    plans = case.plans(arguments.cases or CASES, arguments.seed)
-    tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in plans]
-    return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(plans)}
+    cases = case.plans(arguments.cases or CASES, arguments.seed)
+    tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in cases]
+    return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(cases)}
 
 
 def _heed_terminate() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,7 +82,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _asked(arguments: argparse.Namespace, datasheet: Datasheet) -> tuple[list, list, list, list[str]]:
+def _asked(
+    arguments: argparse.Namespace, datasheet: Datasheet
+) -> tuple[Sequence[float], Sequence[str], Sequence[bool], list[str]]:
     """Gaps [rad], linkages, inductances, and what the default run leaves out because the datasheet cannot make it."""
     if arguments.gap is None and arguments.linkage is None and arguments.inductance is None:
         from ers_mj.validation.cases import possible

@@ -122,7 +122,8 @@ def _estimates(stream, pieces: Iterator[str], datasheet, show) -> Iterator[Estim
     from ers_mj.online.horizon import HORIZON
     from ers_mj.online.moving_horizon import Tracker, is_moving, opening
 
-    begun, tracker = (np.zeros(0),) * 3, None
+    begun: tuple[np.ndarray, ...] = (np.zeros(0),) * 3
+    tracker: Tracker | None = None
     needed = HORIZON.unknown_opening if datasheet is None else HORIZON.opening
     for piece in pieces:
         samples = stream.feed(piece)
@@ -136,7 +137,10 @@ def _estimates(stream, pieces: Iterator[str], datasheet, show) -> Iterator[Estim
                     else begun
                 )
                 continue
-            tracker, samples = Tracker(opening(*begun, datasheet, stream.units["y"] == "rad")), begun
+            tracker, samples = (
+                Tracker(opening(begun[0], begun[1], begun[2], datasheet, stream.units["y"] == "rad")),
+                begun,
+            )
             show.begin(stream.units, datasheet)
         yield from tracker.push(*samples)
     if tracker is None:
@@ -151,7 +155,8 @@ class _Lines:
     """For a pipe: what happens, and a line every so often."""
 
     def __init__(self, every: float):
-        self._every, self._next, self._last = every, -float("inf"), None
+        self._every, self._next = every, -float("inf")
+        self._last: Estimate | None = None
 
     def wait(self, t) -> None:
         """Nothing to say yet."""
@@ -200,7 +205,8 @@ class _Screen(_Lines):
     def __init__(self, name: str):
         super().__init__(0.0)
         self._name, self._drawn, self._height = name, -float("inf"), 0
-        self._history, self._events = deque(maxlen=400), deque(maxlen=6)
+        self._history: deque[Estimate] = deque(maxlen=400)
+        self._events: deque[str] = deque(maxlen=6)
         self._first: dict[str, float] = {}
 
     def wait(self, t) -> None:

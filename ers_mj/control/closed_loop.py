@@ -26,8 +26,13 @@ LOST = 4.0 * math.pi  # [rad] from the start beyond which a loop is given up as 
 class Sampled(Protocol):
     """A plant one sample at a time."""
 
-    theta: float
-    omega: float
+    @property
+    def theta(self) -> float:
+        """The rudder's angle [rad]."""
+
+    @property
+    def omega(self) -> float:
+        """Its speed [rad/s]."""
 
     def drive(self, v: float) -> float:
         """Drive acceleration [rad/s^2] with v [V] at the terminals."""

@@ -52,7 +52,7 @@ def measured(run: Run, u_max: float, ampere: float | None) -> Measures:
     where nothing tells it.
     """
     if run.lost:
-        return Measures(*[None] * 10, stable=False)
+        return Measures(*(None,) * 10, stable=False)
     r, u = run.reference, run.u
     error = run.theta - r.theta
     tail = slice(int((1.0 - 0.2) * r.t.size), None)

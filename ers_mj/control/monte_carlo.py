@@ -136,7 +136,7 @@ def scatter(
         InputError: as :func:`ers_mj.control.trial.try_out`.
     """
     count, wanted = fleet.count, (tuple(controllers), tuple(plants), tuple(cases))
-    found: list[dict[Key, Measures] | None] = [None] * count
+    found: list[dict[Key, Measures]] = [{}] * count
     if jobs <= 1:
         for k in range(count):
             progress(f"servo {k + 1} of {count}", k / count)
@@ -147,10 +147,12 @@ def scatter(
             for done, future in enumerate(as_completed(waiting), start=1):
                 found[waiting[future]] = future.result()
                 progress(f"servo {done} of {count}", done / count)
-    return [Spread(*key, tuple(measures[key] for measures in found)) for key in found[0]]
+    return [Spread(*key, measures=tuple(measures[key] for measures in found)) for key in found[0]]
 
 
-def _one(fleet: Fleet, k: int, wanted: tuple[Sequence[str], ...], conditions: Conditions) -> dict[Key, Measures]:
+def _one(
+    fleet: Fleet, k: int, wanted: tuple[Sequence[str], Sequence[str], Sequence[str]], conditions: Conditions
+) -> dict[Key, Measures]:
     """All trials of servo k: {(controller, plant, case): measures}."""
     random = np.random.default_rng([conditions.seed, k])
     sheet, effects = scattered(fleet.datasheet, conditions.effects, fleet.spread, random)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -20,7 +21,12 @@ from ers_mj.control.references import CASES, Reference, named, read_reference
 from ers_mj.errors import InputError
 from ers_mj.plants.reduced import ReducedModel
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.simulation import EffectSettings, Plant, build_plant
+from ers_mj.servo.simulation import EffectSettings, build_plant
+
+if TYPE_CHECKING:
+    from ers_mj.plants.mechanical import MechanicalPlant
+
+    Plant = ReducedModel | MechanicalPlant  # what a loop can be closed around
 
 Progress = Callable[[str, float], None]
 PLANTS = ("reduced", "mujoco")
@@ -74,6 +80,19 @@ class Trial:
     def as_document(self) -> dict:
         """As an entry of `trials`."""
         return {"controller": self.controller, "plant": self.plant, "case": self.case, **self.measures.as_document()}
+
+
+def plant_under(conditions: Conditions, datasheet: Datasheet, plant: str) -> Plant:
+    """The plant of this name under these conditions; only MuJoCo's has another linkage than the constant one."""
+    built = build_plant(
+        datasheet,
+        plant=plant,
+        effects=conditions.effects,
+        gap=conditions.gap,
+        inductance=conditions.inductance,
+        linkage=conditions.linkage if plant == "mujoco" else "constant",
+    )
+    return cast("Plant", built)
 
 
 def sampled(plant: Plant, rate_hz: float, start: tuple[float, float]) -> Sampled:
@@ -147,17 +166,7 @@ def try_out(
     """
     known = Servo.of(design or datasheet)
     ampere = datasheet.to_lumped().get("ampere")
-    built = {
-        name: build_plant(
-            datasheet,
-            plant=name,
-            effects=conditions.effects,
-            gap=conditions.gap,
-            inductance=conditions.inductance,
-            linkage=conditions.linkage if name == "mujoco" else "constant",
-        )
-        for name in plants
-    }
+    built = {name: plant_under(conditions, datasheet, name) for name in plants}
     wanted = [
         (aim, plant, controller)
         for aim in references(cases, known, conditions)

@@ -183,7 +183,7 @@ def _of_lines(recording: Recording, u: np.ndarray, y: np.ndarray, periods: int) 
     if idle.size:
         rest, noise = _cleaned(Y, idle, quiet)
         excess = np.abs(rest) ** 2 - noise
-        distorted = np.array([max(excess[_nearest(idle, k)].mean(), 0.0) for k in lines])
+        distorted = np.array([max(excess[_nearest(idle, int(k))].mean(), 0.0) for k in lines])
     spread *= periods
     total = spread + np.nan_to_num(distorted)
     size = np.abs(true) ** 2
@@ -217,7 +217,7 @@ def _cleaned(Y: np.ndarray, lines: np.ndarray, quiet: np.ndarray) -> tuple[np.nd
 
 def _nearest(lines: np.ndarray, k: int) -> slice:
     """Which LINES.neighbours of the sorted lines are nearest to k, of both sides alike."""
-    at, half = np.searchsorted(lines, k), LINES.neighbours // 2
+    at, half = int(np.searchsorted(lines, k)), LINES.neighbours // 2
     begin = min(max(at - half, 0), max(lines.size - LINES.neighbours, 0))
     return slice(begin, begin + LINES.neighbours)
 
@@ -244,21 +244,21 @@ def _of_neighbours(recording: Recording, u: np.ndarray, y: np.ndarray) -> Respon
             f"{recording.name}: its input excites no band of frequencies evenly, a frequency response needs a"
             " multisine, a sweep, steps or noise"
         )
-    k, g, variance, rest, power = (np.array(column) for column in zip(*found))
-    f_hz = k / (u.size * h)
+    lines, gains, spreads, rests, powers = (np.array(column) for column in zip(*found))
+    f_hz = lines / (u.size * h)
     differing = np.exp(2j * np.pi * f_hz * h) - 1.0
-    size, rest = np.abs(g / differing) ** 2 * power, rest / np.abs(differing) ** 2
+    size, rests = np.abs(gains / differing) ** 2 * powers, rests / np.abs(differing) ** 2
     return Response(
         recording.name,
         "local",
         1,
         f_hz,
-        g / differing,
-        size / (size + rest),
-        np.sqrt(variance) / np.abs(g),
-        np.sqrt(rest),
+        gains / differing,
+        size / (size + rests),
+        np.sqrt(spreads) / np.abs(gains),
+        np.sqrt(rests),
         np.full(f_hz.size, np.nan),
-        np.sqrt(size + rest),
+        np.sqrt(size + rests),
     )
 
 

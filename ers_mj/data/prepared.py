@@ -118,7 +118,8 @@ class Trace:
         """Samples begin..end as a trace of their own."""
         cut = slice(begin, end)
         pick = lambda a: None if a is None else a[cut]
-        kept = Signals(*(pick(a) for a in (self.t, self.u, self.y, self.valid, self.enable, self.load)))
+        signals = self.t[cut], self.u[cut], self.y[cut], self.valid[cut]
+        kept = Signals(*signals, pick(self.enable), pick(self.load))
         return replace(
             make_trace(self.name, kept, self.sigma, self.quantum),
             channels=tuple(replace(c, values=c.values[cut]) for c in self.channels),
@@ -131,21 +132,22 @@ class Trace:
         if stride <= 1:
             return self
         some, begins = slice(None, None, stride), np.arange(0, self.t.size, stride)
-        pick = lambda a: None if a is None else np.ascontiguousarray(a[some])
+        every = lambda a: np.ascontiguousarray(a[some])
+        pick = lambda a: None if a is None else every(a)
         mean = np.add.reduceat(self.u, begins) / np.diff(np.append(begins, self.t.size))
         block = self.block[some]
         return replace(
             self,
-            t=pick(self.t),
+            t=every(self.t),
             u=mean,
-            y=pick(self.y),
-            valid=pick(self.valid),
+            y=every(self.y),
+            valid=every(self.valid),
             enable=pick(self.enable),
             load=pick(self.load),
             block=block,
             counts=np.bincount(block[self.valid[some]], minlength=block[-1] + 1).astype(float),
             supply=pick(self.supply),
-            channels=tuple(replace(c, values=pick(c.values)) for c in self.channels),
+            channels=tuple(replace(c, values=every(c.values)) for c in self.channels),
         )
 
     def without(self, spans: Sequence[slice]) -> Trace:
@@ -390,7 +392,7 @@ class Blocks:
         return np.minimum(begins[:-1], self.index.size - 1), begins[:-1] == begins[1:]
 
 
-def smooth_speed(trace: Trace) -> np.ndarray:
+def smooth_speed(trace: Trace | Recording) -> np.ndarray:
     """Speed (N,) [output unit / s] by differences over about 20 ms."""
     k = max(1, round(0.01 / trace.sample_time))
     y = np.interp(trace.t, trace.t[trace.valid], trace.y[trace.valid])

@@ -11,6 +11,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class Recording:
     sha256: str = ""
     problems: tuple[str, ...] = ()
 
-    def __setstate__(self, state: dict) -> None:
+    def __setstate__(self, state: dict[str, Any]) -> None:
         """Lock the arrays again: a copy that has been to another process comes back writeable."""
         self.__dict__.update({key: locked(x) if isinstance(x, np.ndarray) else x for key, x in state.items()})
 
@@ -95,7 +96,7 @@ class Recording:
 # -- the three ways in and out --------------------------------------------------------------------------
 
 
-def read_recording(path_or_spec: str | os.PathLike, mapping: Mapping[str, str] | None = None) -> Recording:
+def read_recording(path_or_spec: str | os.PathLike[str], mapping: Mapping[str, str] | None = None) -> Recording:
     """Read one recording from CSV or Parquet.
 
     Args:
@@ -114,15 +115,15 @@ def read_recording(path_or_spec: str | os.PathLike, mapping: Mapping[str, str] |
     roles = {COLUMNS[contract].field: COLUMNS[contract] for contract in chosen}
     labels = {COLUMNS[contract].field: column for contract, column in chosen.items()}
     printed = {COLUMNS[contract].field: x for contract, x in raw.items()}
-    fields = checked({field: x * roles[field].factor for field, x in printed.items()}, labels, name)
-    units = {"input_unit": roles["u"].unit, "output_unit": roles["y"].unit}
+    fields: dict[str, Any] = checked({field: x * roles[field].factor for field, x in printed.items()}, labels, name)
+    units: dict[str, Any] = {"input_unit": roles["u"].unit, "output_unit": roles["y"].unit}
     step = converter_step(printed["y"])
     problems = problems_of(fields, printed, labels, step) + ignored(table.column_names, labels)
-    origin = {"name": name, "path": str(path), "sha256": hashlib.sha256(content).hexdigest()}
+    origin: dict[str, Any] = {"name": name, "path": str(path), "sha256": hashlib.sha256(content).hexdigest()}
     return Recording(**fields, **units, **origin, quantum=step * roles["y"].factor, problems=tuple(problems))
 
 
-def write_recording(path: str | os.PathLike, columns: Mapping[str, Sequence[float]]) -> None:
+def write_recording(path: str | os.PathLike[str], columns: Mapping[str, Sequence[float] | np.ndarray]) -> None:
     """Write columns as CSV: the header first, shortest exact decimals, missing values blank.
 
     The file appears whole or not at all.
@@ -164,11 +165,14 @@ def from_arrays(
     given = {"t": t, "u": u, "y": y, **{field: x for field, x in optional.items() if x is not None}}
     values = {field: _array(x, field, name) for field, x in given.items()}
     labels = {field: field for field in values}
-    fields = checked(values, labels, name)
-    units = {"input_unit": input_unit, "output_unit": output_unit}
+    fields: dict[str, Any] = checked(values, labels, name)
+    units: dict[str, Any] = {"input_unit": input_unit, "output_unit": output_unit}
     step = converter_step(values["y"])
     problems = problems_of(fields, values, labels, step)
-    origin = {"name": name, "sha256": hashlib.sha256(b"".join(x.tobytes() for x in values.values())).hexdigest()}
+    origin: dict[str, Any] = {
+        "name": name,
+        "sha256": hashlib.sha256(b"".join(x.tobytes() for x in values.values())).hexdigest(),
+    }
     return Recording(**fields, **units, **origin, quantum=step, problems=tuple(problems))
 
 
@@ -183,7 +187,7 @@ def _array(x: Sequence[float], field: str, name: str) -> np.ndarray:
     return array
 
 
-def read_input(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
+def read_input(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and voltage [V], each (N,), of a CSV or Parquet file with the columns t_s and u_V.
 
     Raises:

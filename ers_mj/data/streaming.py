@@ -31,7 +31,8 @@ class Stream:
 
     def __init__(self, name: str, mapping: Mapping[str, str] | None = None):
         """``mapping`` is contract name -> column, as in `read_recording`."""
-        self.name, self.units = name, {}
+        self.name = name
+        self.units: dict[str, str] = {}
         self._mapping, self._rest, self._rows = dict(mapping or {}), "", 0
         self._time, self._input = -math.inf, math.nan
 
@@ -49,7 +50,8 @@ class Stream:
                     self._read_header(line)
             elif line.strip():
                 rows.append(self._row(line))
-        return tuple(np.array(column, float) for column in zip(*rows)) if rows else (np.zeros(0),) * 3
+        t, u, y = (np.array(column, float) for column in zip(*rows)) if rows else (np.zeros(0),) * 3
+        return t, u, y
 
     def _read_header(self, line: str) -> None:
         if "\0" in line:

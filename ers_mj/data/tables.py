@@ -80,16 +80,19 @@ def _header_and_body(content: bytes, name: str) -> tuple[str, str]:
 
 
 def _cells(body: str, columns: list[str], delimiter: str, name: str) -> pa.Table:
-    ragged = []
+    ragged: list = []
+
+    def note(row):
+        ragged.append(row)
+        return "error"
+
     if not body.strip():
         raise InputError(f"{name}: has a header and no samples")
     try:
         return pa.csv.read_csv(
             io.BytesIO(body.encode()),
             read_options=pa.csv.ReadOptions(column_names=columns, use_threads=False),
-            parse_options=pa.csv.ParseOptions(
-                delimiter=delimiter, invalid_row_handler=lambda row: ragged.append(row) or "error"
-            ),
+            parse_options=pa.csv.ParseOptions(delimiter=delimiter, invalid_row_handler=note),
             convert_options=pa.csv.ConvertOptions(column_types=dict.fromkeys(columns, pa.string())),
         )
     except pa.ArrowException as error:

@@ -62,7 +62,7 @@ def diagnose(
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
-    sensors = _symptoms(recordings, start.traces, travel, policy)
+    sensors = symptoms(recordings, start.traces, travel, policy)
     chosen = select(
         start.fit,
         start.traces,
@@ -103,7 +103,7 @@ def _ordinary(model: Model, policy: Policy) -> list[str]:
     return [effect.name for effect in BY_NAME.values() if "tau_e" in effect.absorbs]
 
 
-def _symptoms(
+def symptoms(
     recordings: Sequence[Recording], traces: Sequence[Trace], travel: float, policy: Policy
 ) -> dict[str, np.ndarray]:
     """Sensor effects that show in the data itself, with their parameters (see Effect.symptom)."""

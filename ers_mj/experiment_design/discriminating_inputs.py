@@ -101,8 +101,8 @@ def designed(pairs: Sequence[Pair], bench: Bench) -> Design | None:
     order, tried = ranked(pairs, bench)
     found: list[Design] = []
     for _, excitation in order:
-        checks = [checked(pair, excitation, bench) for pair in pairs]
-        found += [Design(excitation, checks, tried)] if None not in checks else []
+        checks = [check for pair in pairs if (check := checked(pair, excitation, bench)) is not None]
+        found += [Design(excitation, checks, tried)] if len(checks) == len(pairs) else []
         if len(found) == SEARCH.checked:
             break
     return max(found, key=lambda d: d.cost, default=None)
@@ -141,7 +141,7 @@ def ranked(pairs: Sequence[Pair], bench: Bench) -> tuple[list[tuple[float, dict]
     for shares in (SHARES, GENTLE):
         wave = [excitation for shape in excitations(bench.limits, shares) for excitation in shape]
         tried += len(wave)
-        bounds += [found for excitation in wave if (found := _tried(pairs, excitation, bench)) is not None]
+        bounds += [one for excitation in wave if (one := _tried(pairs, excitation, bench)) is not None]
         if bounds:
             break
     found: list[tuple[float, dict]] = []
@@ -157,8 +157,9 @@ def _tried(pairs: Sequence[Pair], excitation: dict, bench: Bench) -> Tried | Non
     """The input on a short recording; None where a rig leaves the travel or an answer runs away."""
     length = min(bench.limits.duration, max(SEARCH.seconds, SEARCH.samples / min(bench.limits.rate_hz, SEARCH.rank_hz)))
     trace = bench.trace(excitation, length, SEARCH.rank_hz)
-    filled = {key: bench.filled(rig.model, trace) for key, rig in {id(p.rig): p.rig for p in pairs}.items()}
-    if None in filled.values():
+    rigs = {id(p.rig): p.rig for p in pairs}
+    filled = {key: made for key, rig in rigs.items() if (made := bench.filled(rig.model, trace)) is not None}
+    if len(filled) < len(rigs):
         return None
     e = [bench.misses(p.answer.model, filled[id(p.rig)]) for p in pairs]
     if not np.all(np.isfinite(np.concatenate(e))):
@@ -176,7 +177,8 @@ def _stays(pairs: Sequence[Pair], excitation: dict, bench: Bench) -> bool:
 
 def _mixed(bounds: Sequence[Tried]) -> list[Tried]:
     """By their bound, the best of every shape before the second of any."""
-    turn, out = {}, []
+    turn: dict[tuple, int] = {}
+    out = []
     for b in sorted(bounds, key=lambda b: -b.bound):
         shape = tuple(v for k, v in b.excitation.items() if k not in ("amplitude", "peak_u"))
         turn[shape] = turn.get(shape, 0) + 1

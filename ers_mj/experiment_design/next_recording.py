@@ -174,7 +174,7 @@ def _best_channel(told: Mapping[str, Mapping]) -> str | None:
     if not weak:
         return None
     worst = {name: min(c["channels_sigmas"][name] for c in weak) for name in CHANNELS}
-    best = max(worst, key=worst.get)
+    best = max(worst, key=lambda name: worst[name])
     return best if 0.5 * worst[best] ** 2 > max(SETTLED, 2 * min(c["cost"] for c in weak)) else None
 
 

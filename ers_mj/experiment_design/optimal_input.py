@@ -47,7 +47,9 @@ def reference(question: Question, name: str = "multisine") -> Plan:
     limits = question.rig.limits
     part = _named_at(name, min(_peak(name), limits.high_u), limits)
     u = np.clip(INPUTS[name](question.rig.t), limits.low_u, limits.high_u)
-    return question.checked(question.plan(u, [part], within=False), EFFORT.refits)
+    plan = question.plan(u, [part], within=False)
+    assert plan is not None  # as it need not stay within the travel
+    return question.checked(plan, EFFORT.refits)
 
 
 def planned(
@@ -201,7 +203,7 @@ def _mixtures(question: Question, plans: Sequence[Plan]) -> list[Plan]:
     gives them.
     """
     chosen = _distinct(plans)[: 4 * EFFORT.parts]
-    information = [question.information(p.u).sum(axis=0) for p in chosen]
+    information = [blocks.sum(axis=0) for p in chosen if (blocks := question.information(p.u)) is not None]
     weight, g = np.full(len(chosen), 1.0 / len(chosen)), question.gradients
     for _ in range(300):
         lead = g @ inverse(np.tensordot(weight, information, 1))

@@ -204,7 +204,8 @@ class Question:
 
     def _recording(self, u: np.ndarray) -> Trace:
         """What the rig's sensors would show under u (N,), without noise."""
-        trace, channels = _empty(self.rig, u), ()
+        trace = _empty(self.rig, u)
+        channels: tuple[Channel, ...] = ()
         plant, run = self.model.staged(trace, 0, 0.0, None)
         theta, motion = plant.outputs(trace.t, trace.u, **run)
         if self.rig.current_sigma is not None:
@@ -219,7 +220,7 @@ class Question:
         """J^T J (B, k, k) of the blocks of all channels."""
         count = max(round(self.rig.limits.duration / COUNTING.block), COUNTING.fewest_blocks)
         columns = np.split(jacobian, len(jacobian) // self.rig.t.size)
-        return sum(np.array([part.T @ part for part in np.array_split(c, count)]) for c in columns)
+        return np.asarray(sum(np.array([part.T @ part for part in np.array_split(c, count)]) for c in columns))
 
     def _trimmed(self, blocks: np.ndarray) -> np.ndarray:
         """The blocks' information (k, k) in all, where those that tell most of what is wanted count as the others."""

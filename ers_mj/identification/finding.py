@@ -61,8 +61,8 @@ class Settings:
 
     method: str = "ls"
     plant: str = "reduced"
-    fixed: Mapping[str, float] = None
-    bounds: Mapping[str, tuple[float, float]] = None
+    fixed: Mapping[str, float] | None = None
+    bounds: Mapping[str, tuple[float, float]] | None = None
     factors: tuple[float, float] = FACTORS
     budget: int | None = None
     polish: bool = False

@@ -144,8 +144,8 @@ class Search:
                 low, high = low + reach[0], high + reach[1]
             ends.append((math.exp(low), math.exp(high)) if name in IN_PROPORTION else (low, high))
         for r, i in self._moved:
-            reach = max(NEAR.start, 5.0 * self.traces[r].sigma / self.scale) * (1.0 if i == 0 else 50.0)
-            ends.append((-reach, reach))
+            far = max(NEAR.start, 5.0 * self.traces[r].sigma / self.scale) * (1.0 if i == 0 else 50.0)
+            ends.append((-far, far))
         lower, upper = np.array(ends).T
         return lower, upper
 
@@ -163,7 +163,7 @@ class Search:
         starts = [[theta_0, 0.0] if self.home and self.home[r] else list(t.start) for r, t in enumerate(self.traces)]
         for (r, i), z in zip(self._moved, x[len(self.names) :]):
             starts[r][i] += z * self.scale
-        return tuple(replace(t, start=tuple(s)) for t, s in zip(self.traces, starts))
+        return tuple(replace(t, start=(s[0], s[1])) for t, s in zip(self.traces, starts))
 
 
 @dataclass(frozen=True)

@@ -177,10 +177,9 @@ def profile(
             if rises[-1] > level:
                 break
     order = np.argsort(places)
-    at, rise = np.array(places)[order], np.array(rises)[order]
-    return Profile(
-        name, at, rise, level, (_crossing(at, rise, level, float(x[k]), -1), _crossing(at, rise, level, float(x[k]), 1))
-    )
+    along, rise = np.array(places)[order], np.array(rises)[order]
+    low, high = (_crossing(along, rise, level, float(x[k]), way) for way in (-1, 1))
+    return Profile(name, along, rise, level, (low, high))
 
 
 def _crossing(at: np.ndarray, rise: np.ndarray, level: float, best: float, way: int) -> float | None:

@@ -34,10 +34,8 @@ def rollouts(jobs: int, is_angle: bool = True, timestep: float = TIMESTEP) -> Si
     """
 
     def simulate(unknowns, candidates, traces, rate):
-        plants, parts = (
-            [plant_of(unknowns, letters, is_angle, timestep) for letters in candidates],
-            [[] for _ in candidates],
-        )
+        plants = [plant_of(unknowns, letters, is_angle, timestep) for letters in candidates]
+        parts: list[list[np.ndarray]] = [[] for _ in candidates]
         for trace in traces:
             for letters, part, motion in zip(candidates, parts, _motions(plants, trace, rate, jobs)):
                 part.append(_compared(unknowns, letters, trace, motion))

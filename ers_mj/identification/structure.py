@@ -115,7 +115,8 @@ def structure_of(slopes: np.ndarray, names: Sequence[str], doubt: np.ndarray | N
 
 def _reduced(null: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, tuple[int, ...]]:
     """Gauss-Jordan on the rows (d, k), pivots in the order of HELD_FIRST; what is all but zero becomes zero."""
-    rows, pivots = null.copy(), []
+    rows = null.copy()
+    pivots: list[int] = []
     for k in sorted(
         range(len(names)), key=lambda k: HELD_FIRST.index(names[k]) if names[k] in HELD_FIRST else len(HELD_FIRST)
     ):

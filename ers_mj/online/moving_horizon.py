@@ -127,7 +127,8 @@ class Tracker:
             if not self._t.size:
                 self._due, self._begin, self._fine = t[0] + self._shortest, t[0], t[0] + self._shortest - HORIZON.hop
             cut = min(int(np.searchsorted(t, self._due - 1e-9)) + 1, t.size)
-            if (gaps := np.flatnonzero(np.diff(t[:cut]) > max(GAP * self._model.scales.sample_time, HORIZON.hop))).size:
+            most = max(GAP * self._model.scales.sample_time, HORIZON.hop)
+            if (gaps := np.flatnonzero(np.diff(t[:cut]) > most)).size:
                 cut = int(gaps[0]) + 1
             self._t, self._u, self._y = (np.append(a, b[:cut]) for a, b in ((self._t, t), (self._u, u), (self._y, y)))
             t, u, y = t[cut:], u[cut:], y[cut:]
@@ -191,6 +192,6 @@ class Tracker:
         """
         first = int(np.searchsorted(self._t, begin - 1e-9))
         trace = windowed(self._t[first:], self._u[first:], self._y[first:], sigma)
-        explained = self._last is not None and self._last.misfit <= HORIZON.explained
-        known = self._last.state_at(trace.t[0]) if explained else None
+        last = self._last
+        known = last.state_at(trace.t[0]) if last is not None and last.misfit <= HORIZON.explained else None
         return fitted(self._model, replace(trace, start=known or fitted_start(self._model, trace)))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -103,7 +104,7 @@ class Asker:
         }
         return cost, text, complaint
 
-    def _wait(self, child: subprocess.Popen, began: float) -> tuple[int, object]:
+    def _wait(self, child: subprocess.Popen, began: float) -> tuple[int, resource.struct_rusage]:
         """(exit code, resources used) of the child, killed when its time is over."""
         while True:
             pid, status, usage = os.wait4(child.pid, os.WNOHANG)

@@ -48,11 +48,11 @@ class Setup:
     def given(self, effects: Sequence[Mapping], u: np.ndarray | None, samples: int, dt: float) -> Given:
         """What the compiled sampling reads, ``u`` [V] where the loop is open."""
         stuck, spike, gain = samples_of(effects, self.number, samples, dt)
-        closed = self.controller is not None
+        closed, controller = self.controller is not None, self.controller or {}
         return Given(
             u=np.zeros(samples) if closed else np.asarray(u, float),
             target=np.asarray(self.theta_ref, float) if closed else np.zeros(samples),
-            gains=np.array([self.controller[name] for name in CONTROLLER]) if closed else np.zeros(len(CONTROLLER)),
+            gains=np.array([controller[name] for name in CONTROLLER]) if closed else np.zeros(len(CONTROLLER)),
             closed=closed,
             noise=np.zeros(samples) if self.noise is None else np.asarray(self.noise, float),
             stuck=stuck,

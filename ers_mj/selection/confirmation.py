@@ -44,7 +44,7 @@ class Confirmed:
 
 
 @dataclass
-class _Judged:
+class Judged:
     """One effect on held-out data: the models without it, the scores with and without it, by halves of a ``record``
     where that one teaches most of it, and its p-value.
     """
@@ -60,7 +60,7 @@ def confirmed(
     start: Start, selection: Selection, held: list[Trace], jobs: int, policy: Policy = POLICY
 ) -> tuple[Selection, Confirmed]:
     """Judge each effect on held-out data; those that do not improve it beyond chance are taken out again."""
-    court = _Court(start, selection, held, jobs, policy)
+    court = Court(start, selection, held, jobs, policy)
     while True:
         model = selection.chosen.model
         after_models = court.refits(model)
@@ -78,7 +78,7 @@ def confirmed(
 
 
 @dataclass
-class _Court:
+class Court:
     """What effects are judged by: the baseline and its refits, what is held out, and what stood alone in its round."""
 
     start: Start
@@ -103,7 +103,7 @@ class _Court:
         traces = self.start.traces
         return polished(fit(model.without_effect(name), traces, tau=self.tau, steps=15), traces)
 
-    def judged(self, name: str, model: Model, after: list[Score]) -> _Judged:
+    def judged(self, name: str, model: Model, after: list[Score]) -> Judged:
         """What held-out data says of one effect; where neither it nor the free runs confirm the effect, by halves of
         the recording that teaches most of it.
         """
@@ -111,20 +111,21 @@ class _Court:
         less = self.start.fit.model if is_lone else self.without(name, model).model
         lesser_models = self.base_models if is_lone else self.refits(less)
         lesser = _scores(lesser_models, self.parts)
-        one = _Judged(lesser_models, pooled(lesser), (after, lesser), self._p_of(name, after, lesser))
-        doubtful = decisions.is_doubtful(self._numbers(one, after), self.policy)
+        one = Judged(lesser_models, pooled(lesser), (after, lesser), self.p_of(name, after, lesser))
+        doubtful = decisions.is_doubtful(self.numbers(one, after), self.policy)
         if doubtful and not self.held and len(self.start.traces) > 1:
             record, *halved = self._halved(model, less, after, lesser)
-            if (chance := self._p_of(name, *halved)) < self.policy.largest_p:
+            if (chance := self.p_of(name, *halved)) < self.policy.largest_p:
                 one.p, one.pair, one.record = chance, (halved[0], halved[1]), record
         return one
 
-    def _p_of(self, name: str, after: Sequence[Score], without: Sequence[Score]) -> float:
+    def p_of(self, name: str, after: Sequence[Score], without: Sequence[Score]) -> float:
+        """The p-value of an effect by the scores with and without it."""
         gain = score(pooled(without).misfit, 1.0) - score(pooled(after).misfit, 1.0)
         won = decisions.Won.of(gain)
         return decisions.paired_p(won, BY_NAME[name].once, name in self.alone, self.policy)
 
-    def _numbers(self, one: _Judged, after: Sequence[Score]) -> decisions.HeldOut:
+    def numbers(self, one: Judged, after: Sequence[Score]) -> decisions.HeldOut:
         """What the decision reads."""
         with_it, without = one.pair
         least = 1e-300
@@ -139,20 +140,20 @@ class _Court:
         )
 
     def is_confirmed(
-        self, name: str, one: _Judged, model: Model, after_models: Sequence[Model], after: Sequence[Score]
+        self, name: str, one: Judged, model: Model, after_models: Sequence[Model], after: Sequence[Score]
     ) -> bool:
         """Whether an effect is confirmed, and is none that few samples, a converter or any remainder would show."""
         if not decisions.is_confirmed(
-            self._numbers(one, after),
+            self.numbers(one, after),
             lambda: _halves_recalibrated(after_models, one.lesser_models, self.parts, self.policy),
             self.policy,
         ):
             return False
         return not (
-            self._may_be_none(name, model) or self._is_a_converters(name, model) or self._is_any_wave(name, model, one)
+            self.may_be_none(name, model) or self.is_a_converters(name, model) or self.is_any_wave(name, model, one)
         )
 
-    def _is_a_converters(self, name: str, model: Model) -> bool:
+    def is_a_converters(self, name: str, model: Model) -> bool:
         """Whether a sensor's error along the travel is within half a step of a converter that makes most of the noise:
         it is that converter's own.
         """
@@ -162,7 +163,7 @@ class _Court:
         y = np.concatenate([t.y[t.valid] for t in traces])
         return BY_NAME[name].is_within(dict(model.effects)[name], y, 0.5 * max(t.quantum for t in traces))
 
-    def _is_any_wave(self, name: str, model: Model, one: _Judged) -> bool:
+    def is_any_wave(self, name: str, model: Model, one: Judged) -> bool:
         """Whether a wave whose period was looked for among many does not pay for its numbers: one of them fits any
         remainder a little, held out as well, since the recordings are excited alike.
         """
@@ -175,7 +176,7 @@ class _Court:
         with_it, without = one.pair
         return delta_bic(name, model, pooled(with_it), pooled(without)) < 0.0
 
-    def _may_be_none(self, name: str, model: Model) -> bool:
+    def may_be_none(self, name: str, model: Model) -> bool:
         """Whether what acts once acts at the edge of a recording, and the interval of its size holds zero: it bends to
         whatever few samples leave.
 
@@ -217,7 +218,7 @@ class _Court:
         return record, with_it, without_it
 
     def told(
-        self, model: Model, after_models: list[Model], after: list[Score], judged: dict[str, _Judged]
+        self, model: Model, after_models: list[Model], after: list[Score], judged: dict[str, Judged]
     ) -> Confirmed:
         """What held-out data says in the end."""
         before, traces = _scores(self.base_models, self.parts), self.start.traces

@@ -138,7 +138,7 @@ class _Stepwise:
         bench, current = self.bench, self.current
         self.progress(f"round {len(self.rounds) + 1}: comparing effects", 0.15 + 0.12 * len(self.rounds))
         bar = self._bar()
-        slow = () if self._may_sweep() else _bending_and_twisting(current.model)
+        slow = () if self._may_sweep() else bending_and_twisting(current.model)
         last = bench.budget.raced if is_dear(current) else math.inf
         anchors = self.anchors if not self.rounds else ()
         ranked = candidates(bench.without((*current.model.names, *slow)), current, anchors, bar.faint, last)
@@ -359,7 +359,7 @@ def _restarted(model: Model, traces: Sequence[Trace]) -> Sequence[Trace]:
     return with_starts(model, traces) if is_rough(traces) else traces
 
 
-def _bending_and_twisting(model: Model) -> list[str]:
+def bending_and_twisting(model: Model) -> list[str]:
     """The effects that make a plant whose friction bends a bristle and whose shaft twists, which the model's has only
     one of.
     """

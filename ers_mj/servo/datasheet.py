@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from ers_mj.data.tables import write_whole
 from ers_mj.errors import InputError
@@ -71,7 +72,7 @@ class Datasheet:
         effects = tuple((name, MappingProxyType(dict(values))) for name, values in self.effects)
         object.__setattr__(self, "effects", effects)
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[Any, ...]:
         """Travel to another process as plain dictionaries."""
         effects = tuple((name, dict(values)) for name, values in self.effects)
         plain = dict(self.parameters), dict(self.lumped), self.sample_rate_hz, effects, dict(self.baseline)
@@ -115,7 +116,7 @@ FOLLOWS = {
 # -- reading -----------------------------------------------------------------------------------------------
 
 
-def read_datasheet(path: str | os.PathLike) -> Datasheet:
+def read_datasheet(path: str | os.PathLike[str]) -> Datasheet:
     """Read a datasheet or a `model.toml`; "table1" is the paper's.
 
     Raises:
@@ -138,7 +139,7 @@ def read_datasheet(path: str | os.PathLike) -> Datasheet:
     return sheet
 
 
-def _document(path: Path) -> dict:
+def _document(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
@@ -149,7 +150,7 @@ def _document(path: Path) -> dict:
         raise InputError(f"{path}: is not valid TOML ({str(error)[:120]})") from None
 
 
-def _section(document: dict, section: str, known: Iterable[str], path: Path) -> dict[str, float]:
+def _section(document: dict[str, Any], section: str, known: Iterable[str], path: Path) -> dict[str, float]:
     """One section's numbers: its keys known, no value negative or zero where that makes no sense."""
     where = f"{path}: [{section}]"
     numbers = _numbers(document.get(section, {}), where, known)
@@ -166,7 +167,7 @@ def refuse_impossible(key: str, x: float, where: str) -> None:
         raise InputError(f"{where} has {key} = 0, which no servo has")
 
 
-def _entries(document: dict, path: Path) -> list:
+def _entries(document: dict[str, Any], path: Path) -> list[object]:
     entries = document.get("effect", [])
     if not isinstance(entries, list):
         raise InputError(f"{path}: effect is {_kind(entries)}, a list of [[effect]] was expected")
@@ -205,7 +206,7 @@ def _number(x: object, where: str) -> float:
     return number
 
 
-def _refuse_unknown(table: Mapping, known: Iterable[str], noun: str, where: str) -> None:
+def _refuse_unknown(table: Mapping[str, Any], known: Iterable[str], noun: str, where: str) -> None:
     known = list(known)
     for key in table:
         if key not in known:
@@ -229,7 +230,7 @@ def _kind(x: object) -> str:
 # -- writing -----------------------------------------------------------------------------------------------
 
 
-def write_model(path: str | os.PathLike, datasheet: Datasheet) -> None:
+def write_model(path: str | os.PathLike[str], datasheet: Datasheet) -> None:
     """Write a model as TOML that `read_datasheet` reads back exactly; whole or not at all.
 
     Raises:

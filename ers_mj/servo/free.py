@@ -121,10 +121,10 @@ def _ends(name: str, parameter: Parameter, scales: Scales) -> tuple[float, float
         "frequency": 1.0 / scales.sample_time,
         "period": 2.0 * scales.position / BY_NAME[name].fewest_turns,
     }
-    most = most.get(parameter.name if parameter.kind == "position" else parameter.kind, np.inf)
+    largest = most.get(parameter.name if parameter.kind == "position" else parameter.kind, np.inf)
     least = {"position": BOUNDS.smallest * scales.noise, "frequency": BOUNDS.fewest_cycles / scales.duration}
     lower = least.get(parameter.kind, 1e-12) if parameter.positive and parameter.lower <= 0.0 else parameter.lower
-    return lower, min(parameter.upper, most)
+    return lower, min(parameter.upper, largest)
 
 
 def _near_travel(scales: Scales) -> tuple[float, float]:

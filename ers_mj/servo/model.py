@@ -76,7 +76,7 @@ class Model:
     free: tuple[str, ...]
     effects: tuple[tuple[str, np.ndarray], ...] = ()
     states: Mapping[str, np.ndarray] | None = None
-    scales: Scales | None = None
+    scales: Scales = None  # type: ignore[assignment]  # a model that is only simulated has none
     priors: Mapping[str, tuple[float, float]] | None = None
     frozen: tuple[str, ...] = ()
     local: Mapping[str, np.ndarray] | None = None
@@ -110,9 +110,9 @@ class Model:
         if f.owner == "base":
             return self.values[f.name]
         if f.owner in STATES:
-            return self.states[f.owner][f.index]
+            return (self.states or {})[f.owner][f.index]
         if f.local:
-            return self.local[f.owner][f.index // 16, f.index % 16]
+            return (self.local or {})[f.owner][f.index // 16, f.index % 16]
         return self.effects[f.index // 16][1][f.index % 16]
 
     def at_bound(self, f: Free) -> bool:
@@ -159,7 +159,7 @@ class Model:
         model = self.without_effect(name).with_effect(name, start)
         if BY_NAME[name].wave is None or not BY_NAME[name].local:
             return model
-        return replace(model, local={**model.local, name: self.local[name].copy()})
+        return replace(model, local={**(model.local or {}), name: (self.local or {})[name].copy()})
 
     def without_effect(self, name: str) -> Model:
         """The model with one effect less."""

@@ -154,7 +154,9 @@ def possible(datasheet: Datasheet) -> tuple[tuple[float, ...], tuple[str, ...], 
     words.
     """
     p, left_out = datasheet.parameters, []
-    gaps, linkages, inductances = GAPS, LINKAGES, INDUCTANCES
+    gaps: tuple[float, ...] = GAPS
+    linkages: tuple[str, ...] = LINKAGES
+    inductances: tuple[bool, ...] = INDUCTANCES
     if has_play(datasheet.effects):
         gaps = (0.0,)
         left_out.append("a gap, as the model has a play of its own")

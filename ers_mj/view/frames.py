@@ -87,7 +87,7 @@ def frames_of(plant: MechanicalPlant, evidence: Evidence) -> Frames | None:
 def worst_moments(view: RecordView) -> np.ndarray:
     """Samples (M,), in their order, of the largest differences before, apart from each other."""
     left = np.abs(view.measured - view.before) + 0.0 * view.after
-    chosen = []
+    chosen: list[int] = []
     while len(chosen) < CHOICE.moments and np.isfinite(left).any():
         k = int(np.nanargmax(left))
         chosen.append(k)
@@ -104,8 +104,5 @@ def _drawn(plant: MechanicalPlant, view: RecordView, chosen: np.ndarray, enlarge
             jpeg_bytes(painter.draw(qpos, y))
             for qpos, y in zip(film.qpos, np.concatenate([measured, measured]), strict=True)
         ]
-    rows = zip(t, measured, before, after, strict=True)
-    return tuple(
-        Frame(*map(float, row), *both)
-        for row, both in zip(rows, zip(pictures[: t.size], pictures[t.size :], strict=True), strict=True)
-    )
+    rows = zip(t, measured, before, after, pictures[: t.size], pictures[t.size :], strict=True)
+    return tuple(Frame(float(at), float(y), float(b), float(a), *both) for at, y, b, a, *both in rows)

@@ -6,6 +6,7 @@ import io
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -66,7 +67,7 @@ class Painter:
         return np.ascontiguousarray(image[::-1])
 
 
-def _context_class() -> Callable[[int, int], object]:
+def _context_class() -> Callable[[int, int], Any]:
     """What MuJoCo draws with: the user's MUJOCO_GL, else EGL on Linux, which needs no window, else the system's own."""
     wanted = os.environ.get("MUJOCO_GL", "").lower().strip()
     if sys.platform == "linux" and wanted in ("", "egl"):

@@ -80,7 +80,8 @@ class TimeOptimal(Controller):
 
     def reset(self, theta: float) -> None:
         super().reset(theta)
-        self._theta, self._speed, self._d, self._alpha, self._need = theta, 0.0, 0.0, None, 0.0
+        self._theta, self._speed, self._d, self._need = theta, 0.0, 0.0, 0.0
+        self._alpha: float | None = None
 
     # -- the observer --
 

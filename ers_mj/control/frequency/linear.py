@@ -65,21 +65,20 @@ def at(system: control.StateSpace, f_hz: np.ndarray) -> np.ndarray:
 
 def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: float, omega: float = 1.0) -> LinearPlant:
     """A plant about the angle theta [rad] while it slips at omega [rad/s], for a loop of this sample rate."""
-    reduced, c = isinstance(plant, ReducedModel), coefficients(plant)
-    if reduced:
+    c = coefficients(plant)
+    if isinstance(plant, ReducedModel):
         A, B, C = matrices(plant, theta, omega)
         load = control.ss(A, B[:, 1:], C, 0)
-        move = _flow(A, B[:, :1])
+        move, name = _flow(A, B[:, :1]), "reduced"
     else:
         A, B, C, step = transitions(plant, rate_hz, theta, omega)
         load = control.ss(A, B[:, 1:], C, 0, step)
-        move = _steps(A, B[:, :1], step)
+        move, name = _steps(A, B[:, :1], step), "mujoco"
     held = _held(move, C, 1.0 / rate_hz, c.delay)
-    for name, values in plant.effects:
-        held, load = (
-            (held * _late(values, held.dt), load * _late(values, load.dt)) if name == "sensor_lag" else (held, load)
-        )
-    return LinearPlant("reduced" if reduced else "mujoco", held, load, theta, omega, _left_out(plant))
+    for effect, values in plant.effects:
+        if effect == "sensor_lag":
+            held, load = held * _late(values, held.dt), load * _late(values, load.dt)
+    return LinearPlant(name, held, load, theta, omega, _left_out(plant))
 
 
 def coefficients(plant: ReducedModel | MechanicalPlant) -> Coefficients:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,14 +18,16 @@ from ers_mj.control.frequency.cycle import Cycle, predicted, simulated
 from ers_mj.control.frequency.describing import coulomb, leaning, plant_response, preload, rubbing
 from ers_mj.control.frequency.linear import LinearPlant, coefficients, linearised
 from ers_mj.control.frequency.loop import LOWEST_HZ, Loop, ask, close_loop
-from ers_mj.control.trial import Conditions, make_controller, refuse_late, sampled
+from ers_mj.control.trial import Conditions, make_controller, plant_under, refuse_late, sampled
 from ers_mj.data.frequency_response import Gap, Response, frequency_response, gap
 from ers_mj.data.prepared import smooth_speed
 from ers_mj.data.recording import Recording
 from ers_mj.effects.records import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.simulation import Plant, build_plant
+
+if TYPE_CHECKING:
+    from ers_mj.control.trial import Plant
 
 Progress = Callable[[str, float], None]
 
@@ -127,10 +130,10 @@ def study(
         )
     known = Servo.of(design or datasheet)
     responses = [_response(r, datasheet) for r in recordings]  # what cannot be used is refused before anything runs
-    built = {name: _build(datasheet, name, conditions) for name in plants}
+    built = {name: plant_under(conditions, datasheet, name) for name in plants}
     for plant in built.values():
         refuse_late(plant, conditions.rate_hz, SCOPE.most_late)
-    reduced = built.get("reduced") or _build(datasheet, "reduced", replace(conditions, linkage="constant"))
+    reduced = built.get("reduced") or plant_under(replace(conditions, linkage="constant"), datasheet, "reduced")
     c = coefficients(reduced)
     linear = {name: linearised(plant, conditions.rate_hz, conditions.start) for name, plant in built.items()}
     loops, cycles = [], []
@@ -146,17 +149,6 @@ def study(
         tuple(loops),
         tuple(cycles),
         tuple(_compare(*pair, built, c) for pair in zip(recordings, responses, strict=True)),
-    )
-
-
-def _build(datasheet: Datasheet, plant: str, conditions: Conditions) -> Plant:
-    return build_plant(
-        datasheet,
-        plant=plant,
-        effects=conditions.effects,
-        gap=conditions.gap,
-        inductance=conditions.inductance,
-        linkage=conditions.linkage if plant == "mujoco" else "constant",
     )
 
 

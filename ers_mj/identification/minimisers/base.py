@@ -71,7 +71,7 @@ class Meter:
         """Residuals (N,) of the objective, or of one of its stages, at one point x (k,) in its own units."""
         if self.used >= self.budget:
             raise Spent
-        e = (stage or self.objective).residuals(x)
+        e = (stage or self.objective).residuals(x)  # type: ignore[attr-defined]  # told by `minimise`
         self.used += 1
         if stage is None:
             value = float(e @ e)
