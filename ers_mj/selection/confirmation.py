@@ -217,9 +217,7 @@ class Court:
         )
         return record, with_it, without_it
 
-    def told(
-        self, model: Model, after_models: list[Model], after: list[Score], judged: dict[str, Judged]
-    ) -> Confirmed:
+    def told(self, model: Model, after_models: list[Model], after: list[Score], judged: dict[str, Judged]) -> Confirmed:
         """What held-out data says in the end."""
         before, traces = _scores(self.base_models, self.parts), self.start.traces
         by_halves = {one.record for one in judged.values() if one.record is not None}
