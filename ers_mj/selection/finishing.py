@@ -67,7 +67,7 @@ def _wider(refits: Refits, ends: dict[str, Fit], best: Mapping[str, Fit], broade
     """
     policy = refits.bench.policy
     begun = [*broader, *other_waves(ends, refits.bench.exclude)]
-    for name, found in _finished_if_near(refits, begun, {**best, **ends}):
+    for name, found in finished_if_near(refits, begun, {**best, **ends}):
         kept = ends.get(name, best.get(name))
         if kept is not None:
             tie = max(policy.tie, policy.near_tie * refits.won(kept)) if BY_NAME[name].dear else 0.0
@@ -75,7 +75,7 @@ def _wider(refits: Refits, ends: dict[str, Fit], best: Mapping[str, Fit], broade
             ends[name] = found
 
 
-def _finished_if_near(refits: Refits, begun: Sequence[tuple[str, Begin]], kept: Mapping[str, Fit]) -> list[Named]:
+def finished_if_near(refits: Refits, begun: Sequence[tuple[str, Begin]], kept: Mapping[str, Fit]) -> list[Named]:
     """Of the starts of each form of an effect the one that a few steps bring furthest, fitted to the end if it is not
     far behind what the effect, or else the leader, has won.
     """
@@ -117,11 +117,11 @@ def _to_the_floor(refits: Refits, ranked: list[Candidate]) -> list[Candidate]:
 
 def told(bench: Bench, found: Sequence[Candidate]) -> list[Candidate]:
     """Those that the recordings can show, the likeliest first."""
-    shown = (c for c in found if shows(c) and not _is_within_a_step(c, bench.traces, bench.policy))
+    shown = (c for c in found if shows(c) and not is_within_a_step(c, bench.traces, bench.policy))
     return likeliest_first(sorted(shown, key=lambda c: -c.worth), bench.policy)
 
 
-def _is_within_a_step(candidate: Candidate, traces: Sequence[Trace], policy: Policy) -> bool:
+def is_within_a_step(candidate: Candidate, traces: Sequence[Trace], policy: Policy) -> bool:
     """Whether a candidate moves the reading by less than a coarse converter's step, if it acts once, or by less than
     half a step: what is so small is no more than what a model's own error makes of the moments at which thresholds are
     passed, or of where within a step the rudder began, unless it gains much.

@@ -99,7 +99,7 @@ class _Pushes:
         out, scales = [], self.place.scales
         for form in (f for start in likely for f in (start, *self.effect.grown(self.effect.name, start, scales))):
             for level in levels:
-                form = _nearer(lambda p, level=level: self.gains(p)[level], self.effect, form)
+                form = brought_nearer(lambda p, level=level: self.gains(p)[level], self.effect, form)
             out.append(form)
         return out
 
@@ -171,7 +171,7 @@ def between(gain: Gain, pushes: Sequence[tuple[float, np.ndarray]]) -> list[tupl
     return found
 
 
-def _nearer(gain: Gain, effect: Effect, start: np.ndarray) -> np.ndarray:
+def brought_nearer(gain: Gain, effect: Effect, start: np.ndarray) -> np.ndarray:
     """An impulse's size, beginning and length, or how it fades, brought nearer: a time has no slope before it
     overlaps the mismatch.
     """

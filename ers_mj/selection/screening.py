@@ -112,7 +112,7 @@ class _Screening:
     def look_from(self, view: View, known: Columns, names: Sequence[str]) -> None:
         """Ask the effects what they promise from one place, the likeliest to first order first."""
         is_first, sparse = view.place is self.first, view.sparse()
-        scales = replace(view.place.scales, hot=_hot(view.run, self.bench))
+        scales = replace(view.place.scales, hot=hot_spans(view.run, self.bench))
         starts = {name: BY_NAME[name].starts(scales) for name in names if is_first or not BY_NAME[name].once}
         told = {
             name: first_order(sparse if BY_NAME[name].wave else view, BY_NAME[name], some)
@@ -158,7 +158,7 @@ class _Screening:
             self.promises[name] = max(self.promises.get(name, 0.0), best)
 
 
-def _hot(run: Run, bench: Bench) -> tuple[tuple[int, float, float], ...]:
+def hot_spans(run: Run, bench: Bench) -> tuple[tuple[int, float, float], ...]:
     """Spans (recording, begin [s], length [s]) around the blocks of largest misfit, where something may have struck, in
     recordings that leave enough for it.
     """

@@ -108,7 +108,7 @@ def _in_the_place_of(bench: Bench, current: Fit, ranked: Sequence[Candidate]) ->
     begun += [
         (c.name, _beside(c, current.model, leader)) for c in rivals if {*c.fit.model.names} <= {c.name, *without.names}
     ]
-    begun += [(name, model) for name in (leader, *(c.name for c in rivals)) for model in _begun_anew(name, without)]
+    begun += [(name, model) for name in (leader, *(c.name for c in rivals)) for model in begun_anew(name, without)]
     ends = bench.carried_on(
         [model for _, model in begun],
         lambda found: found.cost - current.cost <= bench.search.missed,
@@ -136,7 +136,7 @@ def _beside(candidate: Candidate, current: Model, leader: str) -> Model:
     return model
 
 
-def _begun_anew(name: str, without: Model) -> list[Model]:
+def begun_anew(name: str, without: Model) -> list[Model]:
     """A play or a shaft from its own starts beside all that has been found since: the numbers that it took alone may
     lie in a local minimum of C, from which the descent does not lead out.
     """
