@@ -1,11 +1,25 @@
-"""What tests of several files share."""
+"""What tests of several files share: baselines of the small servo of servo.py, refitted once."""
 
 import numpy as np
 import pytest
-from servo import recorded, started
+from servo import SPARSE, TRUTH, recorded, started
 
 
 @pytest.fixture(scope="session")
 def pushed():
-    """The refitted baseline of a servo that a torque of 0.05 % of its friction pushes."""
+    """A servo that a torque of 0.05 % of its friction pushes."""
     return started(recorded([("bias_torque", np.array([0.06]))]))
+
+
+@pytest.fixture(scope="session")
+def plain():
+    """A servo without missing physics."""
+    return started(recorded())
+
+
+@pytest.fixture(scope="session")
+def delayed():
+    """A servo whose drive delays and sleeps: (its baseline, its laws by name)."""
+    truth = {"drive_dead_zone": np.array([0.95, np.inf]), "input_delay": np.array([0.0157])}
+    values = {**TRUTH, "c_2": 85.0}
+    return started(recorded(list(truth.items()), values=values, t=SPARSE), values), truth

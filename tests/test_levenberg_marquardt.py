@@ -78,7 +78,7 @@ def test_a_quadratic_is_solved_in_a_step():
 def test_a_bent_valley_is_followed_to_its_end(begin):
     end, jacobians = settled(VALLEY, begin)
     assert end.z == pytest.approx([1.0, 1.0], abs=1e-6)
-    assert jacobians < 120
+    assert jacobians < 30
 
 
 def test_updated_slopes_keep_the_secant_condition():
