@@ -1,10 +1,10 @@
 """How large a gain do servos without any missing physics offer? `python analysis/null_gains.py --cases 24 --seed 1`.
 
 Draws effect-free servos (analysis/concealed_cases.py, half of them with coloured noise), fits the baseline, and refits
-every effect whose secant promises anything at all, with the gates LEAST_PROMISE of screening.py and LEAST_GAIN of
-race.py open. Prints the largest gain in C of each servo, whether no other law is offered nearly as much
-(ranking.stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that
-evaluation.paired_p assumes.
+every effect whose secant promises anything at all, with the gates `least_gain` of the policy and `least_promise` of the
+search open. Prints the largest gain in C of each servo, whether no other law is offered nearly as much
+(decisions/ordering.py, stands_alone), and (1 + misfit) / 2 of its worst block, from whose tails come the scales that
+decisions/confirmation.py, paired_p, assumes.
 """
 
 import argparse
@@ -17,15 +17,19 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from concealed_cases import main as make_cases
 
-from ers_mj import selection
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import read_recording
+from ers_mj.decisions.policy import Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import baseline
-from ers_mj.selection import moves as reviews
-from ers_mj.selection import screening
+from ers_mj.estimation.objective import tau_of
+from ers_mj.selection.bench import Bench
+from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import stands_alone
+from ers_mj.selection.search import Search
 from ers_mj.servo.datasheet import read_datasheet
+
+OPEN, ASKING_ALL = Policy(least_gain=0.0), Search(least_promise=0.0)
 
 
 def largest_gain(folder):
@@ -35,10 +39,10 @@ def largest_gain(folder):
     sheet = read_datasheet(str(folder / "datasheet.toml"))
     traces = [trace_of(read_recording(str(path)), sheet.parameters["J"]) for path in sorted(folder.glob("rec*.csv"))]
     start = baseline(traces, sheet, True)
-    found = selection.select(start.fit, start.traces, anchors=start.anchors, exclude=("inductance",))
-    ranked = [c for c in found.rounds[0] if c.name in BY_NAME] if found.rounds else []
+    bench = Bench(start.traces, tau_of(start.fit.misfit), exclude=("inductance",), policy=OPEN, search=ASKING_ALL)
+    ranked = [c for c in candidates(bench, start.fit, start.anchors) if c.name in BY_NAME]
     best = max(ranked, key=lambda c: c.gain, default=None)
-    worst = 0.5 + 0.5 * float(found.base.misfit.max())
+    worst = 0.5 + 0.5 * float(start.fit.misfit.max())
     return (best.gain, best.name, stands_alone(best, ranked), worst) if best else (0.0, "nothing", False, worst)
 
 
@@ -47,7 +51,6 @@ if __name__ == "__main__":
     parser.add_argument("--cases", type=int, default=24)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    screening.LEAST_PROMISE, selection.LEAST_GAIN, reviews.LEAST_GAIN, selection.MOST_ROUNDS = 0.0, 0.0, 0.0, 1
     gains, lone, worst = [], [], []
     with tempfile.TemporaryDirectory() as folder:
         make_cases(
