@@ -4,9 +4,11 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace, trace_of
 from ers_mj.data.recording import from_arrays
+from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start, baseline
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.selection.bench import Bench
 from ers_mj.servo.datasheet import Datasheet
 
 T = np.arange(0.0, 3.0, 1e-3)
@@ -32,3 +34,8 @@ def recorded(laws=(), values=TRUTH, names=NAMES) -> list[Trace]:
 def started(traces, values=TRUTH) -> Start:
     """The baseline, refitted to all of the traces, with what the servo is on its datasheet."""
     return baseline(traces, Datasheet(lumped=values), True, 1)
+
+
+def bench_of(traces, only=tuple(BY_NAME), tau=1.0, **settings) -> Bench:
+    """What a selection works on and by, which looks for ``only`` these effects."""
+    return Bench(traces, tau, exclude=[name for name in BY_NAME if name not in only], **settings)

@@ -1,25 +1,28 @@
 """A round: who is refitted, from where, and who leads at its end."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import NAMES, TRUTH, T, recorded, started
+from servo import NAMES, TRUTH, T, bench_of, recorded, started
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
-from ers_mj.decisions.explained import score
+from ers_mj.decisions.explained import cost
+from ers_mj.decisions.policy import POLICY
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
 from ers_mj.estimation.objective import residuals, tau_of
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.reduced import EFFORT, ReducedModel, lumped
+from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection import candidates as race
-from ers_mj.selection import screening
-from ers_mj.selection.candidates import LEAST_GAIN, candidates
+from ers_mj.selection import finishing, overlooked
+from ers_mj.selection.bench import Bench
+from ers_mj.selection.candidates import candidates
 from ers_mj.selection.multistart import more_starts, other_forms, other_waves, wider
+from ers_mj.selection.refits import Refits
 from ers_mj.selection.screening import Begin, screen
+from ers_mj.selection.search import Budget
 
 
 def test_a_wider_effect_begins_where_its_limit_ended(pushed):
@@ -74,16 +77,15 @@ def test_further_forms_are_fitted_to_the_end_where_a_few_steps_bring_them_near(p
     """Of two starts of a form the better one, and none of a law that a few steps leave far behind."""
     traces = recorded([("bias_torque", np.array([6.0]))])
     base = fit(pushed.fit.model, traces)
-    with ThreadPoolExecutor(1) as pool:
-        contest = race._Race(base, traces, tau_of(base.misfit), (), LEAST_GAIN, np.inf, pool)
-        begun = [
-            (name, Begin(base.model.with_effect(name, np.array(p)), {}))
-            for name, p in (("bias_torque", [4.0]), ("bias_torque", [-60.0]), ("sensor_lag", [0.002, np.inf]))
-        ]
-        ((_, kept),) = contest.finished(begun[:1])
-        found = contest._finished_if_near(begun, {"bias_torque": kept})
-    assert contest.won(kept) > 10.0 * LEAST_GAIN
-    assert [name for name, _ in found] == ["bias_torque"] and contest.total(found[0][1]) < contest.total(kept) + 0.1
+    refits = Refits(bench_of(traces, tau=tau_of(base.misfit)), base)
+    begun = [
+        (name, Begin(base.model.with_effect(name, np.array(p)), {}))
+        for name, p in (("bias_torque", [4.0]), ("bias_torque", [-60.0]), ("sensor_lag", [0.002, np.inf]))
+    ]
+    ((_, kept),) = refits.finished(begun[:1])
+    found = finishing.finished_if_near(refits, begun, {"bias_torque": kept})
+    assert refits.won(kept) > 10.0 * POLICY.least_gain
+    assert [name for name, _ in found] == ["bias_torque"] and refits.total(found[0][1]) < refits.total(kept) + 0.1
 
 
 def test_forms_are_compared_at_the_end(pushed):
@@ -124,28 +126,26 @@ def test_a_start_that_a_secant_made_too_small_is_no_end(pushed):
 def test_the_kin_of_a_law_that_leads_is_refitted_though_its_secant_promises_nothing(monkeypatch):
     """A limit does nothing until it is passed; what sags does much of what it does, and leads."""
     traces = recorded([("current_limit", np.array([300.0, np.inf]))])
-    start, seen = started(traces), screening.screen
+    start = started(traces)
     monkeypatch.setattr(
-        race,
-        "screen",
-        lambda places, traces, tau, exclude, *more, **settings: seen(
-            places, traces, tau, [*exclude, "current_limit"], *more, **settings
-        ),
+        race, "screen", lambda bench, *more, **settings: screen(bench.without(["current_limit"]), *more, **settings)
     )
-    monkeypatch.setattr(race, "more_starts", lambda *_: [])
-    others = [name for name in BY_NAME if name not in ("supply_sag", "current_limit")]
-    assert candidates(start.fit, start.traces, 1.0, 1, others)[0].name == "current_limit"
+    monkeypatch.setattr(overlooked, "more_starts", lambda *_: [])
+    bench = bench_of(start.traces, only=("supply_sag", "current_limit"))
+    assert candidates(bench, start.fit)[0].name == "current_limit"
 
 
 def test_a_race_ends_when_enough_has_been_simulated():
     start = started(recorded([("input_delay", np.array([0.012]))], names=("multisine", "steps")))
-    tau, efforts, told = tau_of(start.fit.misfit), [], []
+    efforts, told = [], []
     for last in (np.inf, 0.0):
-        before = EFFORT.spent
-        told.append(candidates(start.fit, start.traces, tau, 1, (), (), LEAST_GAIN, last))
-        efforts.append(EFFORT.spent - before)
+        budget = Budget(start.traces)
+        base = replace(start.fit, model=replace(start.fit.model, effort=budget.effort))
+        bench = Bench(start.traces, tau_of(base.misfit), budget=budget)
+        told.append(candidates(bench, base, (), POLICY.least_gain, last))
+        efforts.append(budget.spent)
     assert efforts[1] < 0.8 * efforts[0]
-    assert told[1] and told[1][0].gain > 0.5 * told[0][0].gain > LEAST_GAIN  # what was begun is told
+    assert told[1] and told[1][0].gain > 0.5 * told[0][0].gain > POLICY.least_gain  # what was begun is told
 
 
 def test_a_stop_that_is_touched_once_is_no_knock(monkeypatch):
@@ -171,7 +171,7 @@ def test_a_stop_that_is_touched_once_is_no_knock(monkeypatch):
         return replace(found, promises={"load_disturbance": found.promises["load_disturbance"]})
 
     monkeypatch.setattr(race, "screen", knocks)
-    ranked = candidates(start.fit, start.traces, tau_of(start.fit.misfit), 1, (), (), LEAST_GAIN)
+    ranked = candidates(Bench(start.traces, tau_of(start.fit.misfit)), start.fit, (), POLICY.least_gain)
     assert ranked[0].name == "end_stop" and dict(ranked[0].fit.model.effects)["end_stop"][1] == pytest.approx(
         upper, abs=1e-3
     )
@@ -182,7 +182,7 @@ def test_a_search_that_is_given_up_still_tells_the_cost_that_was_asked_for(pushe
     far = replace(pushed.fit.model, values={**pushed.fit.model.values, "a_1": 2.5, "b": 7.0})
     left = fit(far, pushed.traces, tau=1.0, steps=1, ceiling=pushed.fit.misfit)
     assert float(np.exp(np.mean(np.log(left.misfit + 1.0)))) > 10.0  # it ended at a stage far above
-    assert left.cost == pytest.approx(float(score(left.misfit, 1.0).sum()))
+    assert left.cost == pytest.approx(cost(left.misfit, 1.0))
 
 
 def test_a_soft_knee_is_found_that_a_plain_clip_does_little_of(monkeypatch):
@@ -192,8 +192,8 @@ def test_a_soft_knee_is_found_that_a_plain_clip_does_little_of(monkeypatch):
     knee = max(float(np.max(np.abs(INPUTS[name](T)))) for name in NAMES)
     traces = recorded([("voltage_saturation", np.array([knee, 6.0]))])
     start = started(traces)
-    monkeypatch.setattr(race, "wider", lambda *_: [])
-    found = candidates(start.fit, start.traces, 1.0, 1, [name for name in BY_NAME if name != "voltage_saturation"])[0]
+    monkeypatch.setattr(finishing, "wider", lambda *_: [])
+    found = candidates(bench_of(start.traces, only=["voltage_saturation"]), start.fit)[0]
     assert dict(found.fit.model.effects)["voltage_saturation"] == pytest.approx([knee, 6.0], rel=0.1)
 
 
@@ -201,13 +201,11 @@ def test_a_hinge_moment_that_grows_more_slowly_is_told_as_one():
     """Begun as a plain cubic; one that stays one gets no second number."""
     for truth in ([300.0, 0.5], [300.0, np.inf]):
         start = started(recorded([("hinge_moment_cubic", np.array(truth))]))
-        found = candidates(start.fit, start.traces, 1.0, 1, [name for name in BY_NAME if name != "hinge_moment_cubic"])[
-            0
-        ]
+        found = candidates(bench_of(start.traces, only=["hinge_moment_cubic"]), start.fit)[0]
         assert dict(found.fit.model.effects)["hinge_moment_cubic"] == pytest.approx(truth, rel=0.1)
 
 
 def test_a_drag_may_have_an_exponent_of_its_own():
     start = started(recorded([("quadratic_drag", np.array([1.0, 2.4]))]))
-    found = candidates(start.fit, start.traces, 1.0, 1, [name for name in BY_NAME if name != "quadratic_drag"])[0]
+    found = candidates(bench_of(start.traces, only=["quadratic_drag"]), start.fit)[0]
     assert dict(found.fit.model.effects)["quadratic_drag"] == pytest.approx([1.0, 2.4], rel=0.1)

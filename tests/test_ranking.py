@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from servo import recorded, started
 
+from ers_mj.decisions.policy import POLICY
 from ers_mj.effects import BY_NAME
-from ers_mj.selection import stepwise as selection
-from ers_mj.selection.comparison import CURVED, judged, likeliest, likeliest_first, shows, stands_alone
+from ers_mj.selection.comparison import judged, likeliest, likeliest_first, shows, stands_alone
 from ers_mj.selection.posterior import probabilities
+from ers_mj.selection.stepwise import select
 
 
 def test_a_shaft_that_twists_by_less_than_the_noise_is_none(pushed):
@@ -65,7 +66,7 @@ def test_a_torque_that_bends_along_the_travel_is_gravity(pushed):
         cost = float(np.sum(np.log(1.0 + fits["gravity_imbalance"].misfit)))
         bent = replace(
             fits["gravity_imbalance"],
-            misfit=(1.0 + fits["gravity_imbalance"].misfit) * CURVED ** (-better / pushed.fit.misfit.size) - 1.0,
+            misfit=(1.0 + fits["gravity_imbalance"].misfit) * POLICY.curved ** (-better / pushed.fit.misfit.size) - 1.0,
         )
         assert (
             float(np.sum(np.log(1.0 + bent.misfit))) < cost and likeliest({**fits, "gravity_imbalance": bent}) == first
@@ -97,9 +98,9 @@ def test_a_faint_law_beside_an_effect_must_stand_alone():
     start = started(
         recorded([("quadratic_drag", np.array([1.0, np.inf])), ("load_dependent_friction", np.array([0.01, np.inf]))])
     )
-    found = selection.select(start.fit, start.traces, jobs=1)
+    found = select(start.fit, start.traces, jobs=1)
     assert found.chosen.model.names == ("quadratic_drag", "load_dependent_friction")
-    assert selection.FAINT_GAIN < found.rounds[1][0].gain < selection.LATER_GAIN
+    assert POLICY.faint_gain < found.rounds[1][0].gain < POLICY.later_gain
     first, second = replace(found.rounds[1][0], gain=2.0), replace(found.rounds[0][1], name="stribeck", gain=1.5)
     assert stands_alone(first, (first, replace(second, gain=1.2))) and not stands_alone(first, (first, second))
     assert stands_alone(first, (first, replace(first, name="stribeck")))  # which leaves the same in all blocks

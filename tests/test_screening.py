@@ -4,35 +4,32 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import TRUTH, T, recorded, started
+from servo import TRUTH, T, bench_of, recorded, started
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
-from ers_mj.decisions.explained import score
+from ers_mj.decisions.explained import score, stands_out
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import baseline
-from ers_mj.estimation.objective import residuals, residuals_in, run_of
+from ers_mj.estimation.objective import Run, residuals, residuals_in, run_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.selection import screening
-from ers_mj.selection.impulse_search import NEARER, Surroundings, _nearer, between
-from ers_mj.selection.screening import (
-    Screened,
-    _first_order,
-    _hopeful,
-    _hot,
-    _promise,
-    _sparse,
-    _targets,
-    screen,
-    stands_out,
-)
+from ers_mj.selection import screening, secants
+from ers_mj.selection.impulse_search import NEARING, Surroundings, between, brought_nearer
+from ers_mj.selection.screening import Screened, hot_spans, screen
+from ers_mj.selection.search import SEARCH
+from ers_mj.selection.secants import first_order, hopeful, promise, view_of
 from ers_mj.servo.datasheet import read_datasheet
+
+
+def seen_from(model, traces):
+    """What a model shows of the traces."""
+    return view_of(run_of(model, traces, 5.0), traces, 1.0)[0]
 
 
 def test_a_place_far_from_the_data_takes_no_candidate_from_one_near_it(pushed):
     near, far = pushed.fit.model, replace(pushed.fit.model, values={**pushed.fit.model.values, "b": 60.0})
-    alone, both = (screen(places, pushed.traces, 1.0, (), False, False) for places in ([near], [near, far]))
+    alone, both = (screen(bench_of(pushed.traces), places, False, False) for places in ([near], [near, far]))
     assert "bias_torque" in alone.promising() and set(alone.promising()) <= set(both.promising())
     best = [name for name in both.promising() if both.promises[name] >= 0.5 * max(both.promises.values())]
     assert "bias_torque" in best and all(len(both.begins[name]) == 2 for name in best if not BY_NAME[name].dear)
@@ -40,8 +37,8 @@ def test_a_place_far_from_the_data_takes_no_candidate_from_one_near_it(pushed):
 
 def test_where_much_is_missing_what_promises_least_is_not_screened_from_every_place(pushed):
     near, far = pushed.fit.model, replace(pushed.fit.model, values={**pushed.fit.model.values, "b": 60.0})
-    alone, both = (screen(places, pushed.traces, 1.0, (), True, False) for places in ([near], [near, far]))
-    bar = screening.LESS * max(alone.promises.values())
+    alone, both = (screen(bench_of(pushed.traces), places, True, False) for places in ([near], [near, far]))
+    bar = SEARCH.less * max(alone.promises.values())
     again = {name: len(both.begins[name]) for name in alone.begins if not (BY_NAME[name].dear or BY_NAME[name].once)}
     assert all(count == 1 for name, count in again.items() if alone.promises[name] < bar) and set(again.values()) == {
         1,
@@ -64,17 +61,8 @@ def test_a_small_wave_is_promised_by_a_large_start():
             )
         )
     start = started(traces)
-    place, traces = start.fit.model, start.traces
-    e = residuals(place, traces, 5.0)
-    share, model = _promise(
-        place,
-        BY_NAME["cogging"],
-        np.array([30.0, cog[1], 0.0, np.inf, np.inf]),
-        1.0,
-        e,
-        _targets(place, e, traces, 1.0)[1],
-        traces,
-    )
+    view = seen_from(start.fit.model, start.traces)
+    share, model = promise(view, BY_NAME["cogging"], np.array([30.0, cog[1], 0.0, np.inf, np.inf]), 1.0)
     A, _, phase = dict(model.effects)["cogging"][:3]
     assert share > 0.3 and abs(A * np.exp(1j * phase) - np.exp(1.3j)) < 0.3
 
@@ -84,20 +72,16 @@ def test_a_tangent_that_runs_away_promises_nothing(pushed, monkeypatch):
     compared.
     """
     model, effect = pushed.fit.model, BY_NAME["load_dependent_friction"]
-    run = run_of(model, pushed.traces, 5.0)
+    view, changes = seen_from(model, pushed.traces), type(model).changes
     starts = [size * effect.starts(model.scales)[0] for size in (1.0, 1.1, 1.2, 1.3, 1.4)]
-    targets, changes = _targets(model, run.left, pushed.traces, 1.0)[1], type(model).changes
-    assert len(_first_order(run, targets, pushed.traces, effect, starts)) == 5
-    monkeypatch.setattr(
-        type(model), "changes", lambda *a: changes(*a) + np.where(np.arange(len(starts)) == lost, size, 0.0)
-    )
-    for lost, size in ((0, np.inf), (0, np.nan), (2, 1e200)):  # noqa: B007
-        told = _first_order(run, targets, pushed.traces, effect, starts)
+    assert len(first_order(view, effect, starts)) == 5
+    for lost, size in ((0, np.inf), (0, np.nan), (2, 1e200)):
+        astray = np.where(np.arange(len(starts)) == lost, size, 0.0)
+        monkeypatch.setattr(type(model), "changes", lambda *a, astray=astray: changes(*a) + astray)
+        told = first_order(view, effect, starts)
         shares = [share for share, _ in told]
-        assert (
-            shares[lost] == 0.0 < np.min(np.delete(shares, lost))
-            and len(some := _hopeful(effect, starts, told, 3)) == 3
-        )
+        assert shares[lost] == 0.0 < np.min(np.delete(shares, lost))
+        assert len(some := hopeful(effect, starts, told, 3)) == 3
         assert all(start is not starts[lost] for start, _ in some)
 
 
@@ -109,16 +93,15 @@ def test_the_first_order_tells_the_size_at_which_a_secant_is_taken(pushed, monke
         replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}),
         recorded([("quadratic_drag", acts)]),
     )
-    run = run_of(model, traces, 5.0)
-    targets = _targets(model, run.left, traces, 1.0)[1]
+    view = seen_from(model, traces)
     monkeypatch.setattr(
-        screening, "residuals", lambda m, *a: tried.append(dict(m.effects)["quadratic_drag"][0]) or residuals(m, *a)
+        secants, "residuals", lambda m, *a: tried.append(dict(m.effects)["quadratic_drag"][0]) or residuals(m, *a)
     )
     for times in (0.5, 1.0, 20.0):
         start = np.append(times * acts[0], acts[1:])
-        ((share, size),) = _first_order(run, targets, traces, effect, [start])
-        promise, found = _promise(model, effect, start, size, run.left, targets, traces)
-        assert share > 0.3 and promise > 0.3 and 0.5 < dict(found.effects)["quadratic_drag"][0] / acts[0] < 2.0
+        ((share, size),) = first_order(view, effect, [start])
+        promised, found = promise(view, effect, start, size)
+        assert share > 0.3 and promised > 0.3 and 0.5 < dict(found.effects)["quadratic_drag"][0] / acts[0] < 2.0
     assert len(tried) == 3 and np.ptp(tried) < 0.05 * np.mean(tried)
 
 
@@ -130,11 +113,10 @@ def test_waves_are_told_apart_by_half_the_samples(pushed):
     )
     traces = recorded([("periodic_gust", np.append(gust[1][:3], np.full(len(effect.parameters) - 3, np.inf)))])
     model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH})
-    run = run_of(model, traces, 5.0)
-    whole = run, _targets(model, run.left, traces, 1.0)[1], traces
-    sparse, starts = _sparse(*whole), effect.starts(model.scales)
-    assert traces[0].sample_time < 0.0015 < 0.0019 < sparse[2][0].sample_time
-    all_told, told = ([share for share, _ in _first_order(*some, effect, starts)] for some in (whole, sparse))
+    whole = seen_from(model, traces)
+    sparse, starts = whole.sparse(), effect.starts(model.scales)
+    assert traces[0].sample_time < 0.0015 < 0.0019 < sparse.traces[0].sample_time
+    all_told, told = ([share for share, _ in first_order(some, effect, starts)] for some in (whole, sparse))
     assert np.argmax(told) == np.argmax(all_told) and np.max(np.abs(np.subtract(told, all_told))) < 0.1 * max(all_told)
 
 
@@ -144,9 +126,9 @@ def test_what_promises_next_to_nothing_to_first_order_is_not_simulated(pushed, m
     """
     tried = []
     monkeypatch.setattr(
-        screening, "_promise", lambda place, effect, *a: tried.append(effect.name) or _promise(place, effect, *a)
+        screening, "promise", lambda view, effect, *a: tried.append(effect.name) or promise(view, effect, *a)
     )
-    found = screen([pushed.fit.model], pushed.traces, 1.0, (), False, False)
+    found = screen(bench_of(pushed.traces), [pushed.fit.model], False, False)
     assert "bias_torque" in tried and "bias_torque" in found.promising()
     assert (
         not {"sensor_lag", "drive_dead_zone"} & {*tried}
@@ -179,12 +161,10 @@ def test_beside_a_shaft_the_starts_of_a_wave_are_chosen_along_the_motion_of_one_
     period, shaft = 0.03, ("shaft_compliance", np.array([20.0, 0.1, 0.5, 0.2, np.inf]))
     traces = recorded([shaft, ("cogging", np.array([12.0, period, 0.4, np.inf, np.inf]))])
     model = replace(pushed.fit.model, values={**pushed.fit.model.values, **TRUTH}).with_effect(*shaft)
-    run, effect = run_of(model, traces, 5.0), BY_NAME["cogging"]
-    starts, targets = effect.starts(model.scales), _targets(model, run.left, traces, 1.0)[1]
-    chosen = [
-        start[1]
-        for start, _ in _hopeful(effect, starts, _first_order(*_sparse(run, targets, traces), effect, starts), 3)
-    ]
+    view, effect = seen_from(model, traces), BY_NAME["cogging"]
+    starts = effect.starts(model.scales)
+    told = first_order(view.sparse(), effect, starts)
+    chosen = [start[1] for start, _ in hopeful(effect, starts, told, 3)]
     assert len(chosen) == 3 and min((start[1] for start in starts), key=lambda p: abs(1.0 / p - 1.0 / period)) in chosen
 
 
@@ -209,7 +189,7 @@ def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed):
         values={**pushed.fit.model.values, **TRUTH},
         scales=replace(pushed.fit.model.scales, recordings=1),
     )
-    (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
+    (begins,) = screen(bench_of([still], only=["load_disturbance"]), [model], False, True).begins["load_disturbance"]
     size, begin, length, record, fade = dict(begins[0].model.effects)["load_disturbance"]
     assert (
         size == pytest.approx(-300.0, rel=0.3)
@@ -233,7 +213,7 @@ def test_a_knock_that_fades_is_found_where_it_throws_a_resting_rudder(pushed, si
         values={**pushed.fit.model.values, **TRUTH},
         scales=replace(pushed.fit.model.scales, recordings=1),
     )
-    (begins,) = screen([model], [still], 1.0, (), False, True).begins["load_disturbance"]
+    (begins,) = screen(bench_of([still], only=["load_disturbance"]), [model], False, True).begins["load_disturbance"]
     found = [dict(begin.model.effects)["load_disturbance"] for begin in begins]
     fading = next(p for p in found if np.isfinite(p[4]))
     assert (
@@ -291,21 +271,26 @@ def test_a_knock_is_brought_nearer_within_its_bounds_and_no_longer_than_it_pays(
         return 1.0 / push[4]
 
     fade = effect.parameters[4]
-    assert _nearer(gain, effect, start)[4] == fade.lower and fade.lower <= min(tried) and max(tried) <= fade.upper
+    assert (
+        brought_nearer(gain, effect, start)[4] == fade.lower and fade.lower <= min(tried) and max(tried) <= fade.upper
+    )
     tried.clear()
-    _nearer(lambda push: tried.append(push[4]) or 0.0, effect, start)
-    assert len(tried) < NEARER / 4
+    brought_nearer(lambda push: tried.append(push[4]) or 0.0, effect, start)
+    assert len(tried) < NEARING.simulations / 4
 
 
 def test_knocks_are_looked_for_where_a_recording_leaves_enough(pushed):
     noise = 0.9 * np.random.default_rng(1).standard_normal(sum(t.rows for t in pushed.traces))
-    assert _hot(noise, pushed.traces, 1.0) == ()
-    noise[pushed.traces[0].rows + 1000 :][:60] += 10.0
-    assert (
-        {(record, begin) for record, begin, _ in _hot(noise, pushed.traces, 1.0)}
-        <= {(1, 0.75), (1, 1.0), *((1, 0.25 * k) for k in range(12))}
-        != set()
-    )
+
+    def hot():
+        return {(record, begin) for record, begin, _ in hot_spans(run, bench_of(pushed.traces))}
+
+    run, struck = Run(pushed.fit.model, noise, ()), noise[pushed.traces[0].rows + 1000 :][:60]
+    assert hot() == set()
+    struck += 10.0
+    assert hot() == set()  # half of what an impulse must buy is more than that
+    struck += 10.0
+    assert (1, 1.0) in hot() and {record for record, _ in hot()} == {1}
 
 
 def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
@@ -324,5 +309,5 @@ def test_what_a_parameter_at_its_bound_cannot_follow_is_left_to_an_effect():
     start = baseline(traces, read_datasheet("table1"), True, 1)
     model = start.fit.model
     assert [f.name for f in model.layout() if model.at_bound(f)] == ["tau_e"]
-    promises = screen([model], start.traces, 1.0, (), True, False).promises
+    promises = screen(bench_of(start.traces), [model], True, False).promises
     assert max(promises, key=promises.get) == "inductance"
