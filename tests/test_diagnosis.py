@@ -14,7 +14,7 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
 
-T = np.arange(0.0, 4.0, 1e-3)
+T = np.arange(0.0, 4.0, 2e-3)
 TRUTH = {
     "a_1": 25.0,
     "a_2": 50.0,
@@ -25,7 +25,7 @@ TRUTH = {
     "tau_e": 9e-4,
     "emf_share": 0.94,
 }
-NOISE = 1.5e-4
+NOISE = 1e-4
 
 
 def recordings(effects=(), sensor=lambda y: y, names=("multisine", "steps", "chirp")):
@@ -140,7 +140,7 @@ def test_what_the_library_has_no_name_for_is_unexplained(step):
     rng = np.random.default_rng(4)
     out = []
     for r in recordings():
-        hops = np.repeat(rng.choice([-25.0, 25.0], 40), 100)
+        hops = np.repeat(rng.choice([-25.0, 25.0], 40), T.size // 40)
         plant = ReducedModel(lumped(TRUTH))
         y = plant.theta(T, r.u, (TRUTH["theta_0"], 0.0), load=hops) + NOISE * rng.standard_normal(T.size)
         out.append(from_arrays(T, r.u, np.round(y / step) * step if step else y, name=r.name))
