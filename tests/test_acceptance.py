@@ -1,35 +1,32 @@
-"""What a round asks for, by numbers alone."""
+"""Which candidate of a round is named, by numbers alone."""
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from ers_mj.decisions import acceptance
-from ers_mj.decisions.acceptance import Bar, Offer
+from ers_mj.decisions.acceptance import Bar, Offer, asked, bar, is_asked_for, is_steady, least_of
 from ers_mj.decisions.policy import POLICY
-from ers_mj.effects import BY_NAME
-from ers_mj.selection.comparison import Candidate, stands_alone
 
-BESIDE = Bar(usual=4.0, faint=1.5, z=2.0, outstanding=False, beside=True)
+FIRST = Bar(usual=3.0, faint=3.0, z=1.7, outstanding=False, beside=False)
+LATER = Bar(usual=4.0, faint=1.5, z=2.0, outstanding=False, beside=True)
 
 
-def named(ranked, bar):
-    """The name that these candidates are asked for at this bar, None where none is."""
-    alone = [c.gain < bar.usual and stands_alone(c, ranked) for c in ranked]
-    offer, because = acceptance.asked([c.offer for c in ranked], alone, bar)
+def law(name="stribeck", gain=5.0, z=3.0, lost=0.0, best=3.0, **kind):
+    return Offer(name, gain, z, lost, best, size=7, **kind)
+
+
+def knock(gain=5.0, best=4.0, **kind):
+    return Offer("load_disturbance", gain, 1.0, 0.1, best, size=7, once=True, clocked=True, **kind)
+
+
+def named(offers, bar, alone=None, policy=POLICY):
+    found, because = asked(offers, alone or [False] * len(offers), bar, policy)
     assert because
-    return offer and offer.name
-
-
-def beside(found, name):
-    """A fit with the first start of an effect beside it."""
-    scales = replace(found.model.scales, hot=((0, 1.0, 0.1),))
-    return replace(found, model=found.model.with_effect(name, BY_NAME[name].starts(scales)[0]))
+    return found.name if found else None
 
 
 @pytest.mark.parametrize(
-    "gain, z, lost, asked",
+    "gain, z, lost, wanted",
     [
         (8.8, 1.6, 2.0, True),
         (8.8, 1.6, 3.0, False),
@@ -38,85 +35,86 @@ def beside(found, name):
         (2.9, 4.0, 0.0, False),
     ],
 )
-def test_what_acts_in_few_blocks_may_lose_more_where_it_wins_much(gain, z, lost, asked):
+def test_what_acts_in_few_blocks_may_lose_more_where_it_wins_much(gain, z, lost, wanted):
     """As a stop that one recording reaches does, whose z-score cannot be large."""
-    bar = Bar(usual=3.0, faint=3.0, z=1.7, outstanding=False, beside=False)
-    assert acceptance.is_asked_for(Offer("end_stop", gain, z, lost, 4.0, 8), bar) is asked
-
-
-@pytest.mark.parametrize("gain, first", [(9.9, "drive_dead_zone"), (4.9, "load_disturbance")])
-def test_a_knock_gives_way_to_a_law_that_explains_more(pushed, gain, first):
-    """The law loses too much elsewhere to be asked for by itself; that something is missing the knock has shown."""
-    dead, knocked = (beside(pushed.fit, name) for name in ("drive_dead_zone", "load_disturbance"))
-    ranked = [
-        Candidate("drive_dead_zone", dead, gain, 1.7, 0.4 * gain, 3.0),
-        Candidate("load_disturbance", knocked, 4.4, 1.0, 0.1, 4.0),
-    ]
-    assert named(ranked, BESIDE) == first
-    assert named(ranked[:1], BESIDE) is None
-
-
-@pytest.mark.parametrize("gain, first", [(8.1, "voltage_saturation"), (8.3, "load_disturbance")])
-def test_a_knock_gives_way_to_a_law_that_is_asked_for_as_well(pushed, gain, first):
-    """It chooses its moment, so that it must be well ahead; not where nothing is named yet, since what has no law may
-    look like both.
-    """
-    delayed = beside(pushed.fit, "input_delay")
-    ranked = [
-        Candidate("load_disturbance", delayed, gain, 1.4, 0.0, 3.0),
-        Candidate("end_stop", delayed, 5.3, 1.0, 4.0, 3.0),
-        Candidate("voltage_saturation", delayed, 5.2, 1.5, 0.1, 3.0),
-    ]
-    assert named(ranked, BESIDE) == first
-    assert named(ranked, Bar(3.0, 3.0, 1.7, outstanding=False, beside=False)) == "load_disturbance"
+    assert is_asked_for(law(gain=gain, z=z, lost=lost), FIRST) is wanted
 
 
 @pytest.mark.parametrize(
-    "name, gain, z, asked",
+    "gain, best, outstanding, left, wanted",
     [
-        ("drive_dead_zone", 3.6, 3.3, True),
-        ("drive_dead_zone", 3.6, 2.7, False),
-        ("drive_dead_zone", 2.8, 4.0, False),
-        ("gain", 3.6, 3.3, False),
+        (6.1, 3.0, False, 3.0, True),
+        (5.9, 3.0, False, 3.0, False),  # below the peak it must gain more than a law
+        (1.6, 3.5, False, 3.0, True),  # above it half of what a law must, where little else is left
+        (1.4, 3.5, False, 3.0, False),
+        (6.1, 3.5, False, 9.0, False),  # but all of what matters where that is a share of much
+        (6.1, 3.5, True, 9.0, True),  # unless its block stands out of that
+        (5.9, 3.5, True, 9.0, False),
     ],
 )
-def test_beside_an_effect_a_law_may_buy_less_where_it_buys_it_nearly_everywhere(pushed, name, gain, z, asked):
-    """A rival buys nearly as much, so that it does not stand alone; what differs between recordings is no law."""
-    dead = beside(pushed.fit, "drive_dead_zone")
-    rival = replace(dead, misfit=dead.misfit + 1.0)
-    ranked = [Candidate(name, dead, gain, z, 0.5, 0.4), Candidate("stribeck", rival, 0.9 * gain, 2.0, 0.5, 0.4)]
-    assert (named(ranked, BESIDE) == name) is asked
-    assert named(ranked, Bar(4.0, 4.0, 1.7, outstanding=False, beside=False)) is None
+def test_an_impulse_gains_much_or_what_no_fork_makes(gain, best, outstanding, left, wanted):
+    at = replace(FIRST, usual=left, faint=left, outstanding=outstanding)
+    assert is_asked_for(knock(gain, best), at) is wanted
 
 
-def test_where_the_model_stays_wrong_a_further_effect_must_take_a_good_part():
-    """Of 100 C that are left a tenth is enough in order, a sixth of a third effect, and a good part out of order; of
-    hardly any what is more than chance. What is dear to simulate has no faint effects beside it.
+@pytest.mark.parametrize("gain, first", [(9.9, "drive_dead_zone"), (4.9, "load_disturbance")])
+def test_a_knock_gives_way_to_a_law_that_explains_more(gain, first):
+    """The law loses too much elsewhere to be asked for by itself; that something is missing the knock has shown."""
+    dead = law("drive_dead_zone", gain, z=1.7, lost=0.4 * gain)
+    assert named([dead, knock(4.4)], replace(LATER, faint=4.0)) == "load_disturbance" or gain > 9.0
+    assert named([dead, replace(knock(4.4), is_effect=True)], LATER) == first
+    assert named([dead], LATER) is None
+    assert named([dead, knock(4.4)], replace(LATER, beside=False)) is None  # the first round names its leader or none
+
+
+@pytest.mark.parametrize("gain, first", [(8.1, "voltage_saturation"), (8.3, "load_disturbance")])
+def test_a_knock_gives_way_to_a_law_that_is_asked_for_as_well(gain, first):
+    """It chooses its moment, so that it must be well ahead; not where nothing is named yet, since what has no law may
+    look like both.
     """
-
-    def gains(left, named, dear=False, in_order=True):
-        bar = acceptance.bar(left, named, dear, in_order, outstanding=False)
-        return bar.usual, bar.faint
-
-    assert gains(100.0, 1) == pytest.approx((10.0, 10.0))
-    assert gains(100.0, 2) == pytest.approx((100.0 / 6, 100.0 / 6))
-    assert gains(100.0, 1, in_order=False) == pytest.approx((100.0 * POLICY.good_part, 100.0 * POLICY.good_part))
-    assert gains(0.1, 1) == (POLICY.later_gain, POLICY.faint_gain)
-    assert gains(0.1, 1, dear=True) == (POLICY.later_gain, POLICY.later_gain)
-    assert gains(0.1, 0) == (POLICY.least_gain, POLICY.least_gain)
+    offers = [knock(gain), law("end_stop", 5.3, 1.0, 4.0), law("voltage_saturation", 5.2, 2.1, 0.1)]
+    assert named(offers, LATER) == first
+    assert named(offers, FIRST) == "load_disturbance"
 
 
-def test_an_impulse_must_gain_more_than_a_fork_makes():
-    """Or take away what no fork of stick and slip makes in a block: that is enough where little else is left, or where
-    that block is outstanding among much that is.
-    """
-    usual = Bar(POLICY.least_gain, POLICY.least_gain, 1.7, outstanding=False, beside=False)
-    much = replace(usual, usual=20.0, faint=20.0)
-    peak = float(np.log(POLICY.peak))
+def test_of_laws_the_first_that_is_asked_for_is_named():
+    dear = law("backlash", 9.0, z=1.0, lost=5.0)
+    offers = [dear, law("quadratic_drag", 6.0), law("cogging", 8.0)]
+    assert named(offers, LATER) == "quadratic_drag" and named(offers, FIRST) is None
+    level = law("friction_level", 9.0, is_effect=False, clocked=True)
+    assert named([dear, level], LATER) is None and named([level, dear], LATER) == "friction_level"
+    assert "3" in asked([law(gain=1.0)], [False], FIRST)[1]  # says what was asked
 
-    def asked(gain, best, bar):
-        return acceptance.is_asked_for(Offer("load_disturbance", gain, 0.0, 9.0, best, 9, once=True), bar)
 
-    assert not asked(POLICY.once - 0.1, peak - 0.1, usual) and asked(POLICY.once + 0.1, peak - 0.1, usual)
-    assert asked(POLICY.least_gain, peak + 0.1, usual) and not asked(POLICY.once + 0.1, peak + 0.1, much)
-    assert asked(POLICY.once + 0.1, peak + 0.1, replace(much, outstanding=True))
+@pytest.mark.parametrize(
+    "gain, z, clocked, wanted",
+    [(3.6, 3.3, False, True), (3.6, 2.7, False, False), (2.8, 4.0, False, False), (3.6, 3.3, True, False)],
+)
+def test_beside_an_effect_a_law_may_buy_less_where_it_buys_it_nearly_everywhere(gain, z, clocked, wanted):
+    """What differs between recordings is no law."""
+    one = law("drive_dead_zone", gain, z, 0.5, 0.4, clocked=clocked)
+    assert is_steady(one) is wanted
+    assert (named([one], LATER) is not None) is wanted
+    assert least_of(one, False, LATER) == (LATER.faint if wanted else LATER.usual)
+
+
+def test_beside_an_effect_a_law_may_buy_less_where_it_stands_alone():
+    faint = law(gain=2.0, z=2.5)
+    assert named([faint], LATER) is None and named([faint], LATER, alone=[True]) == "stribeck"
+    assert named([replace(faint, gain=1.4)], LATER, alone=[True]) is None
+    assert named([replace(faint, z=1.9, lost=1.0)], LATER, alone=[True]) is None  # nor by chance
+
+
+def test_the_bar_rises_with_what_is_left_and_what_is_named():
+    assert bar(0.0, 0, False, True, False) == Bar(3.0, 3.0, POLICY.least_z, False, False)
+    assert bar(0.0, 1, False, True, True) == Bar(4.0, 1.5, POLICY.later_z, True, True)
+    assert bar(0.0, 1, True, True, False).faint == 4.0  # beside what is dear nothing is faint
+    for count, in_order, share in ((0, True, 0.1), (1, True, 0.1), (2, True, 1 / 6), (2, False, POLICY.good_part)):
+        at = bar(100.0, count, False, in_order, False)
+        assert at.usual == at.faint == pytest.approx(100.0 * share)
+
+
+def test_another_policy_asks_something_else():
+    strict = replace(POLICY, least_gain=10.0, parameter_price=1.0)
+    assert bar(0.0, 0, False, True, False, strict).usual == 10.0
+    assert law(gain=5.0).worth() == pytest.approx(5.0 - 7 * 0.25) and law(gain=5.0).worth(strict) == -2.0

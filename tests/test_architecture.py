@@ -18,13 +18,13 @@ MAY_READ = {
     "plants": ("effects", "errors"),
     "servo": ("data", "effects", "errors", "plants"),
     "estimation": ("data", "decisions", "effects", "errors", "servo", "solvers"),
-    "identification": ("data", "errors", "estimation", "plants", "servo"),
+    "identification": ("data", "errors", "estimation", "plants", "servo", "solvers"),
     "selection": ("data", "decisions", "effects", "estimation", "plants", "servo", "solvers"),
-    "experiment_design": ("data", "effects", "errors", "estimation", "plants", "servo"),
+    "experiment_design": ("data", "effects", "errors", "estimation", "plants", "servo", "solvers"),
     "diagnosis": (
         "data", "decisions", "effects", "estimation", "experiment_design", "plants", "selection", "servo",
     ),
-    "online": ("data", "estimation", "servo"),
+    "online": ("data", "estimation", "servo", "solvers"),
     "control": ("data", "effects", "errors", "plants", "servo"),
     "validation": ("plants", "servo"),
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
@@ -38,7 +38,7 @@ MAY_READ = {
 }  # fmt: skip
 WRITERS = {"commands", "report", "view", "proving", "cli"}  # beside these only the tables of data/ open a file to write
 FAMILIES = {
-    "effects": ("base",),
+    "effects": ("base", "records"),
     "control/controllers": ("base", "finite_time", "pid"),
     "identification/minimisers": ("base", "iga"),
     "proving/concealed": ("base",),

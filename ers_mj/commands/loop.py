@@ -76,10 +76,10 @@ def conditions_of(arguments: argparse.Namespace, **others) -> Conditions:
     """
     from ers_mj.control.controllers import parse_gains, parse_pid
     from ers_mj.control.trial import Conditions
-    from ers_mj.servo.simulation import parse_effect
+    from ers_mj.servo.simulation import delayed, parse_effect
 
     effects = [parse_effect(text) for text in arguments.effect]
-    effects += [("input_delay", {"T_d": 1e-3 * arguments.delay_ms})] if arguments.delay_ms else []
+    effects += [delayed(1e-3 * arguments.delay_ms)] if arguments.delay_ms else []
     return Conditions(
         amplitude=math.radians(arguments.amplitude_deg),
         u_max=arguments.umax,

@@ -223,6 +223,8 @@ def _refuse_cases(arguments: argparse.Namespace) -> None:
 
 
 def _conditions(arguments: argparse.Namespace) -> Conditions:
+    from ers_mj.servo.simulation import counting
+
     quantum = math.radians(arguments.quantum_deg)
     return conditions_of(
         arguments,
@@ -230,7 +232,7 @@ def _conditions(arguments: argparse.Namespace) -> Conditions:
         rate_hz=arguments.rate_hz or 10_000.0,
         noise=math.radians(arguments.noise_deg),
         seed=arguments.seed,
-        effects=[("sensor_quantisation", {"step": quantum})] if quantum else [],
+        effects=[counting(quantum)] if quantum else [],
     )
 
 

@@ -17,9 +17,8 @@ import numpy as np
 
 from ers_mj.control.controllers import Aim, Controller
 from ers_mj.control.references import Reference
-from ers_mj.effects import BY_NAME
+from ers_mj.effects import BY_NAME, Effect
 
-AFTER_NOISE = ("sensor_quantisation", "sensor_dropout")
 LOST = 4.0 * math.pi  # [rad] from the start beyond which a loop is given up as unstable
 
 
@@ -73,12 +72,10 @@ class Sensor:
 
     def __init__(self, effects: Sequence[tuple[str, np.ndarray]], t: np.ndarray, noise: float = 0.0, seed: int = 0):
         touching = [(BY_NAME[name], p) for name, p in effects if BY_NAME[name].subsystem == "sensor"]
-        self._before = [
-            (effect, p) for effect, p in touching if effect.name not in AFTER_NOISE and effect.name != "sensor_lag"
-        ]
-        self._lags = [p for effect, p in touching if effect.name == "sensor_lag"]
-        self._after = [(effect, p) for effect, p in touching if effect.name == "sensor_quantisation"]
-        self._wires = [(effect, p) for effect, p in touching if effect.name == "sensor_dropout"]
+        self._lags = [(effect, p) for effect, p in touching if any(effect.remembers(p))]
+        self._before = [(effect, p) for effect, p in touching if not (effect.after_noise or any(effect.remembers(p)))]
+        self._after = [(effect, p) for effect, p in touching if effect.after_noise and not effect.holds]
+        self._wires = [(effect, p) for effect, p in touching if effect.holds]
         self._noise = noise * np.random.default_rng(seed).standard_normal(t.size)
         self._t, self._k = t, 0
         self._truth, self._read = np.empty(t.size), np.empty(t.size)
@@ -91,8 +88,8 @@ class Sensor:
         """The reading [rad] of the angle at the next sample."""
         k, y = self._k, theta
         self._truth[k] = theta
-        for p in self._lags:
-            y = self._lagged(p, k)
+        for effect, p in self._lags:
+            y = self._lagged(effect, p, k)
         at = self._t[k : k + 1]
         for effect, p in self._before:
             y = float(effect.measure(p, at, np.array([y]))[0])
@@ -103,13 +100,14 @@ class Sensor:
         self._k += 1
         return float(self._read[self._held[k]])
 
-    def _lagged(self, p: np.ndarray, k: int) -> float:
+    def _lagged(self, effect: Effect, p: np.ndarray, k: int) -> float:
         h, memory = float(self._t[1] - self._t[0]), 12.0  # time constants of the lag that its window holds
-        late = memory * p[0] + (p[1] if np.isfinite(p[1]) else 0.0)
+        constant, dead = effect.remembers(p)
+        late = memory * constant + dead
         begin = max(0, k - 2 - int(late / h))
         if k == 0:
             return float(self._truth[0])
-        return float(BY_NAME["sensor_lag"].measure(p, self._t[begin : k + 1], self._truth[begin : k + 1])[-1])
+        return float(effect.measure(p, self._t[begin : k + 1], self._truth[begin : k + 1])[-1])
 
 
 def close(controller: Controller, plant: Sampled, sensor: Sensor, reference: Reference, terminal=None) -> Run:

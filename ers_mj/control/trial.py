@@ -18,6 +18,7 @@ from ers_mj.control.controllers import CONTROLLERS, Controller, Gains, PidGains,
 from ers_mj.control.controllers.base import FILTER_S
 from ers_mj.control.metrics import Measures, measured
 from ers_mj.control.references import CASES, Reference, named, read_reference
+from ers_mj.effects import BY_NAME
 from ers_mj.errors import InputError
 from ers_mj.plants.reduced import ReducedModel
 from ers_mj.servo.datasheet import Datasheet
@@ -113,7 +114,7 @@ def sampled(plant: Plant, rate_hz: float, start: tuple[float, float]) -> Sampled
 
 def refuse_late(plant: Plant, rate_hz: float, most: int) -> None:
     """Raise InputError where the plant's dead time is more than ``most`` samples."""
-    late = sum(float(values[0]) for name, values in plant.effects if name == "input_delay")
+    late = sum(BY_NAME[name].dead_time(values) for name, values in plant.effects)
     if late * rate_hz > most:
         raise InputError(
             f"a dead time of {late:g} s is {late * rate_hz:.3g} samples at {rate_hz:g} Hz, {most} at most were expected"

@@ -47,9 +47,10 @@ def parse_table(content: bytes, suffix: str, name: str) -> pa.Table:
 
 
 def _parquet(content: bytes, name: str) -> pa.Table:
+    from pyarrow import parquet  # here alone: it takes long to import
 
     try:
-        table = pa.parquet.read_table(pa.BufferReader(content))
+        table = parquet.read_table(pa.BufferReader(content))
     except (pa.ArrowException, OSError) as error:
         raise InputError(f"{name}: is not a readable Parquet file ({reason(error)})") from None
     _refuse_twice(table.column_names, name)

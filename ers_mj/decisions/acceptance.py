@@ -16,7 +16,7 @@ class Offer:
     of fitted numbers of the whole model; and of what kind it is.
 
     ``is_effect`` is false of what differs between recordings; ``once`` tells what acts in one recording only,
-    ``clocked`` what has a clock of its own, ``kin`` the names that are one with it.
+    ``clocked`` what has a clock of its own, ``kin`` the names that are one with it, its own among them.
     """
 
     name: str
@@ -29,6 +29,10 @@ class Offer:
     once: bool = False
     clocked: bool = False
     kin: frozenset[str] = frozenset()
+
+    def __post_init__(self):
+        if self.name not in self.kin:
+            object.__setattr__(self, "kin", self.kin | {self.name})
 
     def worth(self, policy: Policy = POLICY) -> float:
         """Gain less the price of the numbers."""

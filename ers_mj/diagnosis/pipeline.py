@@ -18,7 +18,7 @@ from ers_mj.diagnosis.document import Diagnosis, told
 from ers_mj.diagnosis.mujoco_check import Rig
 from ers_mj.diagnosis.verdict import Case
 from ers_mj.effects import BY_NAME, SUSPECTS
-from ers_mj.effects.base import Symptoms
+from ers_mj.effects.records import Symptoms
 from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes

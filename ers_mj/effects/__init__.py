@@ -5,18 +5,8 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-from ers_mj.effects.base import (
-    Coefficients,
-    Drive,
-    Effect,
-    Friction,
-    Load,
-    Parameter,
-    Scales,
-    Sensor,
-    Transmission,
-    Twin,
-)
+from ers_mj.effects.base import Drive, Effect, Friction, Load, Parameter, Sensor, Transmission
+from ers_mj.effects.records import Coefficients, Scales, Twin
 
 
 def _members() -> tuple[Effect, ...]:

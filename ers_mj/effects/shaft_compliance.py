@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ers_mj.effects.base import Parameter, Transmission, coupled
+from ers_mj.effects.base import Parameter, Transmission
+from ers_mj.effects.records import coupled
 
 LIGHTEST = 0.2  # share of the inertia that the motor's side of a shaft bears at least
 

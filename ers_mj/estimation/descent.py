@@ -73,7 +73,7 @@ class Objective:
         add_prior(self.layout, point.z, hessian, slope)
         return hessian, slope
 
-    def step(self, curvature: np.ndarray, slope: np.ndarray, damping: float) -> np.ndarray:
+    def step(self, point: Reached, curvature: np.ndarray, slope: np.ndarray, damping: float) -> np.ndarray:
         scale = np.diag(curvature) + 1e-9 * np.trace(curvature) / slope.size + 1e-12
         return np.clip(-np.linalg.solve(curvature + damping * np.diag(scale), slope), -LONGEST, LONGEST)
 

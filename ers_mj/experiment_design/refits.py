@@ -9,6 +9,7 @@ import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.experiment_design.bench import Bench, Explanation
+from ers_mj.solvers.levenberg_marquardt import Damping, Descent
 
 
 @dataclass(frozen=True)
@@ -63,43 +64,55 @@ def _scaled(curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return curvature * np.outer(scale, scale) + 1e-10 * np.eye(scale.size), scale
 
 
+@dataclass(frozen=True)
+class _Reached:
+    """A place on the way of a refit: z (k,), what is missed there (N,), the block misfits (B,), and the cost."""
+
+    z: np.ndarray
+    e: np.ndarray
+    misfit: np.ndarray
+    cost: float
+
+
+class _Refit:
+    """C over a new recording plus the curvature of the old ones, as solvers.levenberg_marquardt has a problem."""
+
+    def __init__(self, answer: Explanation, trace: Trace, bench: Bench):
+        self.answer, self.trace, self.bench, self.blocks = answer, trace, bench, Blocks.of([trace])
+
+    def at(self, z: np.ndarray) -> _Reached:
+        e = self.bench.misses(self.answer.at(z), self.trace)
+        if not np.all(np.isfinite(e)):
+            return _Reached(z, e, np.empty(0), math.inf)
+        m, away = self.blocks.misfit(e), z - self.answer.z
+        cost = float(np.sum(np.log((self.bench.tau + m) / self.bench.floor)))
+        return _Reached(z, e, m, cost + 0.5 * float(away @ self.answer.known @ away))
+
+    def reach(self, z: np.ndarray) -> _Reached:
+        return self.at(self.answer.at(z).vector(self.answer.layout))
+
+    def normal(self, point: _Reached, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        weight = (2.0 / ((self.bench.tau + point.misfit) * self.blocks.counts))[self.blocks.index]
+        weighted, known = slopes * weight[:, None], self.answer.known
+        return weighted.T @ slopes + known, weighted.T @ point.e + known @ (point.z - self.answer.z)
+
+    def step(self, point: _Reached, curvature: np.ndarray, slope: np.ndarray, damping: float) -> np.ndarray:
+        return np.clip(-solved(curvature + damping * np.diag(np.diag(curvature)), slope), -1.0, 1.0)
+
+
 def refitted(answer: Explanation, trace: Trace, bench: Bench) -> tuple[np.ndarray, float]:
     """The numbers z that minimise C over the new recording plus the curvature of the old ones, and that sum."""
-    blocks, z, damping = Blocks.of([trace]), answer.z, 1e-3
-
-    def evaluate(z):
-        e = bench.misses(answer.at(z), trace)
-        if not np.all(np.isfinite(e)):
-            return e, None, math.inf
-        m = blocks.misfit(e)
-        return (
-            e,
-            m,
-            float(np.sum(np.log((bench.tau + m) / bench.floor)))
-            + 0.5 * float((z - answer.z) @ answer.known @ (z - answer.z)),
-        )
-
-    e, m, cost = evaluate(z)
-    slopes, fresh = None, 0
-    for _ in range(PATIENCE.steps if m is not None else 0):
-        if slopes is None:
-            slopes, fresh, new = bench.slopes(answer, z, e, trace), fresh + 1, True
-        weighted = slopes * (2.0 / ((bench.tau + m) * blocks.counts))[blocks.index][:, None]
-        curvature, slope = weighted.T @ slopes + answer.known, weighted.T @ e + answer.known @ (z - answer.z)
-        gain = 0.0
-        for _ in range(4 if new else 2):
-            step = np.clip(-solved(curvature + damping * np.diag(np.diag(curvature)), slope), -1.0, 1.0)
-            goal = answer.at(z + step).vector(answer.layout)
-            trial = evaluate(goal)
-            if trial[2] < cost:
-                moved, gain, damping = goal - z, cost - trial[2], damping / 8
-                slopes = slopes + np.outer(trial[0] - e - slopes @ moved, moved / (moved @ moved))
-                z, (e, m, cost) = goal, trial
+    problem = _Refit(answer, trace, bench)
+    descent, taken = Descent(problem, problem.at(answer.z), Damping(raised=10.0, least=0.0, keeps=-math.inf)), 0
+    for _ in range(PATIENCE.steps if math.isfinite(descent.point.cost) else 0):
+        if descent.slopes is None:
+            here = descent.point
+            descent.renew(np.asfortranarray(bench.slopes(answer, here.z, here.e, trace)))
+            taken += 1
+        was_fresh = descent.fresh
+        step = descent.advance(4 if was_fresh else 2)
+        if step is None or step.gain < PATIENCE.least_step:
+            if was_fresh or taken == PATIENCE.jacobians:
                 break
-            damping = max(damping * 10, 1e-6)
-        if gain < PATIENCE.least_step:
-            if new or fresh == PATIENCE.jacobians:
-                break
-            slopes = None
-        new = False
-    return z, cost
+            descent.slopes = None
+    return descent.point.z, descent.point.cost

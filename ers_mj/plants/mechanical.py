@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.base import Coefficients, Twin
+from ers_mj.effects.records import Coefficients, Twin
 from ers_mj.errors import InputError
 from ers_mj.plants.play import rigid_play
 from ers_mj.plants.reduced import Motion
@@ -150,8 +150,8 @@ class MechanicalPlant:
     def _refuse_contradictions(self) -> None:
         if self.gap < 0:
             raise InputError(f"the gap is {self.gap:g}, zero or more was expected")
-        if self.gap > 0 and any(name == "backlash" for name, _ in self.effects):
-            raise InputError("the play is given twice, as gap and as the effect backlash, once was expected")
+        if self.gap > 0 and (plays := [name for name, _ in self.effects if BY_NAME[name].is_play]):
+            raise InputError(f"the play is given twice, as gap and as the effect {plays[0]}, once was expected")
         if not self.timestep > 0:
             raise InputError(f"the timestep is {self.timestep:g} s, more than zero was expected")
         if self.parameters is None and self.linkage != "constant":

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
-from ers_mj.effects.base import Coefficients, Effect
+from ers_mj.effects.base import Effect
+from ers_mj.effects.records import Coefficients
 from ers_mj.plants import fixed_steps, march
 from ers_mj.plants.effort import Effort
 from ers_mj.plants.laws import acting, laid_out

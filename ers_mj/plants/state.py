@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from numba import types
 
-from ers_mj.effects.base import Coefficients
+from ers_mj.effects.records import Coefficients
 from ers_mj.plants.compiled import inline, record_in
 
 MOST_LAWS = 64  # effects that act by laws at once

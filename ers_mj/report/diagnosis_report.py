@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.report import diagnosis_figures, page
 from ers_mj.report.diagnosis_effects import missing_physics
-from ers_mj.report.diagnosis_tables import candidates, fit_table, parameters, record_state
+from ers_mj.report.diagnosis_tables import candidates, fit_table, parameters, record_state, trail
 from ers_mj.report.display import NONE, Unit, figure, missing, noun, pretty, shown
 from ers_mj.report.drawing import restart_ids
 from ers_mj.report.traces import close_up, traces
@@ -37,6 +37,7 @@ def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = N
         missing_physics(document, unit),
         _residuals(evidence),
         candidates(document, evidence, unit),
+        trail(document),
         fit_table(document, unit),
         parameters(document),
         record_state(document, evidence),

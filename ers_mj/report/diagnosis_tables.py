@@ -58,6 +58,22 @@ def _rung(rung: Rung, unit: Unit) -> tuple[str, ...]:
     )
 
 
+def trail(document: Mapping) -> str:
+    """The section of what the selection did, move by move."""
+    rows = [(_move(move), "chosen" if move.get("accepted") else "") for move in document.get("trail") or ()]
+    table = page.table(["move", "before", "after", ">gain", "because"], rows)
+    lead = "What was compared round by round, what was accepted and why; gain is what it takes off the training cost."
+    return page.section("How it was decided", lead, table)
+
+
+def _move(move: Mapping) -> tuple[str, ...]:
+    before, after = (
+        ", ".join(page.named(name) for name in move.get(key) or ()) or "baseline" for key in ("before", "after")
+    )
+    after = after if move.get("accepted") else "as before"
+    return page.text(move.get("kind")), before, after, figure(move.get("gain")), page.text(move.get("because"))
+
+
 def fit_table(document: Mapping, unit: Unit) -> str:
     """The section of errors before and after, in this unit."""
     fit = document.get("fit") or {}

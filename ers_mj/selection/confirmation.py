@@ -154,50 +154,13 @@ class Court:
             self.policy,
         ):
             return False
+        traces, policy = self.start.traces, self.policy
+        with_it, without = (pooled(scores) for scores in one.pair)
         return not (
-            self.may_be_none(name, model) or self.is_a_converters(name, model) or self.is_any_wave(name, model, one)
+            may_be_none(name, model, traces, self.tau, policy)
+            or is_a_converters(name, model, traces)
+            or is_any_wave(name, model, with_it, without, policy)
         )
-
-    def is_a_converters(self, name: str, model: Model) -> bool:
-        """Whether a sensor's error along the travel is within half a step of a converter that makes most of the noise:
-        it is that converter's own.
-        """
-        traces = self.start.traces
-        if not all(t.is_coarse for t in traces):
-            return False
-        y = np.concatenate([t.y[t.valid] for t in traces])
-        return BY_NAME[name].is_within(dict(model.effects)[name], y, 0.5 * max(t.quantum for t in traces))
-
-    def is_any_wave(self, name: str, model: Model, one: Judged) -> bool:
-        """Whether a wave whose period was looked for among many does not pay for its numbers: one of them fits any
-        remainder a little, held out as well, since the recordings are excited alike.
-        """
-        effect = BY_NAME[name]
-        if effect.wave is None:
-            return False
-        periods = sum(np.isfinite(start[effect.wave[1]]) for start in effect.starts(model.scales))
-        if periods < self.policy.many_periods:
-            return False
-        with_it, without = one.pair
-        return delta_bic(name, model, pooled(with_it), pooled(without)) < 0.0
-
-    def may_be_none(self, name: str, model: Model) -> bool:
-        """Whether what acts once acts at the edge of a recording, and the interval of its size holds zero: it bends to
-        whatever few samples leave.
-
-        Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose. What
-        begins while the start is read or in the last moment is none.
-        """
-        if not BY_NAME[name].once:
-            return False
-        pushes, edge = _pushes(name, model, self.start.traces), self.policy.edge
-        if any(before < START or left < START for before, _, left in pushes):
-            return True
-        if not any(before < edge or left - length < edge for before, length, left in pushes):
-            return False
-        layout, size = model.layout(), BY_NAME[name].parameters[0].name
-        z, widths = model.vector(layout), half_widths(model, self.start.traces, (), self.tau)
-        return all(abs(z[k]) <= widths[k] for k, f in enumerate(layout) if f.owner == name and f.name == size)
 
     def _halved(
         self, model: Model, less: Model, after: Sequence[Score], without: Sequence[Score]
@@ -241,23 +204,60 @@ class Court:
         return Confirmed(before, after, without, p, after_models, self.base_models, self.parts, sentence, shown)
 
 
+def is_a_converters(name: str, model: Model, traces: Sequence[Trace]) -> bool:
+    """Whether a sensor's error along the travel is within half a step of a converter that makes most of the noise: it
+    is that converter's own.
+    """
+    if not all(t.is_coarse for t in traces):
+        return False
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    return BY_NAME[name].is_within(dict(model.effects)[name], y, 0.5 * max(t.quantum for t in traces))
+
+
+def is_any_wave(name: str, model: Model, after: Score, without: Score, policy: Policy = POLICY) -> bool:
+    """Whether a wave whose period was looked for among many does not pay for its numbers: one of them fits any
+    remainder a little, held out as well, since the recordings are excited alike.
+    """
+    effect = BY_NAME[name]
+    if effect.wave is None:
+        return False
+    periods = sum(np.isfinite(start[effect.wave[1]]) for start in effect.starts(model.scales))
+    return periods >= policy.many_periods and delta_bic(name, model, after, without) < 0.0
+
+
+def may_be_none(name: str, model: Model, traces: Sequence[Trace], tau: float, policy: Policy = POLICY) -> bool:
+    """Whether what acts once acts at the edge of a recording, and the interval of its size holds zero: it bends to
+    whatever few samples leave.
+
+    Elsewhere that interval tells little: a rudder that sticks does not feel a push until it breaks loose. What begins
+    while the start is read or in the last moment is none.
+    """
+    if not BY_NAME[name].once:
+        return False
+    pushes = _pushes(name, model, traces)
+    if any(before < START or left < START for before, _, left in pushes):
+        return True
+    if not any(before < policy.edge or left - w < policy.edge for before, w, left in pushes):
+        return False
+    layout, size = model.layout(), BY_NAME[name].parameters[0].name
+    z, widths = model.vector(layout), half_widths(model, traces, (), tau)
+    return all(abs(z[k]) <= widths[k] for k, f in enumerate(layout) if f.owner == name and f.name == size)
+
+
+def _pushes(name: str, model: Model, traces: Sequence[Trace]) -> list[tuple[float, float, float]]:
+    """What acts once: how long after a recording's beginning, how long, and how long before its end [s]."""
+    columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
+    begun, width, fade = (model.local[name][:, columns.index(column)] for column in ("t_0", "width", "fade"))
+    each = zip(begun, np.fmin(width, fade), traces, strict=True)
+    return [(b - t.t[0], w, t.t[-1] - b) for b, w, t in each if np.isfinite(b)]
+
+
 def delta_bic(name: str, model: Model, after: Score, without: Score) -> float:
     """What an effect wins of held-out C, as a difference of BIC: twice the gain, less the logarithm of the number of
     blocks for each of its numbers.
     """
     gain = cost(without.misfit, 1.0) - cost(after.misfit, 1.0)
     return 2.0 * gain - sum(np.isfinite(v) for v in dict(model.effects)[name]) * math.log(max(without.misfit.size, 2))
-
-
-def _pushes(name: str, model: Model, traces: Sequence[Trace]) -> list[tuple[float, float, float]]:
-    """Of what acts once, in each recording where it does: the time [s] before it, its length, and the time left."""
-    columns = [p.name for p in BY_NAME[name].parameters if p.per_record]
-    begun, width, fade = (model.local[name][:, columns.index(column)] for column in ("t_0", "width", "fade"))
-    return [
-        (b - t.t[0], w, t.t[-1] - b)
-        for b, w, t in zip(begun, np.fmin(width, fade), traces, strict=True)
-        if np.isfinite(b)
-    ]
 
 
 def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:

@@ -41,7 +41,7 @@ def without_confounders(
         return selection, _alone(bench, current)
     current, suspects = _in_place_of_each(bench, current, selection.chosen.model.names)
     if not suspects:
-        current, suspects = _in_place_of_all(bench, current, selection.base)
+        current, suspects = in_place_of_all(bench, current, selection.base)
     if not suspects:
         return selection, ()
     model = current.model
@@ -79,7 +79,7 @@ def _in_place_of_each(bench: Bench, current: Fit, names: Sequence[str]) -> tuple
     return current, suspects
 
 
-def _in_place_of_all(bench: Bench, current: Fit, base: Fit) -> tuple[Fit, list[Candidate]]:
+def in_place_of_all(bench: Bench, current: Fit, base: Fit) -> tuple[Fit, list[Candidate]]:
     """The baseline with one law without a name in the place of all that is named, where that is much or leaves much."""
     names = current.model.names
     forked = names[1:] and current.cost > bench.policy.forked

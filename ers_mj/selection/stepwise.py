@@ -11,8 +11,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ers_mj.data.prepared import Trace
 from ers_mj.decisions import acceptance, explained
 from ers_mj.decisions.conclusion import is_more_than_noise
@@ -20,7 +18,7 @@ from ers_mj.decisions.policy import POLICY, Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import hopped
 from ers_mj.estimation.initial_state import with_starts
-from ers_mj.estimation.objective import Fit, is_rough, residuals_in, tau_of
+from ers_mj.estimation.objective import Fit, is_rough, tau_of
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import Candidate, bends_and_twists, is_dear, stands_alone
@@ -30,8 +28,8 @@ from ers_mj.selection.pair import beside_a_rival, paired, plants_beside
 from ers_mj.selection.search import Budget
 from ers_mj.selection.swap import exchanged, in_its_place, other_way_round, reviewed, widened
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
-from ers_mj.selection.whiteness import left_by_sensor
-from ers_mj.servo.model import OBSERVER_RATE, Model
+from ers_mj.selection.whiteness import is_beyond_rounding, left_by_sensor
+from ers_mj.servo.model import Model
 
 Progress = Callable[[str, float], None]
 
@@ -59,13 +57,14 @@ def select(
     jobs: int = 1,
     progress: Progress = lambda text, share: None,
     policy: Policy = POLICY,
+    budget: Budget | None = None,
 ) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle,
-    is left out as the budget of simulation is spent (search.Budget).
+    is left out as the ``budget`` of simulation is spent, the selection's own unless one is handed in.
     """
-    budget = Budget(traces)
+    budget = Budget(traces) if budget is None else budget
     base = replace(base, model=replace(base.model, effort=budget.effort))
     bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget=budget)
     return _Stepwise(bench, base, anchors, progress).run()
@@ -115,11 +114,7 @@ class _Stepwise:
         return self.bench.budget.spent < self.bench.budget.sweeps
 
     def _taken(self) -> int:
-        """Rounds that count: those for what differs between recordings do not, nor, once, one whose effect a later one
-        made needless.
-        """
-        effects = len(self.rounds) - len(self.current.model.states or {})
-        return effects - (effects > len(self.current.model.names))
+        return rounds_that_count(len(self.rounds), self.current.model)
 
     def _is_in_order(self) -> bool:
         """Whether a further effect may be told that takes a small part only: of few, or near the noise, or after one
@@ -208,9 +203,9 @@ class _Stepwise:
         """Whether a model is wrong behind a coarse converter, of which nothing was swept yet and nothing explains
         all.
         """
-        if "sweep" in self.tried or not self._may_sweep() or not self._is_rough_and_wrong():
+        bench, model = self.bench, self.current.model
+        if "sweep" in self.tried or not self._may_sweep() or not is_beyond_rounding(model, bench.traces, bench.policy):
             return False
-        bench = self.bench
         return not (ranked and explained.is_quiet(ranked[0].fit.misfit, bench.tau, bench.policy))
 
     def _is_cheap_and_wrong(self) -> bool:
@@ -219,19 +214,6 @@ class _Stepwise:
         without = left_by_sensor(self.base.model, traces) if model.names else None
         left = None if model.plant().coupled else left_by_sensor(model, traces)
         return left is not None and is_more_than_noise(left, without, self.bench.policy)
-
-    def _is_rough_and_wrong(self) -> bool:
-        """Whether a model of one body is further from the readings of a coarse converter than their noise is: behind
-        one, C is so rough that a screening promises nothing of what acts, and what is left has lost its memory.
-        """
-        model, traces = self.current.model, self.bench.traces
-        if model.plant().coupled or not is_rough(traces):
-            return False
-        parts = [
-            trace.plain(residuals_in(model, trace, k, OBSERVER_RATE)[: trace.t.size])[trace.valid]
-            for k, trace in enumerate(traces)
-        ]
-        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) > self.bench.policy.beyond_rounding
 
     def _may_twist(self, ranked: Sequence[Candidate]) -> bool:
         """Whether a rudder whose friction bends a bristle is explained so badly that a play or a shaft may be there,
@@ -343,6 +325,14 @@ class _Stepwise:
             return None
         self.tried.add("part")
         return beside_a_rival(bench, self.current, self.rounds)
+
+
+def rounds_that_count(rounds: int, model: Model) -> int:
+    """Of the rounds that led to a model: those for what differs between recordings do not count, nor, once, one whose
+    effect a later one made needless.
+    """
+    effects = rounds - len(model.states or {})
+    return effects - (effects > len(model.names))
 
 
 def _less(model: Model, name: str) -> Model:

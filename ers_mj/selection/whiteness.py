@@ -17,7 +17,8 @@ import numpy as np
 
 from ers_mj.data.prepared import BLOCK, Trace
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.estimation.objective import residuals_in
+from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.estimation.objective import is_rough, residuals_in
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
 LAGS = (1, 2, 3)  # samples
@@ -46,6 +47,19 @@ def left_elsewhere(model: Model, traces: Sequence[Trace]) -> float:
     """
     left = sorted(max(_mean(_told(model, trace, record)["output"]), 0.0) for record, trace in enumerate(traces))
     return float(np.mean(left[:-1])) if len(left) > 1 else 0.0
+
+
+def is_beyond_rounding(model: Model, traces: Sequence[Trace], policy: Policy = POLICY) -> bool:
+    """Whether a model of one body is further from the readings of a coarse converter than their noise is: behind one, C
+    is so rough that a screening promises nothing of what acts, and what is left has lost its memory.
+    """
+    if model.plant().coupled or not is_rough(traces):
+        return False
+    parts = [
+        trace.plain(residuals_in(model, trace, k, OBSERVER_RATE)[: trace.t.size])[trace.valid]
+        for k, trace in enumerate(traces)
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) > policy.beyond_rounding
 
 
 def _told(model: Model, trace: Trace, record: int) -> dict[str, np.ndarray]:

@@ -37,8 +37,8 @@ class Problem(Protocol[P]):
         """Curvature (k, k) and slope (k,) of the cost at a point, of the slopes (N, k) of what is left there."""
         ...
 
-    def step(self, curvature: np.ndarray, slope: np.ndarray, damping: float) -> np.ndarray:
-        """The damped step (k,)."""
+    def step(self, point: P, curvature: np.ndarray, slope: np.ndarray, damping: float) -> np.ndarray | None:
+        """The damped step (k,) from a point; None where it promises too little to be tried."""
         ...
 
     def reach(self, z: np.ndarray) -> P:
@@ -85,16 +85,25 @@ class Descent(Generic[P]):
         self.slopes, self.fresh = slopes, True
 
     def advance(self, tries: int) -> Step | None:
-        """One step, from the present damping on raised up to ``tries`` times; None where the cost never fell."""
+        """One step, from the present damping on raised up to ``tries`` times; None where the cost never fell, or
+        a step promised too little.
+        """
         before, slopes = self.point, self.slopes
         self.curvature, slope = self.problem.normal(before, slopes)
         for _ in range(tries):
-            there = self.problem.reach(before.z + self.problem.step(self.curvature, slope, self.damping))
+            way = self.problem.step(before, self.curvature, slope, self.damping)
+            if way is None:
+                return None
+            there = self.problem.reach(before.z + way)
             if there.cost < before.cost:
                 break
             self.damping = max(self.damping * self.rule.raised, self.rule.from_)
         else:
             return None
+        return self._gone(before, there, slopes, slope)
+
+    def _gone(self, before: P, there: P, slopes: np.ndarray, slope: np.ndarray) -> Step:
+        """Stand where a step has led, on updated slopes if it kept enough of what it promised."""
         moved = there.z - before.z
         promised = float(-(slope @ moved + 0.5 * moved @ self.curvature @ moved))
         step = Step(before.cost - there.cost, promised, self.fresh)

@@ -19,7 +19,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.base import Coefficients, Effect
+from ers_mj.effects.base import Effect
+from ers_mj.effects.records import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.mjcf import unlogged
@@ -75,8 +76,8 @@ def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: flo
         move, name = _steps(A, B[:, :1], step), "mujoco"
     held = _held(move, C, 1.0 / rate_hz, c.delay)
     for effect, values in plant.effects:
-        if effect == "sensor_lag":
-            held, load = held * _late(values, held.dt), load * _late(values, load.dt)
+        if any(lag := BY_NAME[effect].remembers(values)):
+            held, load = held * _late(*lag, held.dt), load * _late(*lag, load.dt)
     return LinearPlant(name, held, load, theta, omega, _left_out(plant))
 
 
@@ -91,9 +92,9 @@ def _left_out(plant: ReducedModel | MechanicalPlant) -> tuple[str, ...]:
     """
     shaped = [
         name
-        for name, _ in plant.effects
+        for name, values in plant.effects
         if type(BY_NAME[name]).command is not Effect.command
-        or (type(BY_NAME[name]).measure is not Effect.measure and name != "sensor_lag")
+        or (type(BY_NAME[name]).measure is not Effect.measure and not any(BY_NAME[name].remembers(values)))
     ]
     return tuple(dict.fromkeys([*shaped, *(plant.stepped if isinstance(plant, MechanicalPlant) else ())]))
 
@@ -256,10 +257,9 @@ def _held(move: Move, C: np.ndarray, h: float, delay: float) -> control.StateSpa
     return control.ss(A, B, np.hstack([C, np.zeros((1, line))]), 0, h)
 
 
-def _late(values: np.ndarray, dt: float) -> control.StateSpace:
+def _late(T: float, T_d: float, dt: float) -> control.StateSpace:
     """What a late sensor makes of the angle: its lag T, and behind it its dead time T_d where it has one."""
-    T, T_d = values
-    if not np.isfinite(T_d):
+    if not T_d:
         return _lag(T, dt)
     if not dt:
         return _lag(T, dt) * control.ss(control.tf(*control.pade(T_d, 4)))

@@ -7,14 +7,17 @@ objective's ``stages`` are gone through before it, each until a step gains littl
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ers_mj.identification.minimisers.base import Meter, Minimiser, Objective
+from ers_mj.solvers.levenberg_marquardt import Damping, Descent
 
 DIFFERENCE = 1e-5  # of the coordinates, or of the box's width where that is less
 LONGEST, DAMPED = 2.0, 20  # step in any coordinate, and how often the damping may be raised for it
 PROMISING = 0.3  # of that share, which a step along fresh slopes must promise to be tried
-KEPT = 0.3  # share of the promised decrease from which a slope is updated, not taken anew
+DAMPING = Damping(first=1e-2, raised=6.0, from_=1e-7, lowered=6.0, least=1e-12)
 STAGE_GAIN = 0.01  # share of the value below which a step ends a stage
 END_GAIN = 1e-9  # and the search
 STAGE_LEFT, EXACT = (
@@ -63,57 +66,83 @@ class LS(Minimiser):
                 return
 
 
+@dataclass(frozen=True)
+class _Place:
+    """A place in the box: z (k,), the residuals there (N,), and their squares, infinite where there are none."""
+
+    z: np.ndarray
+    e: np.ndarray
+    cost: float
+
+
+class _Squares:
+    """The squares of an objective, or of a ``stage`` of it, as solvers.levenberg_marquardt has a problem.
+
+    A step along fresh slopes that promises less than a share of ``least_gain`` is not tried: where the slopes are not
+    ``given`` the first one alone is asked.
+    """
+
+    def __init__(self, meter: Meter, stage: Objective | None, least_gain: float):
+        self.meter, self.stage, self.least_gain = meter, stage, least_gain
+        self.lower, self.upper = meter.lower, meter.lower + meter.width
+        self.given = getattr(stage or meter.objective, "slopes", None)
+        self.may_look_wider = not self.given and stage is None
+        self.asks, self.hopeless = False, False
+
+    def reach(self, z: np.ndarray) -> _Place:
+        near = 1e-12 * (self.upper - self.lower)  # of a bound that a clipped step leads to, rounding aside
+        there = np.where(z >= self.upper - near, self.upper, np.where(z <= self.lower + near, self.lower, z))
+        e = self.meter.residuals(there, self.stage)
+        return _Place(there, e, _squares(e))
+
+    def slopes(self, point: _Place, wide: float) -> np.ndarray:
+        """Slopes (N, k) at a place, its columns' numbers side by side."""
+        self.asks = True
+        if self.given:
+            return np.array(self.given(point.z, point.e), order="F")
+        return _slopes(self.meter, self.stage, point.z, point.e, wide * DIFFERENCE)
+
+    def normal(self, point: _Place, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return 2.0 * (slopes.T @ slopes), 2.0 * (slopes.T @ point.e)
+
+    def step(self, point: _Place, curvature: np.ndarray, slope: np.ndarray, damping: float) -> np.ndarray | None:
+        held = (point.z <= self.lower) & (slope > 0) | (point.z >= self.upper) & (slope < 0)
+        move = np.clip(point.z + _step(curvature, slope, damping, held), self.lower, self.upper) - point.z
+        if self.asks:
+            promised = -(slope @ move + 0.5 * move @ curvature @ move)
+            self.hopeless = bool(promised < PROMISING * self.least_gain * point.cost)
+            self.asks = bool(self.given)
+        return None if self.hopeless else move
+
+
 def _descend(
     meter: Meter, stage: Objective | None, x: np.ndarray, least_gain: float, enough: float, first: float | None = None
 ) -> tuple[np.ndarray, float, float]:
     """Marquardt's steps from x (k,) until one along fresh slopes gains less than a share ``least_gain``, or a share
     ``enough`` of the ``first`` value is left (of that at x where it is not given); the end, its value, and the first.
     """
-    lower, upper = meter.lower, meter.lower + meter.width
+    problem = _Squares(meter, stage, least_gain)
     e = meter.residuals(x, stage)
-    value = _squares(e)
-    first = value if first is None else first
-    if not np.isfinite(value):
-        return x, np.inf, first
-    damping, slopes, fresh, wide = 1e-2, None, False, 1.0
+    descent, wide = Descent(problem, _Place(x, e, _squares(e)), DAMPING), 1.0
+    first = descent.point.cost if first is None else first
     exact = max(enough * first, BELOW_TARGET * getattr(meter.objective, "target", 0.0))
-    given = getattr(stage or meter.objective, "slopes", None)
-    while value > exact:
-        if slopes is None:
-            slopes, fresh = given(x, e) if given else _slopes(meter, stage, x, e, wide * DIFFERENCE), True
-        hessian, slope = slopes.T @ slopes, slopes.T @ e
-        for attempt in range(8 if fresh else 2):
-            there = np.clip(
-                x + _step(hessian, slope, damping, (x <= lower) & (slope > 0) | (x >= upper) & (slope < 0)),
-                lower,
-                upper,
-            )
-            move = there - x
-            promised = -(2.0 * slope @ move + move @ hessian @ move)
-            if fresh and (given or attempt == 0) and promised < PROMISING * least_gain * value:
-                return x, value, first
-            e_there = meter.residuals(there, stage)
-            if _squares(e_there) < value:
+    while np.isfinite(descent.point.cost) and descent.point.cost > exact:
+        if descent.slopes is None:
+            descent.renew(problem.slopes(descent.point, wide))
+        before = descent.point.cost
+        step = descent.advance(8 if descent.fresh else 2)
+        problem.asks = False
+        if step is None:
+            if problem.hopeless or descent.fresh and (wide > 1.0 or not problem.may_look_wider):
                 break
-            damping = max(6.0 * damping, 1e-7)
-        else:
-            if fresh and (wide > 1.0 or given or stage is not None):
+            if descent.fresh:
+                wide, descent.damping = WIDE, DAMPING.first
+            descent.slopes = None
+        elif step.gain < least_gain * before:
+            if step.fresh or descent.slopes is None:
                 break
-            wide, damping, slopes = (WIDE, 1e-2, None) if fresh else (wide, damping, None)
-            continue
-        gain, was_fresh = value - _squares(e_there), fresh
-        if gain > KEPT * promised and np.any(move):
-            slopes, fresh = slopes + np.outer(e_there - e - slopes @ move, move / (move @ move)), False
-        else:
-            slopes = None
-        small = gain < least_gain * value
-        x, e, value = there, e_there, value - gain
-        damping = max(damping / 6.0, 1e-12)
-        if small:
-            if was_fresh or slopes is None:
-                break
-            slopes = None
-    return x, value, first
+            descent.slopes = None
+    return descent.point.z, descent.point.cost, first
 
 
 def _squares(e: np.ndarray) -> float:
@@ -123,7 +152,7 @@ def _squares(e: np.ndarray) -> float:
 
 def _slopes(meter: Meter, stage: Objective | None, x: np.ndarray, e: np.ndarray, step: float) -> np.ndarray:
     """Forward differences (N, k), backward ones at an upper bound."""
-    out = np.empty((e.size, x.size))
+    out = np.empty((e.size, x.size), order="F")
     for k, h in enumerate(step * np.minimum(meter.width, 1.0)):
         there = x.copy()
         there[k] += h if x[k] + h <= meter.lower[k] + meter.width[k] else -h
