@@ -5,32 +5,32 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import NOISE, TRUTH, started, trace
+from servo import NOISE, TRUTH, bench_of, started, trace
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
+from ers_mj.decisions.policy import POLICY
 from ers_mj.diagnosis.mujoco_check import HELD_SECONDS, LEFT_OUT_SECONDS, run_in_mujoco
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
 from ers_mj.estimation.initial_state import without_spikes
 from ers_mj.estimation.intervals import half_widths, unseen_widths
 from ers_mj.selection.candidates import candidates
-from ers_mj.selection.confirmation import (
-    _halved,
-    _is_a_converters,
-    _is_any_wave,
-    _may_be_none,
-    _no_closer,
-    _p_of,
-    _scores,
-)
-from ers_mj.selection.cross_validation import Fold, Score, folds, halves, refits
+from ers_mj.selection.confirmation import Court, Judged
+from ers_mj.selection.cross_validation import Fold, Score, folds, halves, scored
+from ers_mj.selection.stepwise import Selection
 
 
 @pytest.fixture(scope="module")
 def plain():
     """A servo without missing physics."""
     return started([trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
+
+
+def court_of(start, traces=None):
+    """Where effects beside this baseline are judged by each recording in turn."""
+    start = start if traces is None else replace(start, traces=traces)
+    return Court(start, Selection(start.fit, start.fit, (), 1.0, start.traces), [], 1, POLICY)
 
 
 def holding(y, begins, length=12):
@@ -55,16 +55,16 @@ def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
     not, nor any beside a finer converter.
     """
     step = 0.016
-    coarse, fine = ([trace("multisine", sensor=lambda y: s * np.round(y / s))] for s in (step, NOISE))  # noqa: B023
+    coarse, fine = ([trace("multisine", sensor=lambda y, s=s: s * np.round(y / s))] for s in (step, NOISE))
     small, large = (
         plain.fit.model.with_effect("sensor_nonlinearity", np.array([np.inf, np.inf, size * step, 0.043, 0.3]))
         for size in (0.3, 0.8)
     )
-    assert _is_a_converters("sensor_nonlinearity", small, coarse)
-    assert not _is_a_converters("sensor_nonlinearity", large, coarse) and not _is_a_converters(
-        "sensor_nonlinearity", small, fine
-    )
-    assert not _is_a_converters("bias_torque", small, coarse)
+    by_coarse, by_fine = court_of(plain, coarse), court_of(plain, fine)
+    assert by_coarse.is_a_converters("sensor_nonlinearity", small)
+    assert not by_coarse.is_a_converters("sensor_nonlinearity", large)
+    assert not by_fine.is_a_converters("sensor_nonlinearity", small)
+    assert not by_coarse.is_a_converters("bias_torque", small.with_effect("bias_torque", np.array([0.1])))
 
 
 def test_a_rudder_that_sticks_is_not_held(plain):
@@ -80,7 +80,7 @@ def test_what_cannot_be_scaled_is_refitted_from_all_its_starts(plain):
         for k, name in enumerate(("multisine", "steps", "chirp"))
     ]
     start = started(clipped)
-    best, *others = candidates(start.fit, start.traces, 1.0, 1, ())
+    best, *others = candidates(bench_of(start.traces, only=("voltage_saturation", "current_limit")), start.fit)
     clip = next(c for c in (best, *others) if c.name == "voltage_saturation")
     assert clip.gain == pytest.approx(best.gain, abs=0.01)  # without inductance a limit of the current is the same
     assert dict(clip.fit.model.effects)[clip.name][0] == pytest.approx(0.93 * peak, rel=0.01)
@@ -98,11 +98,11 @@ def test_an_effect_that_one_recording_shows_is_judged_within_it():
     ]
     start = started(traces)
     chosen = fit(start.fit.model.with_effect("end_stop", stop), start.traces)
-    parts, _ = folds(start.traces, [])
+    court = court_of(start)
 
     def p(model):
-        after, without = (_scores(refits(some, parts, 1.0, 1), parts) for some in (model, start.fit.model))
-        return _p_of("end_stop", *_halved(model, start.fit.model, after, without, start, 1.0, 1)[1:])
+        after = [scored(some, fold.held_out) for some, fold in zip(court.refits(model), court.parts, strict=True)]
+        return court.judged("end_stop", model, after).p
 
     assert p(chosen.model) < 0.05
     nowhere = start.fit.model.with_effect("end_stop", np.array([float(np.nanmin(wide.y)) - 1.0, math.inf, 3e5, 50.0]))
@@ -142,17 +142,7 @@ def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out():
         traces = [quiet[0], trace("steps", [("load_disturbance", knock)], seed=1) if knocked else quiet[1], quiet[2]]
         start = started(traces)
         found = fit(start.fit.model.with_effect("load_disturbance", knock), start.traces)
-        assert _may_be_none("load_disturbance", found.model, start.traces, 1.0) == none
-
-
-def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks():
-    score = lambda *rmse: [Score(e**2, 1, np.ones(1)) for e in rmse]
-    assert _no_closer(score(1.2), score(1.0), 0.04) and not _no_closer(score(1.2), score(1.0), 1e-6)
-    assert _no_closer(score(1.4), score(1.0), 1e-6) and not _no_closer(score(0.9), score(1.0), 0.04)
-    assert not _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 1e-6) and _no_closer(
-        score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 0.04
-    )
-    assert _no_closer(score(0.9, 0.9, 9.0), score(1.0, 1.0, 5.0), 1e-6)
+        assert court_of(start).may_be_none("load_disturbance", found.model) == none
 
 
 def test_a_wave_of_many_that_does_not_pay_for_its_numbers_is_any_wave(plain):
@@ -163,10 +153,10 @@ def test_a_wave_of_many_that_does_not_pay_for_its_numbers_is_any_wave(plain):
     for name in ("cogging", "transmission_ripple", "periodic_gust", "sensor_nonlinearity", "voltage_saturation"):
         model = model.with_effect(name, BY_NAME[name].starts(model.scales)[-1])
     left, little, much = (Score(1.0, 1, np.full(100, math.expm1(c / 100) + 0.5)) for c in (20.0, 14.0, 8.0))
-    any_wave = {name: [_is_any_wave(name, model, [after], [left]) for after in (little, much)] for name in model.names}
-    assert any_wave == {
-        name: [name in ("cogging", "transmission_ripple", "periodic_gust"), False] for name in model.names
-    }
+    court, waves = court_of(plain), ("cogging", "transmission_ripple", "periodic_gust")
+    for name in model.names:
+        told = [court.is_any_wave(name, model, Judged([], left, ([after], [left]), 0.0)) for after in (little, much)]
+        assert told == [name in waves, False]
 
 
 @pytest.mark.parametrize("training, most", [(None, HELD_SECONDS), ((), LEFT_OUT_SECONDS)])

@@ -89,7 +89,7 @@ def test_the_constant_variant_of_the_folder_is_the_built_one():
 
 def test_the_rod_varies_the_ratio_as_derived():
     plant = MechanicalPlant(lumped(SHEET.to_lumped()), parameters=SHEET.parameters, linkage="rod")
-    ratio = [plant._skeleton.pose(np.radians(deg))["rotor"][1] for deg in (-30, 0, 30)]
+    ratio = [plant.ratio(np.radians(deg)) for deg in (-30, 0, 30)]
     assert ratio == pytest.approx([18.8, 22.26, 19.8], abs=0.05)
 
 

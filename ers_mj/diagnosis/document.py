@@ -124,10 +124,10 @@ def _effect(case: Case, name: str) -> dict:
     parameters = {p["name"]: p["entry"] for p in _effect_parameters(case, name)}
     without = c.without[name]
     with_and_without = (None, None) if effect.local else (pooled(c.after).rmse, without.rmse)
-    shown = {k: shown(e["value"], e["unit"]) for k, e in parameters.items()}
+    told = {k: shown(e["value"], e["unit"]) for k, e in parameters.items()}
     return {
         "effect": name,
-        "sentence": effect.describe(shown),
+        "sentence": effect.describe(told),
         "subsystem": effect.subsystem,
         "parameters": parameters,
         "evidence": {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -93,7 +94,11 @@ class Court:
         self.parts, self.sentence = folds(self.start.traces, self.held)
         self.tau, rounds = self.selection.tau, self.selection.rounds
         self.alone = {ranked[0].name for ranked in rounds if ranked and stands_alone(ranked[0], ranked, self.policy)}
-        self.base_models = self.refits(self.start.fit.model)
+
+    @cached_property
+    def base_models(self) -> list[Model]:
+        """The baseline fitted to each part."""
+        return self.refits(self.start.fit.model)
 
     def refits(self, model: Model) -> list[Model]:
         return refits(model, self.parts, self.tau, self.jobs)
