@@ -1,53 +1,77 @@
-"""What held-out data confirms, what a model betrays of its sensor, and how far the unseen moves the numbers."""
+"""What held-out data confirms, and what few samples, a converter or any remainder would show."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import NOISE, TRUTH, started, trace
+from servo import NAMES, NOISE, SPARSE, having, recorded, started, trace
 
-from ers_mj.data.prepared import trace_of
-from ers_mj.data.recording import from_arrays
-from ers_mj.diagnosis.mujoco_check import HELD_SECONDS, LEFT_OUT_SECONDS, run_in_mujoco
+from ers_mj.decisions.policy import POLICY
 from ers_mj.effects import BY_NAME
+from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit
-from ers_mj.estimation.initial_state import without_spikes
-from ers_mj.estimation.intervals import half_widths, unseen_widths
-from ers_mj.selection.candidates import candidates
-from ers_mj.selection.confirmation import (
-    _halved,
-    _is_a_converters,
-    _is_any_wave,
-    _may_be_none,
-    _no_closer,
-    _p_of,
-    _scores,
-)
-from ers_mj.selection.cross_validation import Fold, Score, folds, halves, refits
+from ers_mj.selection.confirmation import confirmed, delta_bic, is_a_converters, is_any_wave, may_be_none
+from ers_mj.selection.cross_validation import Score, folds, halves
+from ers_mj.selection.stepwise import Selection
+
+
+def chosen(start: Start, name, p, is_fitted=True) -> Selection:
+    """A selection that has named one effect."""
+    found = having(start.fit, name, p)
+    found = fit(found.model, start.traces) if is_fitted else found
+    return Selection(start.fit, found, (), 1.0, start.traces)
 
 
 @pytest.fixture(scope="module")
-def plain():
-    """A servo without missing physics."""
-    return started([trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
+def stopped():
+    """A servo whose stop one recording of three passes far, and one hardly; and that stop."""
+    calm, wide = (trace("multisine", gain=gain, t=SPARSE) for gain in (0.5, 1.0))
+    upper = float(np.nanquantile(wide.y, 0.97))
+    stop = np.array([-math.inf, upper, 3e5, 50.0])
+    assert np.nanmax(calm.y) < upper
+    traces = [
+        trace("multisine", [("end_stop", stop)], gain=0.5, t=SPARSE),
+        trace("steps", gain=0.5, seed=1, t=SPARSE),
+        trace("multisine", [("end_stop", stop)], seed=2, t=SPARSE),
+    ]
+    return started(traces), stop
 
 
-def holding(y, begins, length=12):
-    y = y.copy()
-    for begin in begins:
-        y[begin : begin + length] = y[begin]
-    return y
+def test_an_effect_that_one_recording_shows_is_judged_within_it(stopped):
+    start, stop = stopped
+    named = chosen(start, "end_stop", stop)
+    selection, told = confirmed(start, named, [], 1)
+    assert selection is named and told.p["end_stop"] < 0.05
+    assert "which teaches most of an effect, by halves as well" in told.sentence
+    assert len(told.shown) == len(told.parts) + 1  # of which one in two halves
 
 
-def test_a_hold_behind_a_coarse_converter_is_betrayed_by_the_model(plain):
-    begins = np.arange(150, 2900, 125)
-    step = 2.5 * NOISE
-    coarse = trace("multisine", sensor=lambda y: step * np.round(holding(y, begins) / step))
-    found = without_spikes(plain.fit.model, [coarse])[0]
-    moving = [b for b in begins if abs(coarse.y[b + 12] - coarse.y[b]) > 6 * step]
-    masked = [b for b in moving if not found.valid[b + 1 : b + 12].any()]
-    assert len(coarse.lost) >= 3 and len(moving) >= 8 and len(masked) >= 0.8 * len(moving)
+def test_what_held_out_data_does_not_confirm_is_taken_out_and_told(stopped):
+    start, stop = stopped
+    nowhere = float(min(np.nanmin(t.y) for t in start.traces)) - 1.0
+    named = chosen(start, "end_stop", [nowhere, math.inf, *stop[2:]], is_fitted=False)
+    selection, told = confirmed(start, named, [], 1)
+    assert selection.chosen is start.fit and not told.p
+    (move,) = selection.trail
+    assert (move.kind, move.before, move.after, move.accepted) == ("drop", ("end_stop",), (), True)
+    assert "held-out" in move.because
+
+
+def test_an_effect_is_judged_on_recordings_of_another_day(pushed):
+    """A torque of 3 rad/s^2 that the held-out recording has, too, and one that it has not."""
+    start = started(recorded([("bias_torque", np.array([3.0]))], names=NAMES[:2], t=SPARSE))
+    named = chosen(start, "bias_torque", [3.0])
+    for held, kept in (([trace("chirp", [("bias_torque", np.array([3.0]))], seed=5, t=SPARSE)], True),
+                       ([trace("chirp", seed=5, t=SPARSE)], False)):
+        selection, told = confirmed(start, named, held, 1)
+        assert bool(selection.chosen.model.names) is kept and told.parts[0].training is None
+
+
+def test_folds_and_halves_leave_out_what_is_judged(stopped):
+    traces = stopped[0].traces
+    first, second = halves(traces, 2)
+    assert first.known == second.known == [0, 1, 2] and first.held_out.t[-1] < second.held_out.t[0]
+    assert [fold.known for fold in folds(traces, [])[0]] == [[1, 2], [0, 2], [0, 1]]
 
 
 def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
@@ -55,104 +79,40 @@ def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
     not, nor any beside a finer converter.
     """
     step = 0.016
-    coarse, fine = ([trace("multisine", sensor=lambda y: s * np.round(y / s))] for s in (step, NOISE))  # noqa: B023
+    coarse, fine = ([trace("multisine", sensor=lambda y, s=s: s * np.round(y / s))] for s in (step, NOISE))
     small, large = (
-        plain.fit.model.with_effect("sensor_nonlinearity", np.array([np.inf, np.inf, size * step, 0.043, 0.3]))
+        having(plain.fit, "sensor_nonlinearity", [np.inf, np.inf, size * step, 0.043, 0.3]).model
         for size in (0.3, 0.8)
     )
-    assert _is_a_converters("sensor_nonlinearity", small, coarse)
-    assert not _is_a_converters("sensor_nonlinearity", large, coarse) and not _is_a_converters(
-        "sensor_nonlinearity", small, fine
-    )
-    assert not _is_a_converters("bias_torque", small, coarse)
+    assert is_a_converters("sensor_nonlinearity", small, coarse)
+    assert not is_a_converters("sensor_nonlinearity", large, coarse)
+    assert not is_a_converters("sensor_nonlinearity", small, fine)
+    assert not is_a_converters("bias_torque", having(plain.fit, "bias_torque").model, coarse)
 
 
-def test_a_rudder_that_sticks_is_not_held(plain):
-    whole = trace("multisine", sensor=lambda y: 2.5 * NOISE * np.round(y / (2.5 * NOISE)))
-    whole = replace(whole, lost=(slice(5, 6),) * 3)  # as where its sensor had been seen to hang
-    assert np.array_equal(without_spikes(plain.fit.model, [whole])[0].valid, whole.valid)
-
-
-def test_what_cannot_be_scaled_is_refitted_from_all_its_starts(plain):
-    peak = max(float(np.abs(t.u).max()) for t in plain.traces)
-    clipped = [
-        trace(name, [("voltage_saturation", np.array([0.93 * peak, np.inf]))], seed=k)
-        for k, name in enumerate(("multisine", "steps", "chirp"))
-    ]
-    start = started(clipped)
-    best, *others = candidates(start.fit, start.traces, 1.0, 1, ())
-    clip = next(c for c in (best, *others) if c.name == "voltage_saturation")
-    assert clip.gain == pytest.approx(best.gain, abs=0.01)  # without inductance a limit of the current is the same
-    assert dict(clip.fit.model.effects)[clip.name][0] == pytest.approx(0.93 * peak, rel=0.01)
-
-
-def test_an_effect_that_one_recording_shows_is_judged_within_it():
-    calm, wide = trace("multisine", gain=0.5), trace("multisine", gain=1.0)
-    upper = float(np.nanquantile(wide.y, 0.97))
-    stop = np.array([-math.inf, upper, 3e5, 50.0])
-    assert np.nanmax(calm.y) < upper
-    traces = [
-        trace("multisine", [("end_stop", stop)], gain=0.5),
-        trace("steps", gain=0.5, seed=1),
-        trace("multisine", [("end_stop", stop)], seed=2),
-    ]
-    start = started(traces)
-    chosen = fit(start.fit.model.with_effect("end_stop", stop), start.traces)
-    parts, _ = folds(start.traces, [])
-
-    def p(model):
-        after, without = (_scores(refits(some, parts, 1.0, 1), parts) for some in (model, start.fit.model))
-        return _p_of("end_stop", *_halved(model, start.fit.model, after, without, start, 1.0, 1)[1:])
-
-    assert p(chosen.model) < 0.05
-    nowhere = start.fit.model.with_effect("end_stop", np.array([float(np.nanmin(wide.y)) - 1.0, math.inf, 3e5, 50.0]))
-    assert p(nowhere) > 0.2
-    first, second = halves(start.traces, 2)
-    assert first.known == second.known == [0, 1, 2] and first.held_out.t[-1] < second.held_out.t[0]
-    assert [fold.known for fold in folds(start.traces, [])[0]] == [[1, 2], [0, 2], [0, 1]]
-
-
-def test_what_is_too_small_to_be_found_widens_the_intervals(plain):
-    faint = started(
-        [
-            trace(name, [("quadratic_drag", np.array([0.02, np.inf]))], seed=k)
-            for k, name in enumerate(("multisine", "steps", "chirp"))
-        ]
-    )
-    model, layout = faint.fit.model, faint.fit.model.layout()
-    noise, unseen = half_widths(model, faint.traces, (), 1.0), unseen_widths(model, faint.traces, 1.0)
-    off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))
-    assert np.all(unseen > 0) and np.all(off < 2.0 * np.hypot(noise, unseen))
-
-
-def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out():
-    """Of a recording where few samples bear it, or while its start is read; within one the interval of what moves a
-    rudder that sticks tells little.
-    """
-    quiet = [trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))]
-    for begun, knocked, none in (
+@pytest.mark.parametrize(
+    "begun, knocked, none",
+    [
         (2.9, False, True),
         (-0.28, True, True),
         (0.03, True, True),
         (1.0, False, False),
         (1.0, True, False),
         (2.6, True, False),
-    ):
-        knock = np.array([40.0, begun, 0.3, 1.0, np.inf])
-        traces = [quiet[0], trace("steps", [("load_disturbance", knock)], seed=1) if knocked else quiet[1], quiet[2]]
-        start = started(traces)
-        found = fit(start.fit.model.with_effect("load_disturbance", knock), start.traces)
-        assert _may_be_none("load_disturbance", found.model, start.traces, 1.0) == none
-
-
-def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks():
-    score = lambda *rmse: [Score(e**2, 1, np.ones(1)) for e in rmse]
-    assert _no_closer(score(1.2), score(1.0), 0.04) and not _no_closer(score(1.2), score(1.0), 1e-6)
-    assert _no_closer(score(1.4), score(1.0), 1e-6) and not _no_closer(score(0.9), score(1.0), 0.04)
-    assert not _no_closer(score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 1e-6) and _no_closer(
-        score(0.9, 0.1, 9.0), score(1.0, 1.0, 5.0), 0.04
-    )
-    assert _no_closer(score(0.9, 0.9, 9.0), score(1.0, 1.0, 5.0), 1e-6)
+    ],
+)
+def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out(plain, begun, knocked, none):
+    """Of a recording where few samples bear it, or while its start is read; within one the interval of what moves a
+    rudder that sticks tells little.
+    """
+    knock = np.array([40.0, begun, 0.3, 1.0, np.inf])
+    start = plain
+    if knocked:
+        first, _, last = recorded()
+        start = started([first, trace("steps", [("load_disturbance", knock)], seed=1), last])
+    model = chosen(start, "load_disturbance", knock).chosen.model
+    assert may_be_none("load_disturbance", model, start.traces, 1.0) == none
+    assert not may_be_none("bias_torque", having(plain.fit, "bias_torque").model, start.traces, 1.0)
 
 
 def test_a_wave_of_many_that_does_not_pay_for_its_numbers_is_any_wave(plain):
@@ -160,24 +120,11 @@ def test_a_wave_of_many_that_does_not_pay_for_its_numbers_is_any_wave(plain):
     its p-value alone.
     """
     model = plain.fit.model
-    for name in ("cogging", "transmission_ripple", "periodic_gust", "sensor_nonlinearity", "voltage_saturation"):
+    names = ("cogging", "transmission_ripple", "periodic_gust", "sensor_nonlinearity", "voltage_saturation")
+    for name in names:
         model = model.with_effect(name, BY_NAME[name].starts(model.scales)[-1])
     left, little, much = (Score(1.0, 1, np.full(100, math.expm1(c / 100) + 0.5)) for c in (20.0, 14.0, 8.0))
-    any_wave = {name: [_is_any_wave(name, model, [after], [left]) for after in (little, much)] for name in model.names}
-    assert any_wave == {
-        name: [name in ("cogging", "transmission_ripple", "periodic_gust"), False] for name in model.names
-    }
-
-
-@pytest.mark.parametrize("training, most", [(None, HELD_SECONDS), ((), LEFT_OUT_SECONDS)])
-def test_mujoco_runs_a_few_seconds_of_what_was_held_out(training, most):
-    def held(seconds):
-        t = np.arange(0.0, seconds, 1e-2)
-        return Fold(trace_of(from_arrays(t, np.sin(t), np.sin(t), name=f"{seconds} s"), None), training)
-
-    (long,) = run_in_mujoco([held(12.0), held(2.0)])
-    assert long.name == "12.0 s" and long.t[-1] == pytest.approx(most, abs=0.011)
-    assert [trace.name for trace in run_in_mujoco([held(0.4 * most), held(0.5 * most), held(0.4 * most)])] == [
-        f"{0.4 * most} s",
-        f"{0.5 * most} s",
-    ]
+    for name in names:
+        found = [is_any_wave(name, model, after, left) for after in (little, much)]
+        assert found == [name in names[:3], False]
+        assert delta_bic(name, model, much, left) > delta_bic(name, model, little, left)
