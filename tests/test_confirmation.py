@@ -23,52 +23,41 @@ def chosen(start: Start, name, p, is_fitted=True) -> Selection:
 
 
 @pytest.fixture(scope="module")
-def stopped():
-    """A servo whose stop one recording of three passes far, and one hardly; and that stop."""
-    calm, wide = (trace("multisine", gain=gain, t=SPARSE) for gain in (0.5, 1.0))
-    upper = float(np.nanquantile(wide.y, 0.97))
-    stop = np.array([-math.inf, upper, 3e5, 50.0])
-    assert np.nanmax(calm.y) < upper
-    traces = [
-        trace("multisine", [("end_stop", stop)], gain=0.5, t=SPARSE),
-        trace("steps", gain=0.5, seed=1, t=SPARSE),
-        trace("multisine", [("end_stop", stop)], seed=2, t=SPARSE),
-    ]
-    return started(traces), stop
+def hardening():
+    """A servo whose spring hardens, as one wide recording of three shows."""
+    laws = [("hinge_moment_cubic", np.array([20.0, np.inf]))]
+    calm = [trace(name, laws, gain=0.35, seed=k, t=SPARSE) for k, name in enumerate(("multisine", "chirp"))]
+    return started([*calm, trace("multisine", laws, seed=2, t=SPARSE)])
 
 
-def test_an_effect_that_one_recording_shows_is_judged_within_it(stopped):
-    start, stop = stopped
-    named = chosen(start, "end_stop", stop)
-    selection, told = confirmed(start, named, [], 1)
-    assert selection is named and told.p["end_stop"] < 0.05
-    assert "which teaches most of an effect, by halves as well" in told.sentence
+def test_an_effect_that_one_recording_shows_is_judged_within_it(hardening):
+    named = chosen(hardening, "hinge_moment_cubic", [20.0, np.inf])
+    selection, told = confirmed(hardening, named, [], 1)
+    assert selection is named and told.p["hinge_moment_cubic"] < 0.05
+    assert "multisine, which teaches most of an effect, by halves as well" in told.sentence
     assert len(told.shown) == len(told.parts) + 1  # of which one in two halves
 
 
-def test_what_held_out_data_does_not_confirm_is_taken_out_and_told(stopped):
-    start, stop = stopped
-    nowhere = float(min(np.nanmin(t.y) for t in start.traces)) - 1.0
-    named = chosen(start, "end_stop", [nowhere, math.inf, *stop[2:]], is_fitted=False)
-    selection, told = confirmed(start, named, [], 1)
-    assert selection.chosen is start.fit and not told.p
+def test_what_held_out_data_does_not_confirm_is_taken_out_and_told(plain):
+    named = chosen(plain, "quadratic_drag", [0.01, np.inf])
+    selection, told = confirmed(plain, named, [], 1)
+    assert selection.chosen is plain.fit and not told.p
     (move,) = selection.trail
-    assert (move.kind, move.before, move.after, move.accepted) == ("drop", ("end_stop",), (), True)
+    assert (move.kind, move.before, move.after, move.accepted) == ("drop", ("quadratic_drag",), (), True)
     assert "held-out" in move.because
 
 
-def test_an_effect_is_judged_on_recordings_of_another_day(pushed):
+def test_an_effect_is_judged_on_recordings_of_another_day():
     """A torque of 3 rad/s^2 that the held-out recording has, too, and one that it has not."""
     start = started(recorded([("bias_torque", np.array([3.0]))], names=NAMES[:2], t=SPARSE))
     named = chosen(start, "bias_torque", [3.0])
-    for held, kept in (([trace("chirp", [("bias_torque", np.array([3.0]))], seed=5, t=SPARSE)], True),
-                       ([trace("chirp", seed=5, t=SPARSE)], False)):
-        selection, told = confirmed(start, named, held, 1)
+    for laws, kept in (([("bias_torque", np.array([3.0]))], True), ((), False)):
+        selection, told = confirmed(start, named, [trace("chirp", laws, seed=5, t=SPARSE)], 1)
         assert bool(selection.chosen.model.names) is kept and told.parts[0].training is None
 
 
-def test_folds_and_halves_leave_out_what_is_judged(stopped):
-    traces = stopped[0].traces
+def test_folds_and_halves_leave_out_what_is_judged(plain):
+    traces = plain.traces
     first, second = halves(traces, 2)
     assert first.known == second.known == [0, 1, 2] and first.held_out.t[-1] < second.held_out.t[0]
     assert [fold.known for fold in folds(traces, [])[0]] == [[1, 2], [0, 2], [0, 1]]
