@@ -1,53 +1,66 @@
-"""What held-out data confirms, what a model betrays of its sensor, and how far the unseen moves the numbers."""
+"""What held-out data confirms, and what few samples, a converter or any remainder would show."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import NOISE, TRUTH, bench_of, started, trace
+from servo import NAMES, NOISE, SPARSE, having, recorded, started, trace
 
-from ers_mj.data.prepared import trace_of
-from ers_mj.data.recording import from_arrays
 from ers_mj.decisions.policy import POLICY
-from ers_mj.diagnosis.mujoco_check import HELD_SECONDS, LEFT_OUT_SECONDS, run_in_mujoco
 from ers_mj.effects import BY_NAME
+from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit
-from ers_mj.estimation.initial_state import without_spikes
-from ers_mj.estimation.intervals import half_widths, unseen_widths
-from ers_mj.selection.candidates import candidates
-from ers_mj.selection.confirmation import Court, Judged
-from ers_mj.selection.cross_validation import Fold, Score, folds, halves, scored
+from ers_mj.selection.confirmation import confirmed, delta_bic, is_a_converters, is_any_wave, may_be_none
+from ers_mj.selection.cross_validation import Score, folds, halves
 from ers_mj.selection.stepwise import Selection
 
 
+def chosen(start: Start, name, p, is_fitted=True) -> Selection:
+    """A selection that has named one effect."""
+    found = having(start.fit, name, p)
+    found = fit(found.model, start.traces) if is_fitted else found
+    return Selection(start.fit, found, (), 1.0, start.traces)
+
+
 @pytest.fixture(scope="module")
-def plain():
-    """A servo without missing physics."""
-    return started([trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
+def hardening():
+    """A servo whose spring hardens, as one wide recording of three shows."""
+    laws = [("hinge_moment_cubic", np.array([20.0, np.inf]))]
+    calm = [trace(name, laws, gain=0.35, seed=k, t=SPARSE) for k, name in enumerate(("multisine", "chirp"))]
+    return started([*calm, trace("multisine", laws, seed=2, t=SPARSE)])
 
 
-def court_of(start, traces=None):
-    """Where effects beside this baseline are judged by each recording in turn."""
-    start = start if traces is None else replace(start, traces=traces)
-    return Court(start, Selection(start.fit, start.fit, (), 1.0, start.traces), [], 1, POLICY)
+def test_an_effect_that_one_recording_shows_is_judged_within_it(hardening):
+    named = chosen(hardening, "hinge_moment_cubic", [20.0, np.inf])
+    selection, told = confirmed(hardening, named, [], 1)
+    assert selection is named and told.p["hinge_moment_cubic"] < 0.05
+    assert "multisine, which teaches most of an effect, by halves as well" in told.sentence
+    assert len(told.shown) == len(told.parts) + 1  # of which one in two halves
 
 
-def holding(y, begins, length=12):
-    y = y.copy()
-    for begin in begins:
-        y[begin : begin + length] = y[begin]
-    return y
+def test_what_held_out_data_does_not_confirm_is_taken_out_and_told(plain):
+    named = chosen(plain, "quadratic_drag", [0.01, np.inf])
+    selection, told = confirmed(plain, named, [], 1)
+    assert selection.chosen is plain.fit and not told.p
+    (move,) = selection.trail
+    assert (move.kind, move.before, move.after, move.accepted) == ("drop", ("quadratic_drag",), (), True)
+    assert "held-out" in move.because
 
 
-def test_a_hold_behind_a_coarse_converter_is_betrayed_by_the_model(plain):
-    begins = np.arange(150, 2900, 125)
-    step = 2.5 * NOISE
-    coarse = trace("multisine", sensor=lambda y: step * np.round(holding(y, begins) / step))
-    found = without_spikes(plain.fit.model, [coarse])[0]
-    moving = [b for b in begins if abs(coarse.y[b + 12] - coarse.y[b]) > 6 * step]
-    masked = [b for b in moving if not found.valid[b + 1 : b + 12].any()]
-    assert len(coarse.lost) >= 3 and len(moving) >= 8 and len(masked) >= 0.8 * len(moving)
+def test_an_effect_is_judged_on_recordings_of_another_day():
+    """A torque of 3 rad/s^2 that the held-out recording has, too, and one that it has not."""
+    start = started(recorded([("bias_torque", np.array([3.0]))], names=NAMES[:2], t=SPARSE))
+    named = chosen(start, "bias_torque", [3.0])
+    for laws, kept in (([("bias_torque", np.array([3.0]))], True), ((), False)):
+        selection, told = confirmed(start, named, [trace("chirp", laws, seed=5, t=SPARSE)], 1)
+        assert bool(selection.chosen.model.names) is kept and told.parts[0].training is None
+
+
+def test_folds_and_halves_leave_out_what_is_judged(plain):
+    traces = plain.traces
+    first, second = halves(traces, 2)
+    assert first.known == second.known == [0, 1, 2] and first.held_out.t[-1] < second.held_out.t[0]
+    assert [fold.known for fold in folds(traces, [])[0]] == [[1, 2], [0, 2], [0, 1]]
 
 
 def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
@@ -57,92 +70,38 @@ def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
     step = 0.016
     coarse, fine = ([trace("multisine", sensor=lambda y, s=s: s * np.round(y / s))] for s in (step, NOISE))
     small, large = (
-        plain.fit.model.with_effect("sensor_nonlinearity", np.array([np.inf, np.inf, size * step, 0.043, 0.3]))
+        having(plain.fit, "sensor_nonlinearity", [np.inf, np.inf, size * step, 0.043, 0.3]).model
         for size in (0.3, 0.8)
     )
-    by_coarse, by_fine = court_of(plain, coarse), court_of(plain, fine)
-    assert by_coarse.is_a_converters("sensor_nonlinearity", small)
-    assert not by_coarse.is_a_converters("sensor_nonlinearity", large)
-    assert not by_fine.is_a_converters("sensor_nonlinearity", small)
-    assert not by_coarse.is_a_converters("bias_torque", small.with_effect("bias_torque", np.array([0.1])))
+    assert is_a_converters("sensor_nonlinearity", small, coarse)
+    assert not is_a_converters("sensor_nonlinearity", large, coarse)
+    assert not is_a_converters("sensor_nonlinearity", small, fine)
+    assert not is_a_converters("bias_torque", having(plain.fit, "bias_torque").model, coarse)
 
 
-def test_a_rudder_that_sticks_is_not_held(plain):
-    whole = trace("multisine", sensor=lambda y: 2.5 * NOISE * np.round(y / (2.5 * NOISE)))
-    whole = replace(whole, lost=(slice(5, 6),) * 3)  # as where its sensor had been seen to hang
-    assert np.array_equal(without_spikes(plain.fit.model, [whole])[0].valid, whole.valid)
-
-
-def test_what_cannot_be_scaled_is_refitted_from_all_its_starts(plain):
-    peak = max(float(np.abs(t.u).max()) for t in plain.traces)
-    clipped = [
-        trace(name, [("voltage_saturation", np.array([0.93 * peak, np.inf]))], seed=k)
-        for k, name in enumerate(("multisine", "steps", "chirp"))
-    ]
-    start = started(clipped)
-    best, *others = candidates(bench_of(start.traces, only=("voltage_saturation", "current_limit")), start.fit)
-    clip = next(c for c in (best, *others) if c.name == "voltage_saturation")
-    assert clip.gain == pytest.approx(best.gain, abs=0.01)  # without inductance a limit of the current is the same
-    assert dict(clip.fit.model.effects)[clip.name][0] == pytest.approx(0.93 * peak, rel=0.01)
-
-
-def test_an_effect_that_one_recording_shows_is_judged_within_it():
-    calm, wide = trace("multisine", gain=0.5), trace("multisine", gain=1.0)
-    upper = float(np.nanquantile(wide.y, 0.97))
-    stop = np.array([-math.inf, upper, 3e5, 50.0])
-    assert np.nanmax(calm.y) < upper
-    traces = [
-        trace("multisine", [("end_stop", stop)], gain=0.5),
-        trace("steps", gain=0.5, seed=1),
-        trace("multisine", [("end_stop", stop)], seed=2),
-    ]
-    start = started(traces)
-    chosen = fit(start.fit.model.with_effect("end_stop", stop), start.traces)
-    court = court_of(start)
-
-    def p(model):
-        after = [scored(some, fold.held_out) for some, fold in zip(court.refits(model), court.parts, strict=True)]
-        return court.judged("end_stop", model, after).p
-
-    assert p(chosen.model) < 0.05
-    nowhere = start.fit.model.with_effect("end_stop", np.array([float(np.nanmin(wide.y)) - 1.0, math.inf, 3e5, 50.0]))
-    assert p(nowhere) > 0.2
-    first, second = halves(start.traces, 2)
-    assert first.known == second.known == [0, 1, 2] and first.held_out.t[-1] < second.held_out.t[0]
-    assert [fold.known for fold in folds(start.traces, [])[0]] == [[1, 2], [0, 2], [0, 1]]
-
-
-def test_what_is_too_small_to_be_found_widens_the_intervals(plain):
-    faint = started(
-        [
-            trace(name, [("quadratic_drag", np.array([0.02, np.inf]))], seed=k)
-            for k, name in enumerate(("multisine", "steps", "chirp"))
-        ]
-    )
-    model, layout = faint.fit.model, faint.fit.model.layout()
-    noise, unseen = half_widths(model, faint.traces, (), 1.0), unseen_widths(model, faint.traces, 1.0)
-    off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))
-    assert np.all(unseen > 0) and np.all(off < 2.0 * np.hypot(noise, unseen))
-
-
-def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out():
-    """Of a recording where few samples bear it, or while its start is read; within one the interval of what moves a
-    rudder that sticks tells little.
-    """
-    quiet = [trace(name, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))]
-    for begun, knocked, none in (
+@pytest.mark.parametrize(
+    "begun, knocked, none",
+    [
         (2.9, False, True),
         (-0.28, True, True),
         (0.03, True, True),
         (1.0, False, False),
         (1.0, True, False),
         (2.6, True, False),
-    ):
-        knock = np.array([40.0, begun, 0.3, 1.0, np.inf])
-        traces = [quiet[0], trace("steps", [("load_disturbance", knock)], seed=1) if knocked else quiet[1], quiet[2]]
-        start = started(traces)
-        found = fit(start.fit.model.with_effect("load_disturbance", knock), start.traces)
-        assert court_of(start).may_be_none("load_disturbance", found.model) == none
+    ],
+)
+def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out(plain, begun, knocked, none):
+    """Of a recording where few samples bear it, or while its start is read; within one the interval of what moves a
+    rudder that sticks tells little.
+    """
+    knock = np.array([40.0, begun, 0.3, 1.0, np.inf])
+    start = plain
+    if knocked:
+        first, _, last = recorded()
+        start = started([first, trace("steps", [("load_disturbance", knock)], seed=1), last])
+    model = chosen(start, "load_disturbance", knock).chosen.model
+    assert may_be_none("load_disturbance", model, start.traces, 1.0) == none
+    assert not may_be_none("bias_torque", having(plain.fit, "bias_torque").model, start.traces, 1.0)
 
 
 def test_a_wave_of_many_that_does_not_pay_for_its_numbers_is_any_wave(plain):
@@ -150,24 +109,11 @@ def test_a_wave_of_many_that_does_not_pay_for_its_numbers_is_any_wave(plain):
     its p-value alone.
     """
     model = plain.fit.model
-    for name in ("cogging", "transmission_ripple", "periodic_gust", "sensor_nonlinearity", "voltage_saturation"):
+    names = ("cogging", "transmission_ripple", "periodic_gust", "sensor_nonlinearity", "voltage_saturation")
+    for name in names:
         model = model.with_effect(name, BY_NAME[name].starts(model.scales)[-1])
     left, little, much = (Score(1.0, 1, np.full(100, math.expm1(c / 100) + 0.5)) for c in (20.0, 14.0, 8.0))
-    court, waves = court_of(plain), ("cogging", "transmission_ripple", "periodic_gust")
-    for name in model.names:
-        told = [court.is_any_wave(name, model, Judged([], left, ([after], [left]), 0.0)) for after in (little, much)]
-        assert told == [name in waves, False]
-
-
-@pytest.mark.parametrize("training, most", [(None, HELD_SECONDS), ((), LEFT_OUT_SECONDS)])
-def test_mujoco_runs_a_few_seconds_of_what_was_held_out(training, most):
-    def held(seconds):
-        t = np.arange(0.0, seconds, 1e-2)
-        return Fold(trace_of(from_arrays(t, np.sin(t), np.sin(t), name=f"{seconds} s"), None), training)
-
-    (long,) = run_in_mujoco([held(12.0), held(2.0)])
-    assert long.name == "12.0 s" and long.t[-1] == pytest.approx(most, abs=0.011)
-    assert [trace.name for trace in run_in_mujoco([held(0.4 * most), held(0.5 * most), held(0.4 * most)])] == [
-        f"{0.4 * most} s",
-        f"{0.5 * most} s",
-    ]
+    for name in names:
+        found = [is_any_wave(name, model, after, left) for after in (little, much)]
+        assert found == [name in names[:3], False]
+        assert delta_bic(name, model, much, left) > delta_bic(name, model, little, left)

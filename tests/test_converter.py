@@ -10,6 +10,7 @@ from test_reduced import SCALES
 from ers_mj.data.prepared import counted, trace_of
 from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import from_arrays
+from ers_mj.decisions.policy import POLICY
 from ers_mj.estimation import baseline
 from ers_mj.estimation.baseline import Start, sharpened
 from ers_mj.estimation.fit import fit
@@ -18,9 +19,9 @@ from ers_mj.estimation.jacobian import step_of
 from ers_mj.estimation.objective import residuals, run_of
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.selection.candidates import _is_within_a_step
 from ers_mj.selection.comparison import Candidate
-from ers_mj.selection.stepwise import _is_rough_and_wrong
+from ers_mj.selection.finishing import is_within_a_step
+from ers_mj.selection.whiteness import is_beyond_rounding
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
 T = np.arange(0.0, 4.0, 1e-3)
@@ -126,9 +127,9 @@ def test_a_model_further_from_the_readings_than_their_rounding_is_wrong(torque, 
     trace, truth = recorded([("bias_torque", np.array([torque]))] if torque else ())
     coarse = counted([trace], float(np.ptp(trace.y)))
     found = fit(model(truth), with_starts(model(truth), coarse))
-    assert _is_rough_and_wrong(found, coarse) is wrong and not _is_rough_and_wrong(found, [trace])
-    bristle = replace(found, model=found.model.with_effect("presliding", np.array([1e-3, 0.2, np.inf, np.inf])))
-    assert not _is_rough_and_wrong(bristle, coarse)
+    assert is_beyond_rounding(found.model, coarse) is wrong and not is_beyond_rounding(found.model, [trace])
+    bristle = found.model.with_effect("presliding", np.array([1e-3, 0.2, np.inf, np.inf]))
+    assert not is_beyond_rounding(bristle, coarse)
 
 
 def test_a_baseline_that_is_far_is_not_led_astray():
@@ -172,7 +173,6 @@ def test_what_moves_the_reading_by_less_than_half_a_coarse_step_is_nothing_to_na
         "bias_torque", np.array([torque])
     )
     candidate = Candidate("bias_torque", replace(fit(model, coarse, steps=1), model=model), 10.0, 3.0, 0.0, 1.0)
-    assert _is_within_a_step(candidate, coarse) is within and not _is_within_a_step(candidate, [fine])
-    assert not _is_within_a_step(
-        replace(candidate, gain=90.0), coarse
-    )  # many thresholds tell together what is much smaller than a step
+    assert is_within_a_step(candidate, coarse, POLICY) is within and not is_within_a_step(candidate, [fine], POLICY)
+    # many thresholds tell together what is much smaller than a step
+    assert not is_within_a_step(replace(candidate, gain=90.0), coarse, POLICY)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import NOISE, TRUTH, started, trace
+from servo import NAMES, NOISE, TRUTH, started, trace
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
@@ -17,6 +17,18 @@ from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere, remembere
 T = np.arange(0.0, 8.0, 1e-3)
 BLOCK = (T / 0.25).astype(int)
 FAINT = 0.4  # noise levels
+
+
+def bent(name, size, seed=0):
+    """A recording whose sensor adds a wave of so many noise levels along the travel."""
+    return trace(name, sensor=lambda y: y + size * NOISE * np.sin(600.0 * y), seed=seed)
+
+
+@pytest.fixture(scope="module")
+def true_model(plain):
+    """The servo as it is."""
+    model = plain.fit.model
+    return replace(model, values={**model.values, **TRUTH, "tau_e": 0.0, "emf_share": 1.0})
 
 
 @pytest.mark.parametrize("noise", [0.7, 1.0, 1.4])
@@ -31,61 +43,44 @@ def test_the_power_of_a_faint_wave_is_read_whatever_the_noise(noise):
 
 
 @pytest.mark.parametrize("times", [0.0, 1.0, 40.0])
-def test_a_converter_leaves_no_mismatch(times):
+def test_a_converter_leaves_no_mismatch(times, plain):
     """The model that made the recordings, read as it is or by a converter of one or forty noise levels."""
-
-    def sensor(y):
-        return np.round(y / (times * NOISE)) * times * NOISE if times else y
-
-    start = started([trace(name, sensor=sensor, seed=k) for k, name in enumerate(("multisine", "steps", "chirp"))])
-    assert times < 1.0 or converter_step(start.traces[0].y) == pytest.approx(times * NOISE, rel=0.1)
+    step = times * NOISE
+    read = [trace(name, sensor=lambda y: np.round(y / step) * step, seed=k) for k, name in enumerate(NAMES) if times]
+    start = started(read) if times else plain
+    assert times < 1.0 or converter_step(start.traces[0].y) == pytest.approx(step, rel=0.1)
     assert abs(left_by_sensor(start.fit.model, start.traces)["output"]) < 0.06
 
 
 def test_a_mismatch_below_the_noise_is_seen():
-    traces = [
-        trace(name, sensor=lambda y: y + NOISE * np.sin(600.0 * y), seed=k)
-        for k, name in enumerate(("multisine", "steps", "chirp"))
-    ]
-    start = started(traces)
+    start = started([bent(name, 1.0, k) for k, name in enumerate(NAMES)])
     assert left_by_sensor(start.fit.model, start.traces)["output"] > 0.1
 
 
-def test_what_one_recording_alone_shows_is_not_left_elsewhere():
+def test_what_one_recording_alone_shows_is_not_left_elsewhere(plain):
     """A wave in one of three recordings is seen by the mean over all, and not by that over the others; a wave in each
     is seen by both.
     """
+    model = plain.fit.model
 
-    def left(bent):
-        traces = [
-            trace(name, sensor=lambda y, size=2.0 * (name in bent): y + size * NOISE * np.sin(600.0 * y), seed=k)
-            for k, name in enumerate(("multisine", "steps", "chirp"))
-        ]
-        model = started([trace("multisine")]).fit.model
+    def left(*waving):
+        traces = [bent(name, 2.0 * (name in waving), k) for k, name in enumerate(NAMES)]
         return left_by_sensor(model, traces)["output"], left_elsewhere(model, traces)
 
-    one, every = left(("multisine",)), left(("multisine", "steps", "chirp"))
+    one, every = left("multisine"), left(*NAMES)
     assert one[0] > 0.1 and one[1] < 0.03
     assert every[0] > 0.3 and every[1] > 0.2
-    assert (
-        left_elsewhere(
-            started([trace("multisine")]).fit.model,
-            [trace("multisine", sensor=lambda y: y + 9.0 * NOISE * np.sin(600.0 * y))],
-        )
-        == 0.0
-    )
+    assert left_elsewhere(model, [bent("multisine", 9.0)]) == 0.0
 
 
 @pytest.mark.parametrize("rate", [1000, 50, 10])
-def test_at_low_sample_rates_blocks_are_joined(rate):
+def test_at_low_sample_rates_blocks_are_joined(rate, true_model):
     """A slow mismatch of four noise levels is seen where a quarter of a second holds two samples as well as where it
     holds 250.
     """
     plant, t = ReducedModel(lumped(TRUTH)), np.arange(0.0, 15.0, 1.0 / rate)
     u = 3.0 * np.sign(np.sin(t))
     y = plant.simulate(t, u).measured + NOISE * np.random.default_rng(1).standard_normal(t.size)
-    model = started([trace("multisine")]).fit.model
-    model = replace(model, values={**model.values, **TRUTH, "tau_e": 0.0, "emf_share": 1.0})
-    plain, bent = (trace_of(from_arrays(t, u, y + size * NOISE * np.sin(2.0 * t)), None) for size in (0.0, 6.0))
-    assert abs(left_by_sensor(model, [replace(plain, sigma=NOISE)])["output"]) < 0.06
-    assert left_by_sensor(model, [replace(bent, sigma=NOISE)])["output"] > 0.085
+    plain, slow = (trace_of(from_arrays(t, u, y + size * NOISE * np.sin(2.0 * t)), None) for size in (0.0, 6.0))
+    assert abs(left_by_sensor(true_model, [replace(plain, sigma=NOISE)])["output"]) < 0.06
+    assert left_by_sensor(true_model, [replace(slow, sigma=NOISE)])["output"] > 0.085
