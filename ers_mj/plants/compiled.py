@@ -185,7 +185,7 @@ def by_address(record: types.Record, place: str, signature) -> Callable:
     ``constants``.
     """
     if IS_PLAIN:
-        return lambda law, *rest: _PLAIN_LAWS[law[place] - 1](law["constants"], *rest)
+        return lambda law, *rest: _PLAIN_LAWS[law[place] - 1](law["constants"].tolist(), *rest)
 
     def find(builder, function_type, arguments):
         law, rest = arguments[0], arguments[1:]

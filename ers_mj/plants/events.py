@@ -61,7 +61,7 @@ def _contact_violation(c, x, m):
     return -_push(depth, rate, c.k_twist, c.d_twist)
 
 
-@unit(F(I, C, X, M))
+@inline
 def _bristle_violation(e, c, x, m):
     """Event function of the bristle: a reversal ends its slip; bent to the full, which is the motor's breakaway here,
     begins it.
@@ -76,7 +76,7 @@ def _bristle_violation(e, c, x, m):
     return abs(pull) - FULL * bristle_level(c, x, 1.0 if x.w > 0 else -1.0)
 
 
-@unit(F(I, C, F, X, M))
+@inline
 def _motor_violation(e, c, t, x, m):
     """Event function of the motor's side."""
     if c.rho <= 0:
@@ -91,7 +91,7 @@ def _motor_violation(e, c, t, x, m):
     return abs(a) - level * (1.0 + CREPT)
 
 
-@unit(F(I, C, F, X, M))
+@inline
 def violation(e, c, t, x, m):
     """Event function e: positive where the mode's inequality fails."""
     if e == REVERSAL:

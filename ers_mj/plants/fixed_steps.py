@@ -18,7 +18,7 @@ import numpy as np
 
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import split_delay
-from ers_mj.plants.forces import LEAST_LEVEL, motor_level
+from ers_mj.plants.forces import LEAST_LEVEL, PAIR, motor_level
 from ers_mj.plants.laws import drive_torque, friction_level, remember, total_torque
 from ers_mj.plants.march import faster
 from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, C, F, I, L, is_bounded, plant_in, types
@@ -178,7 +178,7 @@ def _bristle_damping(c, w, z, level):
     return c.d_bristle * (left if c.dahl == 1.0 else left ** c.dahl) * math.exp(-((w / c.fade) ** 2))
 
 
-@inline
+@unit(PAIR(C, F, F, F, F, F, F, F, F, F, F))
 def _solved(c, theta, theta_m, w, w_m, push, push_m, own, own_m, holds, h):
     """(w, w_m) at the end of a step, under forces in its middle that do not hang on them, dampings of each body's own,
     and what contact and stop do: neither pulls back what it has pushed.

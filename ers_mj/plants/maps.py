@@ -125,7 +125,7 @@ def _row_of_two(e, n, i, x, drive, side, f):
     return _row(e, n, i, x, drive, side, f) + e[n, i, 3] * x.theta_m + e[n, i, 4] * x.w_m
 
 
-@unit(X(MAPS, I, X, F, I, TRIPLE))
+@inline
 def _mapped_two(e, n, x, drive, side, f):
     """The same of two bodies."""
     return State(
@@ -225,11 +225,9 @@ def two_body_segment(e, step, c, t, x, m, drive, tau, a_emf, load, h):
     driven = c.lawful > 0 and not has_bristle(c)
     n = _number(m)
     _make(e, n, c, m, tau, a_emf, step, driven)
-    if c.lawful == 0 and (c.harden <= 0 or has_bristle(c)):
+    if (c.lawful == 0 and (has_bristle(c) or c.harden <= 0)) or (has_bristle(c) and m.s == 0):
         return _mapped_two(e, n, x, drive, m.side, _constant(load))
     _make(e, n + MODES_APART, c, m, tau, a_emf, step / 2, driven)
-    if not has_bristle(c):
-        return _parted_segment(e, n, c, t, x, m, drive, load, h)
-    if m.s == 0:
-        return _mapped_two(e, n, x, drive, m.side, _constant(load))
-    return _bristle_segment(e, n, c, t, x, m, drive, load, h)
+    if has_bristle(c):
+        return _bristle_segment(e, n, c, t, x, m, drive, load, h)
+    return _parted_segment(e, n, c, t, x, m, drive, load, h)

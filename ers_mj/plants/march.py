@@ -200,7 +200,7 @@ def _resting_on_bristle(c, t, x, m, drive, tau, a_emf, load, h):
     return still, z
 
 
-@unit(types.Tuple((L, X))(MAPS, F, C, F, X, M, F, F, F, F, F))
+@inline
 def _of_two_bodies(e, step, c, t, x, m, drive, tau, a_emf, load, h):
     """(whether two bodies, or one on a bristle, go on in their mode over h, the state then or as it begins)."""
     x = with_drive(c, x, drive, tau, a_emf)

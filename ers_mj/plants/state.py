@@ -25,7 +25,7 @@ from numba import types
 from ers_mj.effects.base import Coefficients
 from ers_mj.plants.compiled import inline, record_in
 
-MOST_LAWS = 64  # effects that act by laws at once
+MOST_LAWS = 40  # effects that act by laws at once
 N_CONSTANTS = 7  # of a law at most
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
 
@@ -61,11 +61,14 @@ LAW = _record(
         ("constants", np.float64, (N_CONSTANTS,)),
     ]
 )
-COUNTS = ("effects", "torques", "frictions", "inertias", "motor_torques", "lawful")  # lawful: what adds to the forces
+# numbers of laws; lawful: of those that add to the forces
+COUNTS = ("torques", "frictions", "inertias", "memories", "motor_torques", "lawful")
+HAVING = ("with_torque", "with_friction", "with_inertia", "with_memory", "with_motor_torque")  # which laws those are
 PLANT = _record(
     [
         *((letter, np.float64) for letter in Coefficients._fields),
         *((count, np.int64) for count in COUNTS),
+        *((having, np.uint64, (MOST_LAWS,)) for having in HAVING),
         ("laws", LAW, (MOST_LAWS,)),
     ]
 )
