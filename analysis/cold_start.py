@@ -1,7 +1,7 @@
-"""Compiling and running the reduced model's kernels, this checkout beside an older commit: `python analysis/cold_start.py`.
+"""Compiling and running the reduced model, this checkout beside an older commit: `python analysis/cold_start.py`.
 
-Compiling is everything that can be compiled (each kernel, each law), from an empty cache, in seconds of the processor in
-user mode. Running is the least time of a thread over many calls of 10 s at 1 kHz, multisine, in eight cases, the two
+Compiling is everything that can be compiled (each kernel, each law), from an empty cache, in seconds of the processor
+in user mode. Running is the least time of a thread over many calls of 10 s at 1 kHz, multisine, in eight cases, the two
 checkouts in turn. What a motion is must not differ: the sum of |theta| is compared in every digit.
 """
 
@@ -76,7 +76,12 @@ def asked(checkout: Path, cache: Path, program: str, *arguments: str) -> tuple[s
     environment = {**os.environ, "PYTHONPATH": str(checkout), "XDG_CACHE_HOME": str(cache), "ERS_MJ_COMPILING": "1"}
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = subprocess.run(
-        [sys.executable, "-c", program, *arguments], env=environment, cwd=cache, check=True, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", program, *arguments],
+        env=environment,
+        cwd=cache,
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     return done.stdout, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
@@ -109,7 +114,8 @@ def main():
     for case, before in least["before"].items():
         now, same = least["now"][case], sums["now"][case] == sums["before"][case]
         kept = kept and same and now <= MOST_RUNNING * before
-        print(f"{case:12}{1e3 * before:7.3f} ms{1e3 * now:7.3f} ms{now / before:8.3f}   {'' if same else 'ANSWERS DIFFER'}")
+        differ = "" if same else "   ANSWERS DIFFER"
+        print(f"{case:12}{1e3 * before:7.3f} ms{1e3 * now:7.3f} ms{now / before:8.3f}{differ}")
     print("bars kept" if kept else "bars NOT kept")
     return 0 if kept else 1
 

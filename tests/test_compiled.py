@@ -47,7 +47,12 @@ def home(tmp_path):
 
 
 def run(home, program, **more):
-    environment = {**os.environ, "XDG_CACHE_HOME": str(home / "cache"), "PYTHONPATH": f"{ROOT}{os.pathsep}{home}", **more}
+    environment = {
+        **os.environ,
+        "XDG_CACHE_HOME": str(home / "cache"),
+        "PYTHONPATH": f"{ROOT}{os.pathsep}{home}",
+        **more,
+    }
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(program)], env=environment, cwd=home, capture_output=True, text=True
     )
@@ -147,7 +152,9 @@ def test_an_edited_law_is_run_and_leaves_the_kernels_as_they_are():
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     for law in ("-p[0] * w", "-2.0 * p[0] * w", "-p[0] * w"):
         program = LAW.format(law=law, end=0.1) + "print(model.simulate(t, np.ones(20)).theta[-1].hex())"
-        done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+        )
         assert answers.setdefault(law, done.stdout) == done.stdout and "compiling" not in done.stderr
     assert len(set(answers.values())) == 2
 
@@ -178,7 +185,8 @@ def test_what_is_compiled_without_jit_moves_alike():
     from ers_mj.plants.reduced import ReducedModel, lumped
     c = lumped({"b": 10.0, "a_1": 5.0, "a_2": 3.0, "c_1": 0.5, "c_2": 1.0, "theta_0": 0.1})
     t = np.linspace(0.0, 0.2, 60)
-    for effects in ([], [("stribeck", np.array([1.0, 0.1, 1.0, np.inf]))], [("backlash", np.array([0.01, 0.5, 0.5, 80.0, 0.1]))]):
+    stribeck, backlash = [1.0, 0.1, 1.0, np.inf], [0.01, 0.5, 0.5, 80.0, 0.1]
+    for effects in ([], [("stribeck", np.array(stribeck))], [("backlash", np.array(backlash))]):
         print(ReducedModel(c, effects).simulate(t, 3.0 * np.sin(40.0 * t)).theta.tobytes().hex())
     """
     told = []
@@ -253,6 +261,8 @@ def test_the_first_call_says_what_it_compiles(home):
     PrintedPlay(lumped({"b": 1.0}), 0.1).simulate(t, t)
     """
     assert run(home, program)[1] == ""  # one part: no word
-    program = program.replace("PrintedPlay(lumped", "from ers_mj.plants.reduced import ReducedModel\n    ReducedModel(lumped")
+    program = program.replace(
+        "PrintedPlay(lumped", "from ers_mj.plants.reduced import ReducedModel\n    ReducedModel(lumped"
+    )
     _, said = run(home, program.replace('{"b": 1.0}), 0.1)', '{"b": 1.0}))'))
     assert said.count("compiling") == 1 and "for this machine, once: about" in said

@@ -1,4 +1,4 @@
-"""Compiling: functions that are compiled each on its own and call each other by symbol, and laws called by their address.
+"""Compiling: functions that are compiled each on its own and call each other by symbol; laws called by address.
 
     inline   put into its callers, for what is small or called in one place
     unit     compiled once, apart from its callers, neither linked nor inlined into them
@@ -19,7 +19,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, wraps
+from functools import cache, cached_property, wraps
 from pathlib import Path
 
 import llvmlite.binding as llvm
@@ -112,8 +112,8 @@ def inline(function: Callable) -> Callable:
 
 
 def inline_as(signature) -> Callable[[Callable], Callable]:
-    """As ``inline``, compiled for this signature alone: of what is called with numbers written out, of which numba would
-    make a copy each.
+    """As ``inline``, compiled for this signature alone: of what is called with numbers written out, for each of which
+    numba would make a copy.
     """
 
     def declare(function: Callable) -> Callable:
@@ -127,7 +127,7 @@ def inline_as(signature) -> Callable[[Callable], Callable]:
 
 
 def unit(signature) -> Callable[[Callable], Callable]:
-    """Compile a function that makes no arrays of its own once, apart from its callers, which call it by its symbol."""
+    """Compile a function that makes no arrays once, apart from its callers, which call its symbol."""
 
     def declare(function: Callable) -> Callable:
         if IS_PLAIN:
@@ -165,7 +165,7 @@ def kernel(signature) -> Callable[[Callable], Callable]:
     return declare
 
 
-@lru_cache(maxsize=None)
+@cache
 def address_of(function: Callable, signature) -> int:
     """Of a law, compiled now where it was not before; where nothing is compiled a number that stands for it."""
     if IS_PLAIN:
@@ -260,7 +260,7 @@ def make(piece: Piece) -> None:
 
 
 def _in_order(piece: Piece) -> list[Piece]:
-    """A piece and those that it needs, and has not yet, callees before their callers: a missing symbol ends the process."""
+    """A piece and those that it needs and has not yet, callees first: a symbol that is missing ends the process."""
     found = {}
 
     def visit(each: Piece) -> None:

@@ -6,7 +6,7 @@ import math
 
 from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.laws import drive_torque, friction_level, moved, total_torque
-from ers_mj.plants.state import C, F, I, M, State, X, drive_speed, has_bristle, is_parted, types
+from ers_mj.plants.state import C, F, M, State, X, drive_speed, has_bristle, is_parted, types
 
 LEAST_LEVEL = 0.2  # of the mean friction, which laws cannot lower a bristle's beyond
 PAIR, TRIPLE = types.UniTuple(F, 2), types.UniTuple(F, 3)

@@ -109,7 +109,7 @@ def _without_numbers(on: Acting) -> np.ndarray:
         raise ValueError(f"{len(on.rows)} effects act by laws at once, of at most {MOST_LAWS}")
     flat = np.zeros(PLANT.itemsize // np.float64().nbytes)
     plant, effects = flat.view(PLANT)[0], [EFFECTS[row] for row in on.rows]
-    for law, effect in zip(plant.laws, effects):
+    for law, effect in zip(plant.laws, effects, strict=False):
         for kind, signature in SIGNATURES.items():
             if getattr(effect, kind):
                 law[kind] = address_of(getattr(effect, kind), signature)

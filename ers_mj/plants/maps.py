@@ -1,5 +1,6 @@
-"""The flow over a whole segment of a sample as one precomputed map. What laws add enters it as a force that is a parabola
-in time, through three evaluations (an exponential integrator); what a shaft that hardens adds goes the same way.
+"""The flow over a whole segment of a sample as one precomputed map. What laws add enters it as a force that is a
+parabola in time, through three evaluations (an exponential integrator); what a shaft that hardens adds goes the same
+way.
 """
 
 from __future__ import annotations
@@ -10,17 +11,18 @@ from numba import njit
 from ers_mj.plants.compiled import inline, inline_as, unit
 from ers_mj.plants.flow import flow, linear
 from ers_mj.plants.forces import TRIPLE, beside, extra
-from ers_mj.plants.state import C, F, I, L, M, Mode, State, X, bends, has_bristle, types
+from ers_mj.plants.state import C, F, L, M, Mode, N, State, X, bends, has_bristle, types
 
 GAUSS_X, GAUSS_W = (0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(10)[1])
 # columns of a map: x, a constant, the drive, the side, then a force as a parabola 1, s, s^2 on the rudder, between the
 # bodies, on the motor
-CONSTANT, DRIVE, SIDE, ON_RUDDER, BETWEEN, ON_MOTOR, COLUMNS = 5, 6, 7, 8, 11, 14, 17
+CONSTANT, DRIVE, SIDE = range(5, 8)
+ON_RUDDER, BETWEEN, ON_MOTOR, COLUMNS = range(8, 18, 3)
 MODES_APART = 27  # of s, s_m and twist
 MAPS = F[:, :, ::1]  # (54, 5, 17), see no_maps
 
 
-@unit(types.void(MAPS, I, I, C, M, F, F, F, X))
+@unit(types.void(MAPS, N, N, C, M, F, F, F, X))
 def _add_parabola(e, n, column, c, m, tau, a_emf, h, push):
     """Add what the accelerations ``push`` of a unit force as 1, s, s^2 (s = t/h) do over h, by Gauss's rule."""
     for g in range(GAUSS_X.size):
@@ -44,11 +46,11 @@ def _one(k):
     )
 
 
-@unit(types.void(MAPS, I, C, M, F, F, F, L))
+@unit(types.void(MAPS, N, C, M, F, F, F, L))
 def fill_map(e, n, c, m, tau, a_emf, h, driven):
-    """The exact map over h in a mode with side 0: e[n] (5, 17), columns x (5), constant, drive, side, force on the rudder
-    1, s, s^2 (s = t/h), the same of a force between the two bodies where their shaft hardens, and of one on the motor
-    where it is ``driven`` by laws.
+    """The exact map over h in a mode with side 0: e[n] (5, 17), columns x (5), constant, drive, side, force on the
+    rudder 1, s, s^2 (s = t/h), the same of a force between the two bodies where their shaft hardens, and of one on the
+    motor where it is ``driven`` by laws.
     """
     zero = State(0.0, 0.0, 0.0, 0.0, 0.0)
     base = linear(c, zero, m, 0.0, tau, a_emf, h, 1.0, 0.0, 0.0)
@@ -97,7 +99,7 @@ def _make(e, n, c, m, tau, a_emf, step, driven):
         fill_map(e, n, c, Mode(m.s, 0, 0, m.s_m, m.twist), tau, a_emf, step, driven)
 
 
-@inline_as(F(MAPS, I, I, X, F, I, TRIPLE))
+@inline_as(F(MAPS, N, N, X, F, N, TRIPLE))
 def _row(e, n, i, x, drive, side, f):
     return (
         e[n, i, 0] * x.theta
@@ -116,11 +118,15 @@ def _row(e, n, i, x, drive, side, f):
 def _mapped_one(e, n, x, drive, side, f):
     """The state of one body after a map, under the force f (3,), a parabola of s from 0 to 1."""
     return State(
-        _row(e, n, 0, x, drive, side, f), _row(e, n, 1, x, drive, side, f), _row(e, n, 2, x, drive, side, f), x.theta_m, x.w_m
+        _row(e, n, 0, x, drive, side, f),
+        _row(e, n, 1, x, drive, side, f),
+        _row(e, n, 2, x, drive, side, f),
+        x.theta_m,
+        x.w_m,
     )
 
 
-@inline_as(F(MAPS, I, I, X, F, I, TRIPLE))
+@inline_as(F(MAPS, N, N, X, F, N, TRIPLE))
 def _row_of_two(e, n, i, x, drive, side, f):
     return _row(e, n, i, x, drive, side, f) + e[n, i, 3] * x.theta_m + e[n, i, 4] * x.w_m
 
@@ -137,14 +143,14 @@ def _mapped_two(e, n, x, drive, side, f):
     )
 
 
-@inline_as(types.UniTuple(F, 2)(MAPS, I, I, TRIPLE, TRIPLE))
+@inline_as(types.UniTuple(F, 2)(MAPS, N, N, TRIPLE, TRIPLE))
 def _pushed(e, n, i, q, r):
     """What a force q (3,) between the bodies and then one r (3,) on the motor add to x_i."""
     between = e[n, i, BETWEEN] * q[0] + e[n, i, BETWEEN + 1] * q[1] + e[n, i, BETWEEN + 2] * q[2]
     return between, e[n, i, ON_MOTOR] * r[0] + e[n, i, ON_MOTOR + 1] * r[1] + e[n, i, ON_MOTOR + 2] * r[2]
 
 
-@unit(X(MAPS, I, X, F, I, TRIPLE, TRIPLE, TRIPLE))
+@unit(X(MAPS, N, X, F, N, TRIPLE, TRIPLE, TRIPLE))
 def _mapped_parted(e, n, x, drive, side, f, q, r):
     """The same of two bodies under the force f on the rudder, q between the two, of a shaft that hardens, and r on the
     motor.
@@ -152,9 +158,7 @@ def _mapped_parted(e, n, x, drive, side, f, q, r):
     z = _mapped_two(e, n, x, drive, side, f)
     (t_q, t_r), (w_q, w_r), (j_q, j_r) = _pushed(e, n, 0, q, r), _pushed(e, n, 1, q, r), _pushed(e, n, 2, q, r)
     (tm_q, tm_r), (wm_q, wm_r) = _pushed(e, n, 3, q, r), _pushed(e, n, 4, q, r)
-    return State(
-        z.theta + t_q + t_r, z.w + w_q + w_r, z.j + j_q + j_r, z.theta_m + tm_q + tm_r, z.w_m + wm_q + wm_r
-    )
+    return State(z.theta + t_q + t_r, z.w + w_q + w_r, z.j + j_q + j_r, z.theta_m + tm_q + tm_r, z.w_m + wm_q + wm_r)
 
 
 @inline
@@ -191,7 +195,7 @@ def one_body_segment(e, step, c, t, x, m, drive, tau, a_emf, load, h, extra_now)
     return _mapped_one(e, n, x, drive, m.side, _parabola(begin, middle, load + end)), end
 
 
-@unit(X(MAPS, I, C, F, X, M, F, F, F))
+@unit(X(MAPS, N, C, F, X, M, F, F, F))
 def _parted_segment(e, n, c, t, x, m, drive, load, h):
     """The same of motor and rudder under laws, or on a shaft that hardens."""
     f, q, r = beside(c, load, t, x, m)
@@ -203,11 +207,13 @@ def _parted_segment(e, n, c, t, x, m, drive, load, h):
     return _mapped_parted(e, n, x, drive, m.side, f, q, r)
 
 
-@unit(X(MAPS, I, C, F, X, M, F, F, F))
+@unit(X(MAPS, N, C, F, X, M, F, F, F))
 def _bristle_segment(e, n, c, t, x, m, drive, load, h):
     """The same on a bristle bent to the full that slips under laws."""
     begin = load + extra(c, load, t, x, m.s)
-    middle = load + extra(c, load, t + 0.5 * h, _mapped_two(e, n + MODES_APART, x, drive, m.side, _constant(begin)), m.s)
+    middle = load + extra(
+        c, load, t + 0.5 * h, _mapped_two(e, n + MODES_APART, x, drive, m.side, _constant(begin)), m.s
+    )
     z = _mapped_two(e, n, x, drive, m.side, _rising(begin, middle))
     end = load + extra(c, load, t + h, z, m.s)
     return _mapped_two(e, n, x, drive, m.side, _parabola(begin, middle, end))

@@ -1,5 +1,5 @@
-"""The compiled integrator of Eq. (1)/(5): through a recording sample by sample, smooth flow between events, every switch
-of a Sgn located exactly.
+"""The compiled integrator of Eq. (1)/(5): through a recording sample by sample, smooth flow between events, every
+switch of a Sgn located exactly.
 
 Where nothing happens, a precomputed map takes a whole segment of a sample (see maps); where its end says that something
 may have, the segment is gone through by events (see ``advance``).
@@ -16,7 +16,18 @@ from ers_mj.effects.base import LEAST_IRON
 from ers_mj.plants.checks import is_calm, is_clean, is_steady, is_still, turns
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import CUTS, corner_speed, cut, law_step, longest_step
-from ers_mj.plants.events import BREAKAWAY, CONTACT, CROSSING, ORDER, REVERSAL, STOP, breakaway, locate, switch, violation
+from ers_mj.plants.events import (
+    BREAKAWAY,
+    CONTACT,
+    CROSSING,
+    ORDER,
+    REVERSAL,
+    STOP,
+    breakaway,
+    locate,
+    switch,
+    violation,
+)
 from ers_mj.plants.flow import flow
 from ers_mj.plants.forces import derivative
 from ers_mj.plants.laws import remember
@@ -29,10 +40,10 @@ from ers_mj.plants.state import (
     VECTOR,
     C,
     F,
-    I,
     L,
     M,
     Mode,
+    N,
     State,
     X,
     bends,
@@ -109,7 +120,7 @@ def _charged(j, drive, tau, h):
     return drive + (j - drive) * math.exp(-h / tau) if tau > 0 else j
 
 
-@unit(types.Tuple((X, M, I))(C, F, X, M, F, F, F, F, F, F))
+@unit(types.Tuple((X, M, N))(C, F, X, M, F, F, F, F, F, F))
 def advance(c, t, x, m, drive, tau, a_emf, dt, h_max, corner):
     """Integrate over dt under a constant drive, through every event on the way. Returns (x, m, number of events)."""
     if tau <= 0:
@@ -268,9 +279,7 @@ def _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, s
         if now.is_usual and now.closed and m.stop == 0:
             e, step = (maps.late, cuts.last) if cuts.fresh[i] == 1 else (maps.early, cuts.ends[0])
             is_last = i == cuts.ends.size - 1
-            done, x, extra, resting = _segment(
-                e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips
-            )
+            done, x, extra, resting = _segment(e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips)
             if done:
                 continue
         extra = np.nan
@@ -288,12 +297,18 @@ def _sample(t, u, enable, load, c, cuts, k):
     return Sample(k, t[k], stretch, is_usual, enable[k], load[k], load[k + 1], before, now)
 
 
-@unit(types.void(READ, READ, READ_BOOL, READ, READ, F, I, C, I, VECTOR, CUTS, OF_A_SAMPLE, L, TABLE))
+@inline
+def _event_budget(c, n, cuts):
+    """Events that n samples may have."""
+    return EVENT_BUDGET * n * (cuts.ends.size if has_bristle(c) else 1) + 1000
+
+
+@unit(types.void(READ, READ, READ_BOOL, READ, READ, F, N, C, N, VECTOR, CUTS, OF_A_SAMPLE, L, TABLE))
 def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps, out):
     """See ``simulate``: through the samples, by maps over segments or, if it ``leaps``, over a whole sample."""
     n, bristle, slips = t.size, has_bristle(c), never_sticks(c)
     h_max, corner = longest_step(c, cuts, refine), corner_speed(c, cuts, refine)
-    budget = EVENT_BUDGET * n * (cuts.ends.size if bristle else 1) + 1000
+    budget = _event_budget(c, n, cuts)
     resting = -1  # the sample that begins in a rest which was checked already
     extra = np.nan  # what the laws add where a segment ended that holds no event
     x = start_state(c, x0[0], x0[1], x0[2], 0.5 * (c.c_2_plus + c.c_2_minus))
@@ -311,16 +326,14 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
             done, x = _leap(maps, c, now, cuts.h0, x, m)
             if done:
                 continue
-        x, m, extra, resting, events = _through_segments(
-            maps, c, now, cuts, x, m, h_max, corner, extra, resting, slips
-        )
+        x, m, extra, resting, events = _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, slips)
         budget -= events
         if not is_bounded(x) or budget < 0:
             out[k + 1 :, :] = np.nan
             return
 
 
-@kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, I, VECTOR, I, VECTOR, TABLE))
+@kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, N, VECTOR, N, VECTOR, TABLE))
 def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
     """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
 

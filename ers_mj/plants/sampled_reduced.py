@@ -14,7 +14,7 @@ from ers_mj.plants.laws import laid_out, remember
 from ers_mj.plants.march import advance
 from ers_mj.plants.modes import start_mode, start_state
 from ers_mj.plants.reduced import ReducedModel
-from ers_mj.plants.state import MODES, PLANT, VECTOR, F, I, Mode, State, is_bounded, plant_in, types
+from ers_mj.plants.state import MODES, PLANT, VECTOR, F, Mode, N, State, is_bounded, plant_in, types
 
 
 @kernel(types.void(VECTOR, VECTOR, MODES))
@@ -29,7 +29,7 @@ def begin(plant, x, m):
         x[i], m[i] = z[i], mode[i]
 
 
-@kernel(types.void(F, F, F, F, VECTOR, I, VECTOR, MODES))
+@kernel(types.void(F, F, F, F, VECTOR, N, VECTOR, MODES))
 def hold(t, h0, before, now, plant, refine, x, m):
     """Move x (5,) and m (5,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first,
     ``now`` afterwards.
@@ -44,9 +44,7 @@ def hold(t, h0, before, now, plant, refine, x, m):
     remember(c, z.theta, z.w, z.j, z.theta_m, z.w_m, h0)
     for i in range(cuts.ends.size):
         drive = c.b * (now if cuts.fresh[i] == 1 else before)
-        z, mode, _ = advance(
-            c, t + start, z, mode, drive, c.tau_e, c.a_emf, cuts.ends[i] - start, h_max, corner
-        )
+        z, mode, _ = advance(c, t + start, z, mode, drive, c.tau_e, c.a_emf, cuts.ends[i] - start, h_max, corner)
         start = cuts.ends[i]
         if not is_bounded(z):
             z = State(np.nan, np.nan, np.nan, np.nan, np.nan)

@@ -74,10 +74,10 @@ PLANT = _record(
 )
 plant_in = record_in(PLANT)  # of an array of numbers (see laws.laid_out)
 
-F, I, L = types.float64, types.int64, types.boolean
+F, N, L = types.float64, types.int64, types.boolean
 C = numba.from_dtype(PLANT)
-X, M = types.NamedUniTuple(F, 5, State), types.NamedUniTuple(I, 5, Mode)
-VECTOR, TABLE, MODES = F[::1], F[:, ::1], I[::1]
+X, M = types.NamedUniTuple(F, 5, State), types.NamedUniTuple(N, 5, Mode)
+VECTOR, TABLE, MODES = F[::1], F[:, ::1], N[::1]
 READ, READ_BOOL = types.Array(F, 1, "C", readonly=True), types.Array(L, 1, "C", readonly=True)
 
 
@@ -128,7 +128,7 @@ def is_bounded(x):
 
 @inline
 def with_drive(c, x, drive, tau, a_emf):
-    """The state whose drive acceleration is at once what the drive makes of its speed, where no inductance delays it."""
+    """The state with the drive acceleration that the drive makes of its speed where no inductance delays it."""
     if tau > 0:
         return x
     return State(x.theta, x.w, drive - a_emf * drive_speed(c, x), x.theta_m, x.w_m)
