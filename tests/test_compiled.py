@@ -1,33 +1,268 @@
-"""What is compiled is compiled once, by another process, which says so."""
+"""Units: compiled apart and kept under their own fingerprints, in a folder that belongs to the user alone."""
 
 import os
+import pickle
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+import pytest
+
+from ers_mj.plants.code_folder import refusal
+from ers_mj.plants.fingerprint import fingerprint
+
+ROOT = Path(__file__).resolve().parents[1]
+SMALL = """
+import sys
+from numba import njit, types
+from ers_mj.plants.compiled import address_of, by_address, inline, kernel, unit
+
+F = types.float64
+{constant}
+
+@inline
+def twice(x):
+    return 2.0 * x
+
+@unit(F(F))
+def lowest(x):
+    return {body}
+
+@unit(F(F))
+def middle(x):
+    return lowest(x) + twice(x)
+
+@kernel(F(F))
+def highest(x):
+    return middle(x) + lowest(x)
+"""
 
 
-def imported(home, **more):
-    """What importing the plants prints on stderr, with kept code in ``home`` and nothing compiled in earnest."""
-    environment = {**os.environ, "XDG_CACHE_HOME": str(home), "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(ROOT), **more}
+@pytest.fixture
+def home(tmp_path):
+    """A folder for a small module and for the code that is kept."""
+    (tmp_path / "cache").mkdir(mode=0o700)
+    return tmp_path
+
+
+def run(home, program, **more):
+    environment = {
+        **os.environ,
+        "XDG_CACHE_HOME": str(home / "cache"),
+        "PYTHONPATH": f"{ROOT}{os.pathsep}{home}",
+        **more,
+    }
     done = subprocess.run(
-        [sys.executable, "-c", "import ers_mj.plants.events"],
-        env=environment,
-        cwd=home,
-        capture_output=True,
-        text=True,
+        [sys.executable, "-c", textwrap.dedent(program)], env=environment, cwd=home, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    return done.stderr
+    return done.stdout.strip(), done.stderr
 
 
-def test_the_first_import_compiles_and_says_so_and_the_second_does_not(tmp_path):
-    assert "compiling" in imported(tmp_path)
-    assert len(list(tmp_path.glob("ers_mj/*/done-*"))) == 1
-    assert imported(tmp_path) == ""
+def write(home, body, constant="K = 3.0"):
+    (home / "small.py").write_text(SMALL.format(body=body, constant=constant))
 
 
-def test_a_process_that_compiles_starts_no_other(tmp_path):
-    assert imported(tmp_path, ERS_MJ_COMPILING="1") == ""
-    assert not list(tmp_path.glob("ers_mj/*/done-*"))
+def kept(home):
+    """Names of what is kept, by the time at which it was written."""
+    return {path.name: path.stat().st_mtime_ns for path in (home / "cache").rglob("*.nbc")}
+
+
+ASK = "import small; print(small.highest(5.0))"
+
+
+def test_units_call_each_other_and_the_plain_functions_agree(home):
+    write(home, "K * x + 1.0")
+    assert run(home, ASK)[0] == run(home, ASK, NUMBA_DISABLE_JIT="1")[0] == "42.0"
+    assert len(kept(home)) == 3
+    before = kept(home)
+    assert run(home, ASK)[0] == "42.0" and kept(home) == before
+
+
+def test_an_edited_unit_compiles_itself_alone_and_is_never_run_stale(home):
+    write(home, "K * x + 1.0")
+    run(home, ASK)
+    before = kept(home)
+    write(home, "K * x + 2.0")
+    assert run(home, ASK)[0] == "44.0"
+    assert len(kept(home)) == len(before) + 1 and kept(home).items() > before.items()
+    write(home, "K * x + 2.0", constant="K = 4.0")
+    assert run(home, ASK)[0] == "54.0"
+    assert len(kept(home)) == len(before) + 2
+
+
+def test_what_is_put_into_others_compiles_them(home):
+    write(home, "x")
+    assert run(home, ASK)[0] == "20.0"
+    text = (home / "small.py").read_text()
+    (home / "small.py").write_text(text.replace("2.0 * x", "3.0 * x"))
+    assert run(home, ASK)[0] == "25.0" and len(kept(home)) == 4
+
+
+def test_a_callee_may_be_declared_after_its_caller_is_kept(home):
+    write(home, "x")
+    run(home, ASK)
+    for path in (home / "cache").rglob("*lowest*"):
+        path.unlink()
+    assert run(home, ASK)[0] == "20.0"
+
+
+def test_the_importing_of_plants_compiles_nothing(home):
+    _, said = run(home, "import ers_mj.plants.march, ers_mj.plants.reduced, ers_mj.plants.tangents")
+    assert not said and not kept(home)
+
+
+def test_an_error_of_a_unit_comes_up(home):
+    write(home, "1.0 / (x - 5.0)")
+    for jit in ("0", "1"):
+        ask = f"import small\ntry:\n    {ASK.split('; ')[1]}\nexcept ZeroDivisionError:\n    print('raised')"
+        assert run(home, ask, NUMBA_DISABLE_JIT=jit)[0] == "raised"
+
+
+LAW = """
+import numpy as np
+from ers_mj.effects import BY_NAME
+from ers_mj.effects.base import law
+from ers_mj.plants.reduced import ReducedModel, lumped
+
+drag = type(BY_NAME["quadratic_drag"])
+
+@law
+def torque(p, theta, w, j, t):
+    return {law}
+
+drag.torque = torque
+drag.is_lawful = lambda self, p: True
+model = ReducedModel(lumped({{"b": 10.0, "a_2": 1.0}}), [("quadratic_drag", np.array([1.0, np.inf]))])
+t = np.linspace(0.0, {end}, 20)
+"""
+
+
+@pytest.mark.parametrize("jit", ["0", "1"])
+def test_a_law_that_fails_says_so(jit):
+    program = LAW.format(law="1.0 / (p[0] - 1.0)", end=0.1) + "model.simulate(t, np.ones(20))"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_DISABLE_JIT": jit}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert done.returncode != 0 and "ZeroDivisionError" in done.stderr
+
+
+def test_an_edited_law_is_run_and_leaves_the_kernels_as_they_are():
+    answers = {}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for law in ("-p[0] * w", "-2.0 * p[0] * w", "-p[0] * w"):
+        program = LAW.format(law=law, end=0.1) + "print(model.simulate(t, np.ones(20)).theta[-1].hex())"
+        done = subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+        )
+        assert answers.setdefault(law, done.stdout) == done.stdout and "compiling" not in done.stderr
+    assert len(set(answers.values())) == 2
+
+
+def test_a_model_goes_to_another_process_without_an_address(tmp_path):
+    import numpy as np
+
+    from ers_mj.plants.reduced import ReducedModel, lumped
+
+    model = ReducedModel(lumped({"b": 10.0, "a_2": 1.0, "c_2": 2.0}), [("stribeck", np.array([1.0, 0.1, 1.0, np.inf]))])
+    t = np.linspace(0.0, 0.1, 50)
+    here = model.simulate(t, np.ones(50)).theta
+    (tmp_path / "model.pickle").write_bytes(pickle.dumps(model))
+    program = (
+        "import pickle, numpy as np\nmodel = pickle.load(open('model.pickle', 'rb'))\n"
+        "print(model.simulate(np.linspace(0.0, 0.1, 50), np.ones(50)).theta.tobytes().hex())"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert bytes.fromhex(done.stdout) == here.tobytes()
+
+
+def test_what_is_compiled_without_jit_moves_alike():
+    program = """
+    import numpy as np
+    from ers_mj.plants.reduced import ReducedModel, lumped
+    c = lumped({"b": 10.0, "a_1": 5.0, "a_2": 3.0, "c_1": 0.5, "c_2": 1.0, "theta_0": 0.1})
+    t = np.linspace(0.0, 0.2, 60)
+    stribeck, backlash = [1.0, 0.1, 1.0, np.inf], [0.01, 0.5, 0.5, 80.0, 0.1]
+    for effects in ([], [("stribeck", np.array(stribeck))], [("backlash", np.array(backlash))]):
+        print(ReducedModel(c, effects).simulate(t, 3.0 * np.sin(40.0 * t)).theta.tobytes().hex())
+    """
+    told = []
+    for jit in ("0", "1"):
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_DISABLE_JIT": jit}
+        done = subprocess.run(
+            [sys.executable, "-c", textwrap.dedent(program)], env=environment, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        told.append(done.stdout)
+    assert told[0] == told[1]
+
+
+def test_a_fingerprint_tells_code_and_numbers_but_no_place():
+    def of(text):
+        scope = {}
+        exec(text, scope)
+        return fingerprint(scope["f"], lambda _: None)
+
+    one = of("K = 2.0\ndef f(x):\n    return K * x")
+    assert one == of("K = 2.0\n\n\ndef f(x):\n    return K * x")
+    assert one != of("K = 3.0\ndef f(x):\n    return K * x")
+    assert one != of("K = 2.0\ndef f(x):\n    return K + x")
+    inner = "def g(x):\n    return {} * x\ndef f(x):\n    return g(x)"
+    assert of(inner.format(1.0)) != of(inner.format(2.0))
+
+
+def test_the_folder_belongs_to_the_user_alone(tmp_path):
+    folder = tmp_path / "ers_mj" / "code"
+    assert refusal(folder) == ""
+    assert folder.stat().st_mode & 0o777 == folder.parent.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("level", [0, 1])
+@pytest.mark.parametrize("mode", [0o770, 0o707])
+def test_a_folder_open_to_others_is_refused(tmp_path, level, mode):
+    folder = tmp_path / "ers_mj" / "code"
+    folder.mkdir(parents=True, mode=0o700)
+    folder.parent.chmod(0o700)
+    (folder, folder.parent)[level].chmod(mode)
+    assert "open to others" in refusal(folder)
+
+
+def test_a_folder_of_another_user_is_refused(tmp_path, monkeypatch):
+    folder = tmp_path / "ers_mj" / "code"
+    assert refusal(folder) == ""
+    monkeypatch.setattr(os, "getuid", lambda: folder.stat().st_uid + 1)
+    assert "another user" in refusal(folder)
+
+
+def test_where_it_is_refused_a_fresh_private_folder_is_taken_and_said_once(home):
+    (home / "cache" / "ers_mj").mkdir()
+    (home / "cache" / "ers_mj").chmod(0o777)
+    write(home, "x")
+    ask = (
+        "import os, small; from ers_mj.plants.code_folder import code_folder; print(small.highest(5.0), "
+        "oct(code_folder().stat().st_mode & 0o777), code_folder())"
+    )
+    first, said = run(home, ask)
+    second, _ = run(home, ask)
+    assert said.count("open to others") == 1 and "compiled code is kept in" in said
+    assert first.split()[:2] == ["20.0", "0o700"] and first.split()[2] != second.split()[2]
+    assert not Path(first.split()[2]).exists() and not kept(home)
+
+
+def test_the_first_call_says_what_it_compiles(home):
+    program = """
+    import numpy as np
+    from ers_mj.plants.printed_play import PrintedPlay
+    from ers_mj.plants.reduced import lumped
+    t = np.linspace(0.0, 0.01, 11)
+    PrintedPlay(lumped({"b": 1.0}), 0.1).simulate(t, t)
+    """
+    assert run(home, program)[1] == ""  # one part: no word
+    program = program.replace(
+        "PrintedPlay(lumped", "from ers_mj.plants.reduced import ReducedModel\n    ReducedModel(lumped"
+    )
+    _, said = run(home, program.replace('{"b": 1.0}), 0.1)', '{"b": 1.0}))'))
+    assert said.count("compiling") == 1 and "for this machine, once: about" in said

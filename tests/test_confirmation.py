@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from servo import NAMES, NOISE, SPARSE, having, recorded, started, trace
 
-from ers_mj.decisions.policy import POLICY
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit
@@ -70,8 +69,7 @@ def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
     step = 0.016
     coarse, fine = ([trace("multisine", sensor=lambda y, s=s: s * np.round(y / s))] for s in (step, NOISE))
     small, large = (
-        having(plain.fit, "sensor_nonlinearity", [np.inf, np.inf, size * step, 0.043, 0.3]).model
-        for size in (0.3, 0.8)
+        having(plain.fit, "sensor_nonlinearity", [np.inf, np.inf, size * step, 0.043, 0.3]).model for size in (0.3, 0.8)
     )
     assert is_a_converters("sensor_nonlinearity", small, coarse)
     assert not is_a_converters("sensor_nonlinearity", large, coarse)

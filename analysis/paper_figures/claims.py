@@ -42,9 +42,9 @@ k_1 = 0.25 lets go in seconds. A q far from 1 (5/7) is quicker at first and then
 LEAD = """# The paper's claims, and what we measure
 
 Written by `python analysis/paper_figures/claims.py`; the figures by `figure_07.py` to `figure_15.py` beside it. The
-paper's figures 7 and 8 are simulations of Eq. (5); its test bench is not ours: in its place stands the MuJoCo plant. All
-laws know the plant exactly. `pid-ff`, which the paper does not have, is its PID (38) with the feed-forward of FTRC: what
-FTRC gains over PID and not over `pid-ff` is the feed-forward's, not finite time's.
+paper's figures 7 and 8 are simulations of Eq. (5); its test bench is not ours: in its place stands the MuJoCo plant.
+All laws know the plant exactly. `pid-ff`, which the paper does not have, is its PID (38) with the feed-forward of FTRC:
+what FTRC gains over PID and not over `pid-ff` is the feed-forward's, not finite time's.
 
 | where | case | claim of FTRC | measured | |
 |---|---|---|---|---|

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ers_mj.plants.compiled import inline, unit
-from ers_mj.plants.events import ORDER, breakaway, violation
+from ers_mj.plants.events import breakaway, violation
 from ers_mj.plants.forces import derivative
 from ers_mj.plants.state import C, F, L, M, X, has_bristle, never_sticks
 
@@ -55,7 +55,7 @@ def is_clean(c, t, x, z, m, tau, load, h):
     bias = c.bias
     c.bias = bias + load
     clean = not (has_bristle(c) and _grazes(c, x, z, m, h))
-    for event in ORDER:
+    for event in range(7):
         clean = clean and violation(event, c, t + h, z, m) <= 0
     if tau <= 0:
         clean = clean and breakaway(c, t, x, m) <= 0

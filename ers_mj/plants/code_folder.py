@@ -1,6 +1,4 @@
-"""Where compiled code is kept: a folder that belongs to the user alone, since whoever writes in it decides what is
-run.
-"""
+"""Where compiled code is kept: a folder of the user's own, since whoever may write there decides what is run."""
 
 from __future__ import annotations
 
@@ -24,9 +22,7 @@ OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def code_folder() -> Path:
-    """`ers_mj` in the user's cache, or a fresh private folder of this process where that one cannot be trusted or
-    made.
-    """
+    """`ers_mj/code` in the user's cache, or a fresh private one of this process where that is not safe."""
     return _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
 
 

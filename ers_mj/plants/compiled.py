@@ -1,5 +1,4 @@
-"""Compiling: functions that are compiled each on its own and call each other by symbol, and laws called by their
-address.
+"""Compiling: functions that are compiled each on its own and call each other by symbol; laws called by address.
 
     inline   put into its callers, for what is small or called in one place
     unit     compiled once, apart from its callers, neither linked nor inlined into them
@@ -113,8 +112,8 @@ def inline(function: Callable) -> Callable:
 
 
 def inline_as(signature) -> Callable[[Callable], Callable]:
-    """As ``inline``, compiled for this signature alone: of what is called with numbers written out, of which numba
-    would make a copy each.
+    """As ``inline``, compiled for this signature alone: of what is called with numbers written out, for each of which
+    numba would make a copy.
     """
 
     def declare(function: Callable) -> Callable:
@@ -128,7 +127,7 @@ def inline_as(signature) -> Callable[[Callable], Callable]:
 
 
 def unit(signature) -> Callable[[Callable], Callable]:
-    """Compile a function that makes no arrays of its own once, apart from its callers, which call it by its symbol."""
+    """Compile a function that makes no arrays once, apart from its callers, which call its symbol."""
 
     def declare(function: Callable) -> Callable:
         if IS_PLAIN:
@@ -186,7 +185,7 @@ def by_address(record: types.Record, place: str, signature) -> Callable:
     ``constants``.
     """
     if IS_PLAIN:
-        return lambda law, *rest: _PLAIN_LAWS[law[place] - 1](law["constants"], *rest)
+        return lambda law, *rest: _PLAIN_LAWS[law[place] - 1](law["constants"].tolist(), *rest)
 
     def find(builder, function_type, arguments):
         law, rest = arguments[0], arguments[1:]
@@ -261,9 +260,7 @@ def make(piece: Piece) -> None:
 
 
 def _in_order(piece: Piece) -> list[Piece]:
-    """A piece and those that it needs, and has not yet, callees before their callers: a missing symbol ends the
-    process.
-    """
+    """A piece and those that it needs and has not yet, callees first: a symbol that is missing ends the process."""
     found = {}
 
     def visit(each: Piece) -> None:

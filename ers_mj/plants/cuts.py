@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from ers_mj.plants.compiled import inline
-from ers_mj.plants.state import MODES, VECTOR, F, I, has_bristle, types
+from ers_mj.plants.state import MODES, VECTOR, F, N, has_bristle, types
 
 FALL_STEP = 0.1  # length of a segment over the electrical time constant where the inductance falls with the current
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
@@ -30,7 +30,7 @@ class Cuts(NamedTuple):
     last: float
 
 
-CUTS = types.NamedTuple([VECTOR, MODES, I, F, F], Cuts)
+CUTS = types.NamedTuple([VECTOR, MODES, N, F, F], Cuts)
 
 
 @inline

@@ -7,7 +7,7 @@ import numpy as np
 from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.flow import flow
 from ers_mj.plants.forces import bristle_level, held_motor, held_rudder, motor_friction
-from ers_mj.plants.state import C, F, I, M, Mode, State, X, has_bristle, never_sticks, types
+from ers_mj.plants.state import C, F, M, Mode, N, State, X, has_bristle, never_sticks, types
 
 # events, speeds first: between their zeros angles are monotone, so that later events have one root
 REVERSAL, CROSSING, STOP, BREAKAWAY, MOTOR_REVERSAL, CONTACT, MOTOR_BREAKAWAY = range(7)
@@ -61,7 +61,7 @@ def _contact_violation(c, x, m):
     return -_push(depth, rate, c.k_twist, c.d_twist)
 
 
-@unit(F(I, C, X, M))
+@inline
 def _bristle_violation(e, c, x, m):
     """Event function of the bristle: a reversal ends its slip; bent to the full, which is the motor's breakaway here,
     begins it.
@@ -76,7 +76,7 @@ def _bristle_violation(e, c, x, m):
     return abs(pull) - FULL * bristle_level(c, x, 1.0 if x.w > 0 else -1.0)
 
 
-@unit(F(I, C, F, X, M))
+@inline
 def _motor_violation(e, c, t, x, m):
     """Event function of the motor's side."""
     if c.rho <= 0:
@@ -91,7 +91,7 @@ def _motor_violation(e, c, t, x, m):
     return abs(a) - level * (1.0 + CREPT)
 
 
-@unit(F(I, C, F, X, M))
+@inline
 def violation(e, c, t, x, m):
     """Event function e: positive where the mode's inequality fails."""
     if e == REVERSAL:
@@ -158,7 +158,7 @@ def _after_motor(e, c, t, x, m):
     return x, Mode(m.s, m.side, m.stop, s_m, m.twist)
 
 
-@unit(types.Tuple((X, M))(I, C, F, X, M, F))
+@unit(types.Tuple((X, M))(N, C, F, X, M, F))
 def switch(e, c, t, x, m, corner):
     """State and mode just after event e."""
     if e == REVERSAL or e == BREAKAWAY:
@@ -191,7 +191,7 @@ def _narrow(e, c, t, x, m, drive, tau, a_emf, dt):
     return low, g_low
 
 
-@unit(types.Tuple((F, X))(I, C, F, X, M, F, F, F, F, F))
+@unit(types.Tuple((F, X))(N, C, F, X, M, F, F, F, F, F))
 def locate(e, c, t, x, m, drive, tau, a_emf, dt, g_end):
     """First instant in (0, dt] where event function e vanishes (Illinois method on the flow), and the state there."""
     low, g_low = _narrow(e, c, t, x, m, drive, tau, a_emf, dt)

@@ -23,7 +23,7 @@ def fingerprint(function: Callable, apart: Callable[[object], str | None], *besi
 
 def read_by(function: Callable) -> Iterator[tuple[str, object]]:
     """(name, value) of every global and enclosed variable that a function's code names."""
-    for cell, name in zip(function.__closure__ or (), function.__code__.co_freevars):
+    for cell, name in zip(function.__closure__ or (), function.__code__.co_freevars, strict=True):
         yield name, cell.cell_contents
     names = {name for code in _codes(function.__code__) for name in code.co_names}
     for name in sorted(names & function.__globals__.keys()):

@@ -1,6 +1,5 @@
 """A play or a shaft beside a bristle: two bodies by fixed steps, every force taken in the middle of the step.
-
-State x = (theta, w, j, theta_m, w_m, z): as in events.py, and the bristle's bend z [output unit], half a step ahead.
+ State x = (theta, w, j, theta_m, w_m, z): as in state.py, and the bristle's bend z [output unit], half a step ahead.
 Its friction is k z + d exp(-(w / w_d)^2) z', its bend goes the way of Dahl's exactly under a speed that is constant
 over the step. What gives like a spring needs no event; what is left of set-valued terms, the motor side's dry friction
 and the preload's corner, is solved for with the speeds at the end of the step, as in Moreau's time
@@ -18,10 +17,10 @@ import numpy as np
 
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import split_delay
-from ers_mj.plants.forces import LEAST_LEVEL, motor_level
+from ers_mj.plants.forces import LEAST_LEVEL, PAIR, motor_level
 from ers_mj.plants.laws import drive_torque, friction_level, remember, total_torque
 from ers_mj.plants.march import faster
-from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, C, F, I, L, is_bounded, plant_in, types
+from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, C, F, L, N, is_bounded, plant_in, types
 
 LONGEST = 2e-4  # [s] of a step
 SPRING_STEP = 0.35  # frequency [rad/s] of the stiffest spring times the step
@@ -178,7 +177,7 @@ def _bristle_damping(c, w, z, level):
     return c.d_bristle * (left if c.dahl == 1.0 else left**c.dahl) * math.exp(-((w / c.fade) ** 2))
 
 
-@inline
+@unit(PAIR(C, F, F, F, F, F, F, F, F, F, F))
 def _solved(c, theta, theta_m, w, w_m, push, push_m, own, own_m, holds, h):
     """(w, w_m) at the end of a step, under forces in its middle that do not hang on them, dampings of each body's own,
     and what contact and stop do: neither pulls back what it has pushed.
@@ -260,7 +259,7 @@ def _moved(c, x, jump):
     return Bent(x.theta + jump, x.w, x.j, x.theta_m + jump, x.w_m, x.z)
 
 
-@kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, I, VECTOR, I, VECTOR, TABLE))
+@kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, N, VECTOR, N, VECTOR, TABLE))
 def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
     """As march.simulate, of a plant that has both a motor's side and a bristle."""
     c, n, h0 = plant_in(plant), t.size, t[1] - t[0]
@@ -283,7 +282,7 @@ def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
             return
 
 
-@kernel(types.void(F, F, F, F, VECTOR, I, VECTOR))
+@kernel(types.void(F, F, F, F, VECTOR, N, VECTOR))
 def hold(t, h0, before, now, plant, refine, x):
     """Move x (6,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first, ``now``
     afterwards.

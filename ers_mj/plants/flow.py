@@ -105,6 +105,12 @@ def _next_term(c, m, b, v, drive, tau, a_emf, q, first):
     return State(e_theta, e_w, e_j, e_theta_m, e_w_m)
 
 
+@inline
+def _is_small(v, x):
+    """Whether a term no longer moves a sum."""
+    return abs(v.w) <= 1e-15 * abs(x.w) and abs(v.j) <= 1e-15 * abs(x.j) and abs(v.w_m) <= 1e-15 * abs(x.w_m)
+
+
 @unit(X(C, X, M, F, F, F, F, F, F, F))
 def linear(c, x, m, drive, tau, a_emf, dt, scale, f, r):
     """The flow within a mode without laws, exact: Taylor series in steps of about one time constant.
@@ -120,8 +126,7 @@ def linear(c, x, m, drive, tau, a_emf, dt, scale, f, r):
         for k in range(1, 40):
             v = _next_term(c, m, b, v, drive, tau, a_emf, h / k, scale if k == 1 else 0.0)
             x = State(x.theta + v.theta, x.w + v.w, x.j + v.j, x.theta_m + v.theta_m, x.w_m + v.w_m)
-            is_small = abs(v.w) <= 1e-15 * abs(x.w) and abs(v.j) <= 1e-15 * abs(x.j)
-            if k > 2 and is_small and abs(v.w_m) <= 1e-15 * abs(x.w_m):
+            if k > 2 and _is_small(v, x):
                 break
     if tau <= 0:
         return State(x.theta, x.w, scale * drive - a_emf * (x.w_m if is_parted(c) else x.w), x.theta_m, x.w_m)
@@ -163,8 +168,8 @@ def _bristle_rate(c, x):
     return math.sqrt(c.k_bristle) + c.d_bristle + lets_go
 
 
-@unit(F(C, M, X, F, F))
-def fastest_rate(c, m, x, tau, a_emf):
+@inline
+def _fastest_rate(c, m, x, tau, a_emf):
     """An upper bound [1/s] of the fastest rate in a mode, at the state x."""
     rate = max(abs(c.a_mech_plus), abs(c.a_mech_minus)) + math.sqrt(abs(c.a_1)) + a_emf
     winding = 1.0 / tau if tau > 0 else 0.0
@@ -202,7 +207,7 @@ def flow(c, t, x, m, drive, tau, a_emf, dt):
         return linear(c, x, m, drive, tau, a_emf, dt, 1.0, 0.0, 0.0)
     if is_parted(c) and c.harden <= 0:
         return _driven(c, t, x, m, drive, tau, a_emf, dt)
-    steps = fastest_rate(c, m, x, tau, a_emf) * dt / RATE_STEP
+    steps = _fastest_rate(c, m, x, tau, a_emf) * dt / RATE_STEP
     if not steps < MOST_STEPS:
         return State(np.nan, np.nan, np.nan, np.nan, np.nan)
     n = int(steps) + 1

@@ -6,7 +6,7 @@ import math
 
 from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.laws import drive_torque, friction_level, moved, total_torque
-from ers_mj.plants.state import C, F, I, M, State, X, drive_speed, has_bristle, is_parted, types
+from ers_mj.plants.state import C, F, M, State, X, drive_speed, has_bristle, is_parted, types
 
 LEAST_LEVEL = 0.2  # of the mean friction, which laws cannot lower a bristle's beyond
 PAIR, TRIPLE = types.UniTuple(F, 2), types.UniTuple(F, 3)
@@ -36,7 +36,7 @@ def hardening(c, x):
     return c.k_twist * c.harden * (x.theta_m - x.theta) ** 3
 
 
-@unit(F(C, X, F))
+@inline
 def bristle_level(c, x, direction):
     """Level of friction on a bristle in one direction."""
     level = c.c_2_plus if direction > 0 else c.c_2_minus
@@ -53,7 +53,7 @@ def _bending(c, share):
     return math.copysign(abs(1.0 - share) ** c.dahl, 1.0 - share)
 
 
-@unit(PAIR(C, X, I))
+@inline
 def bristle(c, x, s_m):
     """(force of the bristle on the rudder; the speed of its foot)."""
     if s_m != 0:
@@ -71,7 +71,7 @@ def viscous(c, s_m, w):
     return c.a_mech_plus if s_m > 0 or (s_m == 0 and w > 0) else c.a_mech_minus
 
 
-@inline
+@unit(TRIPLE(C, F, X, M))
 def held_rudder(c, t, x, m):
     """(net acceleration without friction on the rudder at rest, its friction up, down)."""
     theta, _, j, theta_m, w_m = x
@@ -110,7 +110,7 @@ def motor_level(c, theta, j, w_m):
     return c.phi * 0.5 * (up + down)
 
 
-@inline
+@unit(PAIR(C, F, X, M))
 def held_motor(c, t, x, m):
     """(net acceleration without friction on the motor's side at rest, its friction)."""
     a = x.j - twist_force(c, m.twist, x.theta, x.w, x.theta_m, 0.0)
@@ -138,7 +138,7 @@ def _rudder_acceleration(c, t, x, m, push):
     return moved(c, theta, w, a) if c.lawful > 0 else a
 
 
-@inline
+@unit(F(C, F, X, M, F))
 def _motor_acceleration(c, t, x, m, push):
     """Acceleration of a motor's side that slips."""
     theta, _, j, theta_m, w_m = x
@@ -149,7 +149,7 @@ def _motor_acceleration(c, t, x, m, push):
     return force / c.rho
 
 
-@unit(X(C, F, X, M, F, F, F))
+@inline
 def derivative(c, t, x, m, drive, tau, a_emf):
     """d/dt of (theta, w, j, theta_m, w_m) within a mode."""
     theta, w, j, theta_m, w_m = x
@@ -170,7 +170,7 @@ def derivative(c, t, x, m, drive, tau, a_emf):
     return State(w, dw, dj, w_m, dw_m)
 
 
-@unit(F(C, F, F, X, I))
+@inline
 def extra(c, load, t, x, s):
     """What the laws of effects add to the force on a slipping rudder under a known ``load``; what they take of its
     inertia of one body only.

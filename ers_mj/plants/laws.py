@@ -23,6 +23,7 @@ SIGNATURES = {
     "inertia": types.UniTuple(F, 2)(CONSTANTS, F),
     "memory": F(CONSTANTS, F, F, F, F),
 }
+KINDS = {"torque": "torques", "friction": "frictions", "inertia": "inertias", "memory": "memories"}
 _torque_of, _friction_of, _inertia_of, _memory_of = (
     by_address(C.fields["laws"].type.dtype, kind, signature) for kind, signature in SIGNATURES.items()
 )
@@ -32,11 +33,8 @@ _torque_of, _friction_of, _inertia_of, _memory_of = (
 def total_torque(c, theta, w, j, t):
     """Sum of the torques of the effects that are on: those on the rudder only where the motor is a body of its own."""
     a = 0.0
-    if c.torques > 0:
-        for i in range(c.effects):
-            law = c.laws[i]
-            if law.torque != 0 and law.at_motor == 0:
-                a += _torque_of(law, theta, w, j, t)
+    for i in range(c.torques):
+        a += _torque_of(c.laws[c.with_torque[i]], theta, w, j, t)
     return a
 
 
@@ -44,47 +42,37 @@ def total_torque(c, theta, w, j, t):
 def drive_torque(c, theta_m, w_m, j, t):
     """The same on a motor that is a body of its own, at its angle and speed seen at the output."""
     a = 0.0
-    if c.motor_torques > 0:
-        for i in range(c.effects):
-            law = c.laws[i]
-            if law.torque != 0 and law.at_motor != 0:
-                a += _torque_of(law, theta_m, w_m, j, t)
+    for i in range(c.motor_torques):
+        a += _torque_of(c.laws[c.with_motor_torque[i]], theta_m, w_m, j, t)
     return a
 
 
 @inline
 def friction_level(c, level, theta, w, j, direction):
     """The friction level after every effect that is on."""
-    if c.frictions > 0:
-        for i in range(c.effects):
-            law = c.laws[i]
-            if law.friction != 0:
-                level = _friction_of(law, level, theta, w, j, direction)
+    for i in range(c.frictions):
+        level = _friction_of(c.laws[c.with_friction[i]], level, theta, w, j, direction)
     return level
 
 
 @inline
 def moved(c, theta, w, a):
     """The acceleration that is left of ``a``, per total inertia, where effects change the inertia along the travel."""
-    if c.inertias > 0:
-        for i in range(c.effects):
-            law = c.laws[i]
-            if law.inertia != 0:
-                inertia, half_slope = _inertia_of(law, theta)
-                a = (a - half_slope * w * w) / inertia
+    for i in range(c.inertias):
+        inertia, half_slope = _inertia_of(c.laws[c.with_inertia[i]], theta)
+        a = (a - half_slope * w * w) / inertia
     return a
 
 
 @inline
 def remember(c, theta, w, j, theta_m, w_m, h):
     """Bring the memories of effects, their fifth constants, on by a sample of length h from this state."""
-    for i in range(c.effects):
-        law = c.laws[i]
-        if law.memory != 0:
-            if law.at_motor == 0:
-                law.constants[MEMORY] = _memory_of(law, theta, w, j, h)
-            else:
-                law.constants[MEMORY] = _memory_of(law, theta_m, w_m, j, h)
+    for i in range(c.memories):
+        law = c.laws[c.with_memory[i]]
+        if law.at_motor == 0:
+            law.constants[MEMORY] = _memory_of(law, theta, w, j, h)
+        else:
+            law.constants[MEMORY] = _memory_of(law, theta_m, w_m, j, h)
 
 
 class Acting(NamedTuple):
@@ -121,16 +109,17 @@ def _without_numbers(on: Acting) -> np.ndarray:
         raise ValueError(f"{len(on.rows)} effects act by laws at once, of at most {MOST_LAWS}")
     flat = np.zeros(PLANT.itemsize // np.float64().nbytes)
     plant, effects = flat.view(PLANT)[0], [EFFECTS[row] for row in on.rows]
-    for law, effect in zip(plant.laws, effects):
+    for law, effect in zip(plant.laws, effects, strict=False):
         for kind, signature in SIGNATURES.items():
             if getattr(effect, kind):
                 law[kind] = address_of(getattr(effect, kind), signature)
         law["at_motor"] = on.parted and effect.at_motor
-    own = sum(on.parted and effect.at_motor for effect in effects if effect.torque)
-    plant.effects, plant.motor_torques = len(effects), own
-    plant.torques = sum(effect.torque is not None for effect in effects) - own
-    plant.frictions = sum(effect.friction is not None for effect in effects)
-    plant.inertias = sum(effect.inertia is not None for effect in effects)
+    own = [i for i, law in enumerate(plant.laws) if law.torque and law.at_motor]
+    for kind in SIGNATURES:
+        having = [i for i, law in enumerate(plant.laws) if law[kind] and not (kind == "torque" and i in own)]
+        plant[KINDS[kind]] = len(having)
+        plant[f"with_{kind}"][: len(having)] = having
+    plant.motor_torques, plant.with_motor_torque[: len(own)] = len(own), own
     plant.lawful = plant.torques + plant.frictions + plant.motor_torques
     return flat
 

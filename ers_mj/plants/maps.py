@@ -11,17 +11,18 @@ from numba import njit
 from ers_mj.plants.compiled import inline, inline_as, unit
 from ers_mj.plants.flow import flow, linear
 from ers_mj.plants.forces import TRIPLE, beside, extra
-from ers_mj.plants.state import C, F, I, L, M, Mode, State, X, bends, has_bristle, types
+from ers_mj.plants.state import C, F, L, M, Mode, N, State, X, bends, has_bristle, types
 
 GAUSS_X, GAUSS_W = (0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(10)[1])
 # columns of a map: x, a constant, the drive, the side, then a force as a parabola 1, s, s^2 on the rudder, between the
 # bodies, on the motor
-CONSTANT, DRIVE, SIDE, ON_RUDDER, BETWEEN, ON_MOTOR, COLUMNS = 5, 6, 7, 8, 11, 14, 17
+CONSTANT, DRIVE, SIDE = range(5, 8)
+ON_RUDDER, BETWEEN, ON_MOTOR, COLUMNS = range(8, 18, 3)
 MODES_APART = 27  # of s, s_m and twist
 MAPS = F[:, :, ::1]  # (54, 5, 17), see no_maps
 
 
-@unit(types.void(MAPS, I, I, C, M, F, F, F, X))
+@unit(types.void(MAPS, N, N, C, M, F, F, F, X))
 def _add_parabola(e, n, column, c, m, tau, a_emf, h, push):
     """Add what the accelerations ``push`` of a unit force as 1, s, s^2 (s = t/h) do over h, by Gauss's rule."""
     for g in range(GAUSS_X.size):
@@ -45,7 +46,7 @@ def _one(k):
     )
 
 
-@unit(types.void(MAPS, I, C, M, F, F, F, L))
+@unit(types.void(MAPS, N, C, M, F, F, F, L))
 def fill_map(e, n, c, m, tau, a_emf, h, driven):
     """The exact map over h in a mode with side 0: e[n] (5, 17), columns x (5), constant, drive, side, force on the
     rudder 1, s, s^2 (s = t/h), the same of a force between the two bodies where their shaft hardens, and of one on the
@@ -98,7 +99,7 @@ def _make(e, n, c, m, tau, a_emf, step, driven):
         fill_map(e, n, c, Mode(m.s, 0, 0, m.s_m, m.twist), tau, a_emf, step, driven)
 
 
-@inline_as(F(MAPS, I, I, X, F, I, TRIPLE))
+@inline_as(F(MAPS, N, N, X, F, N, TRIPLE))
 def _row(e, n, i, x, drive, side, f):
     return (
         e[n, i, 0] * x.theta
@@ -125,12 +126,12 @@ def _mapped_one(e, n, x, drive, side, f):
     )
 
 
-@inline_as(F(MAPS, I, I, X, F, I, TRIPLE))
+@inline_as(F(MAPS, N, N, X, F, N, TRIPLE))
 def _row_of_two(e, n, i, x, drive, side, f):
     return _row(e, n, i, x, drive, side, f) + e[n, i, 3] * x.theta_m + e[n, i, 4] * x.w_m
 
 
-@unit(X(MAPS, I, X, F, I, TRIPLE))
+@inline
 def _mapped_two(e, n, x, drive, side, f):
     """The same of two bodies."""
     return State(
@@ -142,14 +143,14 @@ def _mapped_two(e, n, x, drive, side, f):
     )
 
 
-@inline_as(types.UniTuple(F, 2)(MAPS, I, I, TRIPLE, TRIPLE))
+@inline_as(types.UniTuple(F, 2)(MAPS, N, N, TRIPLE, TRIPLE))
 def _pushed(e, n, i, q, r):
     """What a force q (3,) between the bodies and then one r (3,) on the motor add to x_i."""
     between = e[n, i, BETWEEN] * q[0] + e[n, i, BETWEEN + 1] * q[1] + e[n, i, BETWEEN + 2] * q[2]
     return between, e[n, i, ON_MOTOR] * r[0] + e[n, i, ON_MOTOR + 1] * r[1] + e[n, i, ON_MOTOR + 2] * r[2]
 
 
-@unit(X(MAPS, I, X, F, I, TRIPLE, TRIPLE, TRIPLE))
+@unit(X(MAPS, N, X, F, N, TRIPLE, TRIPLE, TRIPLE))
 def _mapped_parted(e, n, x, drive, side, f, q, r):
     """The same of two bodies under the force f on the rudder, q between the two, of a shaft that hardens, and r on the
     motor.
@@ -194,7 +195,7 @@ def one_body_segment(e, step, c, t, x, m, drive, tau, a_emf, load, h, extra_now)
     return _mapped_one(e, n, x, drive, m.side, _parabola(begin, middle, load + end)), end
 
 
-@unit(X(MAPS, I, C, F, X, M, F, F, F))
+@unit(X(MAPS, N, C, F, X, M, F, F, F))
 def _parted_segment(e, n, c, t, x, m, drive, load, h):
     """The same of motor and rudder under laws, or on a shaft that hardens."""
     f, q, r = beside(c, load, t, x, m)
@@ -206,7 +207,7 @@ def _parted_segment(e, n, c, t, x, m, drive, load, h):
     return _mapped_parted(e, n, x, drive, m.side, f, q, r)
 
 
-@unit(X(MAPS, I, C, F, X, M, F, F, F))
+@unit(X(MAPS, N, C, F, X, M, F, F, F))
 def _bristle_segment(e, n, c, t, x, m, drive, load, h):
     """The same on a bristle bent to the full that slips under laws."""
     begin = load + extra(c, load, t, x, m.s)
@@ -230,11 +231,9 @@ def two_body_segment(e, step, c, t, x, m, drive, tau, a_emf, load, h):
     driven = c.lawful > 0 and not has_bristle(c)
     n = _number(m)
     _make(e, n, c, m, tau, a_emf, step, driven)
-    if c.lawful == 0 and (c.harden <= 0 or has_bristle(c)):
+    if (c.lawful == 0 and (has_bristle(c) or c.harden <= 0)) or (has_bristle(c) and m.s == 0):
         return _mapped_two(e, n, x, drive, m.side, _constant(load))
     _make(e, n + MODES_APART, c, m, tau, a_emf, step / 2, driven)
-    if not has_bristle(c):
-        return _parted_segment(e, n, c, t, x, m, drive, load, h)
-    if m.s == 0:
-        return _mapped_two(e, n, x, drive, m.side, _constant(load))
-    return _bristle_segment(e, n, c, t, x, m, drive, load, h)
+    if has_bristle(c):
+        return _bristle_segment(e, n, c, t, x, m, drive, load, h)
+    return _parted_segment(e, n, c, t, x, m, drive, load, h)

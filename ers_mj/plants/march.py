@@ -40,10 +40,10 @@ from ers_mj.plants.state import (
     VECTOR,
     C,
     F,
-    I,
     L,
     M,
     Mode,
+    N,
     State,
     X,
     bends,
@@ -120,7 +120,7 @@ def _charged(j, drive, tau, h):
     return drive + (j - drive) * math.exp(-h / tau) if tau > 0 else j
 
 
-@unit(types.Tuple((X, M, I))(C, F, X, M, F, F, F, F, F, F))
+@unit(types.Tuple((X, M, N))(C, F, X, M, F, F, F, F, F, F))
 def advance(c, t, x, m, drive, tau, a_emf, dt, h_max, corner):
     """Integrate over dt under a constant drive, through every event on the way. Returns (x, m, number of events)."""
     if tau <= 0:
@@ -211,7 +211,7 @@ def _resting_on_bristle(c, t, x, m, drive, tau, a_emf, load, h):
     return still, z
 
 
-@unit(types.Tuple((L, X))(MAPS, F, C, F, X, M, F, F, F, F, F))
+@inline
 def _of_two_bodies(e, step, c, t, x, m, drive, tau, a_emf, load, h):
     """(whether two bodies, or one on a bristle, go on in their mode over h, the state then or as it begins)."""
     x = with_drive(c, x, drive, tau, a_emf)
@@ -297,12 +297,18 @@ def _sample(t, u, enable, load, c, cuts, k):
     return Sample(k, t[k], stretch, is_usual, enable[k], load[k], load[k + 1], before, now)
 
 
-@unit(types.void(READ, READ, READ_BOOL, READ, READ, F, I, C, I, VECTOR, CUTS, OF_A_SAMPLE, L, TABLE))
+@inline
+def _event_budget(c, n, cuts):
+    """Events that n samples may have."""
+    return EVENT_BUDGET * n * (cuts.ends.size if has_bristle(c) else 1) + 1000
+
+
+@unit(types.void(READ, READ, READ_BOOL, READ, READ, F, N, C, N, VECTOR, CUTS, OF_A_SAMPLE, L, TABLE))
 def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps, out):
     """See ``simulate``: through the samples, by maps over segments or, if it ``leaps``, over a whole sample."""
     n, bristle, slips = t.size, has_bristle(c), never_sticks(c)
     h_max, corner = longest_step(c, cuts, refine), corner_speed(c, cuts, refine)
-    budget = EVENT_BUDGET * n * (cuts.ends.size if bristle else 1) + 1000
+    budget = _event_budget(c, n, cuts)
     resting = -1  # the sample that begins in a rest which was checked already
     extra = np.nan  # what the laws add where a segment ended that holds no event
     x = start_state(c, x0[0], x0[1], x0[2], 0.5 * (c.c_2_plus + c.c_2_minus))
@@ -327,7 +333,7 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
             return
 
 
-@kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, I, VECTOR, I, VECTOR, TABLE))
+@kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, N, VECTOR, N, VECTOR, TABLE))
 def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
     """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
 

@@ -18,7 +18,7 @@ import numpy as np
 from ers_mj.effects.records import Coefficients
 from ers_mj.plants.compiled import inline, kernel
 from ers_mj.plants.reduced import Motion
-from ers_mj.plants.state import READ, TABLE, F, I, types
+from ers_mj.plants.state import READ, TABLE, F, N, types
 
 STEP = 2e-6  # [s] at most; half of it moves theta by less than 0.01 deg RMS
 
@@ -77,7 +77,7 @@ def _speed(slope, push, corner, friction, preload):
     return 0.0 if abs(held) <= friction else corner
 
 
-@kernel(types.void(F, F, F, F, F, F, F, F, F, READ, READ, I, TABLE))
+@kernel(types.void(F, F, F, F, F, F, F, F, F, READ, READ, N, TABLE))
 def _run(a_1, a_mech, a_emf, b, c_1, c_2, theta_0, tau, threshold, t, u, substeps, out):
     """Fill out (N, 3) with angle, speed, transmitted acceleration just before u[k] acts; implicit steps in the
     speed.

@@ -60,6 +60,24 @@ class Motion:
     measured: np.ndarray
 
 
+@dataclass(frozen=True)
+class Held:
+    """What acts on a run beside its input: whether the circuit is closed (N,), a known acceleration of the rudder (N,),
+    and what an observer of this ``gain`` follows (N,) at one sample in ``every`` (see march.simulate).
+    """
+
+    enable: np.ndarray | None = None
+    load: np.ndarray | None = None
+    y: np.ndarray | None = None
+    gain: float = 0.0
+    every: int = 1
+
+    def beside(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(enable, load, y) as the kernel takes them, each (N,)."""
+        enable = np.ones(t.size, np.bool_) if self.enable is None else self.enable
+        return enable, np.zeros(t.size) if self.load is None else self.load, t if self.y is None else self.y
+
+
 def _step(c: np.ndarray, c_2: np.ndarray) -> np.ndarray:
     """c_2 - c, and 0 where both are the same infinity."""
     return np.subtract(c_2, c, out=np.zeros_like(c), where=c != c_2)
@@ -93,7 +111,7 @@ class ReducedModel:
                 given[name] = effect.constants(values, c)
         on = acting(tuple(given), c.has_motor_side)
         p = np.zeros((len(on.rows), N_CONSTANTS))
-        for row, constants in zip(on.rows, p):
+        for row, constants in zip(on.rows, p, strict=True):
             constants[: len(given[EFFECTS[row].name])] = given[EFFECTS[row].name]
         object.__setattr__(self, "_lowered", (np.array(c, float), on, p))
 
@@ -125,23 +143,22 @@ class ReducedModel:
             u = BY_NAME[name].command(values, u)
         return np.ascontiguousarray(u, float)
 
-    def _run(self, t, u, start, enable, load, y, gain, every, refine):
+    def _run(self, t: np.ndarray, u: np.ndarray, start, held: Held, refine: int) -> np.ndarray:
         c, on, p = self._lowered
         out = np.empty((t.size, 4))
-        enable = np.ones(t.size, np.bool_) if enable is None else enable
-        load = np.zeros(t.size) if load is None else load
+        enable, load, y = held.beside(t)
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         both = self.bends and self.has_motor_side
         self._count(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on.pushes else PLAIN)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        followed = t if y is None else y
         run = fixed_steps.simulate if both else march.simulate
-        run(t, self.terminal(u), enable, load, followed, gain, every, laid_out(c, on, p), refine, x0, out)
+        plant = laid_out(c, on, p)
+        run(t, self.terminal(u), enable, load, y, held.gain, held.every, plant, refine, x0, out)
         return out
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
         """What the sensor reads (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see
-        events.simulate_kernel).
+        march.simulate).
 
         ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool. An
         observer beside a sensor effect that is not ``instant`` runs twice: what the sensor adds on the first way is
@@ -153,12 +170,12 @@ class ReducedModel:
         self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1
     ) -> tuple[np.ndarray, np.ndarray]:
         """As ``theta``, with the motion (N, 4) beside it: theta, omega, drive acceleration and motor side's angle."""
-        motion = self._run(
-            t, u, start, enable, load, self.behind(y) if gain > 0 and self._is_instant else y, gain, every, 1
-        )
+        followed = self.behind(y) if gain > 0 and self._is_instant else y
+        motion = self._run(t, u, start, Held(enable, load, followed, gain, every), 1)
         read = self.read(t, motion[:, 0])
         if gain > 0 and not self._is_instant:
-            motion = self._run(t, u, start, enable, load, y - (read - motion[:, 0]), gain, every, 1)
+            followed = y - (read - motion[:, 0])
+            motion = self._run(t, u, start, Held(enable, load, followed, gain, every), 1)
             read = self.read(t, motion[:, 0])
         return read, motion
 
@@ -209,20 +226,18 @@ class ReducedModel:
             and all(BY_NAME[name].tangible for name, _ in self.effects if _touches_sensor(name))
         )
 
-    def tangents(
-        self, t, u, path, others, scale, *, enable=None, load=None, y=None, gain=0.0, every=1
-    ) -> list[np.ndarray]:
+    def tangents(self, t, u, path, others, scale, **held) -> list[np.ndarray]:
         """First-order changes (N, 4) of theta, omega, drive acceleration and reading along a ``path`` (see
-        ``outputs``), towards each of the ``others``.
+        ``outputs``), towards each of the ``others``, with what was ``held`` beside the input (see Held).
 
         Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect. An
         observer's second way (see ``theta``) is taken to follow what the other sensor adds, not what the change of the
         motion makes of it.
         """
         c, on, p = self._lowered
-        enable = np.ones(t.size, np.bool_) if enable is None else enable
-        load = np.zeros(t.size) if load is None else load
-        theta, y, arriving = path[:, 0], t if y is None else y, self._arriving(t, u)
+        held = Held(**held)
+        enable, load, y = held.beside(t)
+        theta, arriving = path[:, 0], self._arriving(t, u)
         read, followed, instant, out = self.read(t, theta), self.behind(y), self._is_instant, []
         maps, slopes, still = np.empty((6, 5, 17)), np.zeros((t.size, 3)), np.zeros(t.size)
         prepare(t, load, path, laid_out(c, on, p), maps, slopes)
@@ -235,26 +250,8 @@ class ReducedModel:
                 added = (other.read(t, theta) - read) * scale
                 dy = (other.behind(y) - followed) * scale if instant else -added
             du, here = (other._arriving(t, u) - arriving) * scale, followed if instant else y
-            plants = laid_out(c, on, p), laid_out(c_2, on_2, p_2)
-            tangent(
-                t,
-                arriving,
-                du,
-                enable,
-                load,
-                here,
-                dy,
-                path,
-                maps,
-                slopes,
-                gain,
-                every,
-                *plants,
-                dc,
-                differ,
-                scale,
-                change,
-            )
+            motion = (t, arriving, du, enable, load, here, dy, path, maps, slopes, held.gain, held.every)
+            tangent(*motion, laid_out(c, on, p), laid_out(c_2, on_2, p_2), dc, differ, scale, change)
             change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
             out.append(change)
         return out
@@ -297,5 +294,5 @@ class ReducedModel:
     def simulate(self, t, u, start=None, *, enable=None, load=None, refine=1) -> Motion:
         """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples."""
         t, start = np.ascontiguousarray(t, float), (self.coefficients.theta_0, 0.0) if start is None else start
-        out = self._run(t, u, start, enable, load, None, 0.0, 1, refine)
+        out = self._run(t, u, start, Held(enable, load), refine)
         return Motion(t, out[:, 0], out[:, 1], out[:, 2], out[:, 3], self.read(t, out[:, 0]))

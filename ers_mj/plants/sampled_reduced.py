@@ -14,7 +14,7 @@ from ers_mj.plants.laws import laid_out, remember
 from ers_mj.plants.march import advance
 from ers_mj.plants.modes import start_mode, start_state
 from ers_mj.plants.reduced import ReducedModel
-from ers_mj.plants.state import MODES, PLANT, VECTOR, F, I, Mode, State, is_bounded, plant_in, types
+from ers_mj.plants.state import MODES, PLANT, VECTOR, F, Mode, N, State, is_bounded, plant_in, types
 
 
 @kernel(types.void(VECTOR, VECTOR, MODES))
@@ -29,7 +29,7 @@ def begin(plant, x, m):
         x[i], m[i] = z[i], mode[i]
 
 
-@kernel(types.void(F, F, F, F, VECTOR, I, VECTOR, MODES))
+@kernel(types.void(F, F, F, F, VECTOR, N, VECTOR, MODES))
 def hold(t, h0, before, now, plant, refine, x, m):
     """Move x (5,) and m (5,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first,
     ``now`` afterwards.

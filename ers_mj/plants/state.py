@@ -22,10 +22,10 @@ import numba
 import numpy as np
 from numba import types
 
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.base import Coefficients
 from ers_mj.plants.compiled import inline, record_in
 
-MOST_LAWS = 64  # effects that act by laws at once
+MOST_LAWS = 40  # effects that act by laws at once
 N_CONSTANTS = 7  # of a law at most
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
 
@@ -61,20 +61,23 @@ LAW = _record(
         ("constants", np.float64, (N_CONSTANTS,)),
     ]
 )
-COUNTS = ("effects", "torques", "frictions", "inertias", "motor_torques", "lawful")  # lawful: what adds to the forces
+# numbers of laws; lawful: of those that add to the forces
+COUNTS = ("torques", "frictions", "inertias", "memories", "motor_torques", "lawful")
+HAVING = ("with_torque", "with_friction", "with_inertia", "with_memory", "with_motor_torque")  # which laws those are
 PLANT = _record(
     [
         *((letter, np.float64) for letter in Coefficients._fields),
         *((count, np.int64) for count in COUNTS),
+        *((having, np.uint64, (MOST_LAWS,)) for having in HAVING),
         ("laws", LAW, (MOST_LAWS,)),
     ]
 )
 plant_in = record_in(PLANT)  # of an array of numbers (see laws.laid_out)
 
-F, I, L = types.float64, types.int64, types.boolean
+F, N, L = types.float64, types.int64, types.boolean
 C = numba.from_dtype(PLANT)
-X, M = types.NamedUniTuple(F, 5, State), types.NamedUniTuple(I, 5, Mode)
-VECTOR, TABLE, MODES = F[::1], F[:, ::1], I[::1]
+X, M = types.NamedUniTuple(F, 5, State), types.NamedUniTuple(N, 5, Mode)
+VECTOR, TABLE, MODES = F[::1], F[:, ::1], N[::1]
 READ, READ_BOOL = types.Array(F, 1, "C", readonly=True), types.Array(L, 1, "C", readonly=True)
 
 
@@ -125,9 +128,7 @@ def is_bounded(x):
 
 @inline
 def with_drive(c, x, drive, tau, a_emf):
-    """The state whose drive acceleration is at once what the drive makes of its speed, where no inductance delays
-    it.
-    """
+    """The state with the drive acceleration that the drive makes of its speed where no inductance delays it."""
     if tau > 0:
         return x
     return State(x.theta, x.w, drive - a_emf * drive_speed(c, x), x.theta_m, x.w_m)

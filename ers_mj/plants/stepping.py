@@ -38,7 +38,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Observer:
-    """Corrections on the way, as events.simulate_kernel makes them: at one sample in ``every`` the output is moved by
+    """Corrections on the way, as march.simulate makes them: at one sample in ``every`` the output is moved by
     gain (y - theta).
 
     ``moved(theta, by)`` gives {joint: change of its position} of such a move; y is (N,), NaN where there is none.
@@ -77,14 +77,18 @@ class Stepper:
         self.gap = self._address("gap") if self.c.has_motor_side else None
         self.current = int(self.model.actuator_actadr[self.motor])
         self.bristle = self.model.actuator("bristle").id if self.c.has_bristle else None
+        self.falls = self.current >= 0 and self.c.fall > 0
+        self._sort_laws()
+        self.turning = self.model.joint("rocker").dofadr[0]
+        self.armature = float(self.model.dof_armature[self.turning])
+
+    def _sort_laws(self) -> None:
+        """What the laws compute, by kind, each with constants of its own."""
         laws = [(law, law.p.copy(), law.at_motor and self.c.has_motor_side) for law in self.laws]
         self.torques = [(law.torque, p, own) for law, p, own in laws if law.torque]
         self.frictions = [(law.friction, p) for law, p, _ in laws if law.friction]
         self.inertias = [(law.inertia, p) for law, p, _ in laws if law.inertia and not self.c.has_motor_side]
-        self.falls = self.current >= 0 and self.c.fall > 0
         self.memories = [(law.memory, p, own) for law, p, own in laws if law.memory]
-        self.turning = self.model.joint("rocker").dofadr[0]
-        self.armature = float(self.model.dof_armature[self.turning])
 
     def _address(self, joint: str) -> int:
         return int(self.model.jnt_qposadr[self.model.joint(joint).id])
@@ -202,23 +206,24 @@ class Stepper:
             self.model.dof_armature[self.turning] = self.armature + self.inertia * (relative - 1.0)
             force -= half_slope * w * w
         if self.frictions:
-            share = 1.0 - c.phi if c.has_motor_side else 1.0
-            up, down = self._levels(theta, w, j)
-            if c.has_motor_side:
-                self.model.dof_frictionloss[self.turning] = (
-                    0.5 * c.phi * self.inertia * sum(self._levels(theta, w_m, j))
-                )
-            if self.bristle is None:
-                self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
-                force -= 0.5 * share * (up - down - c.c_2_plus + c.c_2_minus)
-            else:
-                self.model.actuator_biasprm[self.bristle, 3:5] = (
-                    share * self.inertia * self._yielding(up if w > 0 else down, w)
-                )
-                self.model.actuator_dynprm[self.bristle, LUGRE_DAMPING] = (
-                    share * self.inertia * c.d_bristle * math.exp(-((w / c.fade) ** 2))
-                )
+            force += self._apply_frictions(theta, w, w_m, j)
         self.data.ctrl[self.load] = self.inertia * force
+
+    def _apply_frictions(self, theta: float, w: float, w_m: float, j: float) -> float:
+        """Set frictionloss or the bristle from the laws; the force that an asymmetric friction leaves beside it."""
+        c = self.c
+        share = 1.0 - c.phi if c.has_motor_side else 1.0
+        up, down = self._levels(theta, w, j)
+        if c.has_motor_side:
+            self.model.dof_frictionloss[self.turning] = 0.5 * c.phi * self.inertia * sum(self._levels(theta, w_m, j))
+        if self.bristle is None:
+            self.model.tendon_frictionloss[self.tendon] = 0.5 * share * self.inertia * (up + down)
+            return -(0.5 * share * (up - down - c.c_2_plus + c.c_2_minus))
+        self.model.actuator_biasprm[self.bristle, 3:5] = share * self.inertia * self._yielding(up if w > 0 else down, w)
+        self.model.actuator_dynprm[self.bristle, LUGRE_DAMPING] = (
+            share * self.inertia * c.d_bristle * math.exp(-((w / c.fade) ** 2))
+        )
+        return 0.0
 
     def _levels(self, theta: float, w: float, j: float) -> tuple[float, float]:
         """The friction levels up and down, per inertia, after every law."""

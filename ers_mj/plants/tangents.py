@@ -14,7 +14,7 @@ from ers_mj.plants.compiled import inline, kernel
 from ers_mj.plants.forces import extra
 from ers_mj.plants.laws import remember
 from ers_mj.plants.maps import MAPS, fill_map
-from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, F, I, L, Mode, State, has_bristle, plant_in, types
+from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, F, L, Mode, N, State, has_bristle, plant_in, types
 from ers_mj.plants.tangents_bristle import along_bristle
 from ers_mj.plants.tangents_slip import along
 
@@ -62,7 +62,7 @@ def prepare(t, load, path, plant, maps, slopes):
 
 @kernel(
     types.void(
-        READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, F, I, VECTOR, VECTOR, VECTOR, L, F, TABLE
+        READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, F, N, VECTOR, VECTOR, VECTOR, L, F, TABLE
     )
 )
 def tangent(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, plant, plant_2, change, differ, scale, out):

@@ -9,7 +9,7 @@ import math
 from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.forces import bristle_level, extra
 from ers_mj.plants.laws import remember
-from ers_mj.plants.state import READ, READ_BOOL, TABLE, C, F, I, State, X, types
+from ers_mj.plants.state import READ, READ_BOOL, TABLE, C, F, N, State, X, types
 from ers_mj.plants.tangents_slip import (
     along_path,
     charged,
@@ -62,7 +62,7 @@ def _bent(c, c_2, dc, x, z, way, scale, h):
     return z_1, bends, lets_go, grows
 
 
-@unit(F(C, C, C, X, I, F, F, F, F, F, F, F))
+@unit(F(C, C, C, X, N, F, F, F, F, F, F, F))
 def _direct(c, c_2, dc, x, s, mean_side, z, z_1, t, load, scale, h):
     """What the changed model adds to the force on the rudder, per unit of the change, in the middle of a sample."""
     force = (
@@ -87,7 +87,7 @@ def _drawn(d, pull, rate, emf, part):
     return (d + part / rate * pull) / (1.0 + part / rate), -part / rate * emf / (1.0 + part / rate)
 
 
-@unit(types.UniTuple(F, 4)(C, TABLE, I, X, F, F, F, F, F, F, F, F, F, F, F, I, F))
+@unit(types.UniTuple(F, 4)(C, TABLE, N, X, F, F, F, F, F, F, F, F, F, F, F, N, F))
 def _stepped(c, slopes, i, x, a, b, d, bent, pull, rate, emf, force, bends, lets_go, grows, s, h):
     """(a, b, d, bent) a sample later, by a step that is implicit at AHEAD of it."""
     part, k = AHEAD * h, c.k_bristle
@@ -116,7 +116,7 @@ def _middle(x, x_1):
     return State(theta, 0.5 * (x.w + x_1.w), 0.5 * (x.j + x_1.j), theta, 0.0)
 
 
-@unit(types.void(READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, TABLE, F, I, C, C, C, F, TABLE))
+@unit(types.void(READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, TABLE, F, N, C, C, C, F, TABLE))
 def along_bristle(t, u, du, enable, load, y, dy, path, slopes, gain, every, c, c_2, dc, scale, out):
     """See tangents.tangent; the bend z along the path and its change bent are integrated here."""
     n, h = t.size, t[1] - t[0]

@@ -17,7 +17,7 @@ from ers_mj.plants.forces import derivative, extra
 from ers_mj.plants.laws import remember
 from ers_mj.plants.maps import MAPS
 from ers_mj.plants.modes import sign
-from ers_mj.plants.state import READ, READ_BOOL, TABLE, C, F, I, L, Mode, State, X, types
+from ers_mj.plants.state import READ, READ_BOOL, TABLE, C, F, L, Mode, N, State, X, types
 
 # times the motion's extent and largest speed by which a unit of change may move it: beyond, stick and slip only fork
 # otherwise
@@ -99,7 +99,7 @@ def struck(c, dc, a, b, w_mean, h):
     return dc.theta_0, 0.0
 
 
-@unit(F(C, F, X, I, I, F, F, F, F))
+@unit(F(C, F, X, N, N, F, F, F, F))
 def _acceleration(c, t, x, s, side, drive, tau, a_emf, load):
     """Acceleration of a slipping rudder in the state x."""
     bias = c.bias
@@ -109,7 +109,7 @@ def _acceleration(c, t, x, s, side, drive, tau, a_emf, load):
     return a
 
 
-@unit(F(C, C, C, L, F, F, F, X, I, F))
+@unit(F(C, C, C, L, F, F, F, X, N, F))
 def _direct(c, dc, c_2, laws, scale, load, t, x, s, side):
     """What the changed model adds to the force on a rudder that slips in direction s, per unit of the change."""
     a_mech, level = (dc.a_mech_plus, dc.c_2_plus) if s > 0 else (dc.a_mech_minus, dc.c_2_minus)
@@ -119,7 +119,7 @@ def _direct(c, dc, c_2, laws, scale, load, t, x, s, side):
     return force
 
 
-@unit(types.Tuple((F, F, I))(C, F, F, X, X, F, F, F, F, F, F, F))
+@unit(types.Tuple((F, F, N))(C, F, F, X, X, F, F, F, F, F, F, F))
 def _mode_changes(c, t, t_1, x, x_1, h, drive, tau, a_emf, load, side, side_1):
     """(share of the sample in which the body slips, ratio of the accelerations after and before a reversal, slip)."""
     s, s_1 = sign(x.w), sign(x_1.w)
@@ -150,7 +150,7 @@ def _fed_back(slopes, k, v):
     return slopes[k, 0] * v.a + slopes[k, 1] * v.b + slopes[k, 2] * v.d
 
 
-@unit(CHANGE(MAPS, I, TABLE, I, CHANGE, F, F, F, L, I))
+@unit(CHANGE(MAPS, N, TABLE, N, CHANGE, F, F, F, L, N))
 def _slipped(maps, n, slopes, k, v, pull, force, force_1, same, times):
     """The change a sample after v, under forces that go from one to the other and what laws make of it."""
     back = back_1 = _fed_back(slopes, k, v)
@@ -186,6 +186,12 @@ def _add_laws(c, dc, differ):
     return c.inertias > 0 or c.frictions > 0 and (dc.c_2_plus != 0.0 or dc.c_2_minus != 0.0) or differ
 
 
+@inline
+def _times(c):
+    """How often a sample is gone over: again where laws make something of the change."""
+    return 2 if c.torques + c.frictions > 0 else 1
+
+
 class Known(NamedTuple):
     """A force at the end of a sample, the next one's number, and the slip that it was taken for."""
 
@@ -194,11 +200,11 @@ class Known(NamedTuple):
     towards: int
 
 
-@unit(types.void(READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, F, I, C, C, C, L, F, TABLE))
+@unit(types.void(READ, READ, READ, READ_BOOL, READ, READ, READ, TABLE, MAPS, TABLE, F, N, C, C, C, L, F, TABLE))
 def along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, c_2, dc, differ, scale, out):
     """See tangents.tangent; ``dc`` is the change of c per unit."""
     h, n = t[1] - t[0], t.size
-    laws, times = _add_laws(c, dc, differ), 2 if c.torques + c.frictions > 0 else 1
+    laws, times = _add_laws(c, dc, differ), _times(c)
     known = Known(0.0, -1, 0)
     most, fastest = limits(path)
     a = b = d = 0.0
