@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from typing import TypeVar
 
 
 @dataclass(frozen=True)
@@ -20,10 +21,11 @@ class Reason:
     set_by: str
 
 
+N = TypeVar("N", int, float)
 UNRECORDED = "on tuning seeds; no figure was kept"
 
 
-def _threshold(value: float, unit: str, protects: str, set_by: str = UNRECORDED) -> float:
+def _threshold(value: N, unit: str, protects: str, set_by: str = UNRECORDED) -> N:
     return field(default=value, metadata={"reason": Reason(unit, protects, set_by)})
 
 

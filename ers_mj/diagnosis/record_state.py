@@ -41,7 +41,7 @@ def _differs(case: Case, name: str, values: Sequence[float], ci95: Sequence[Ends
     rest, policy = _rest(name), case.policy
     travel = case.start.fit.model.scales.position
     least = policy.state_offset * travel if name == "offset" else policy.state_factor
-    known = ((v, low, high) for v, (low, high) in zip(values, ci95) if low is not None)
+    known = ((v, low, high) for v, (low, high) in zip(values, ci95) if low is not None and high is not None)
     return any(abs(v - rest) > least and not low <= rest <= high for v, low, high in known)
 
 

@@ -95,7 +95,7 @@ def answer(
     profiles = () if simulate or misfit > WRONG else _profiles(reduced, open_ended, slopes, x, precision)
     y, u = recordings[0].output_unit, {"pct": "%"}.get(recordings[0].input_unit, recordings[0].input_unit)
     sheet = {**datasheet.to_lumped(), **datasheet.parameters} if datasheet is not None else {}
-    ends = {p.name: tuple(None if z is None else factor_of(p.name, z) for z in p.ends) for p in profiles}
+    ends = {p.name: (_factor(p.name, p.ends[0]), _factor(p.name, p.ends[1])) for p in profiles}
     rows = Rows(search, letters, precision, ends, sheet, y, u).all()
     predicted = _predicted(search, letters, free / weight)
     return Identified(
@@ -114,6 +114,11 @@ def answer(
         tuple(_warnings(search, x, misfit)),
         0.0,
     )
+
+
+def _factor(name: str, z: float | None) -> float | None:
+    """The factor that a coordinate stands for, where there is one."""
+    return None if z is None else factor_of(name, z)
 
 
 def _profiles(

@@ -161,7 +161,7 @@ def unknowns_of(
     lower, upper = np.array([*ends.values()], float).T.copy()
     reference = np.clip([known[name] for name in ends], lower, upper)
     held = {name: x for name, x in known.items() if name not in ends}
-    return Unknowns(tuple(ends), reference, lower, upper, held, tuple(fixed), is_lumped, own, tuple(factors))
+    return Unknowns(tuple(ends), reference, lower, upper, held, tuple(fixed), is_lumped, own, (factors[0], factors[1]))
 
 
 def _searched(
@@ -181,7 +181,8 @@ def _searched(
             if _has_spring(known, is_lumped):
                 ends[name] = float(y.min()), float(y.max())
         elif known[name] != 0.0 and _matters(name, traces, known, is_lumped):
-            ends[name] = tuple(sorted((factors[0] * known[name], factors[1] * known[name])))
+            low, high = sorted((factors[0] * known[name], factors[1] * known[name]))
+            ends[name] = low, high
     return ends
 
 

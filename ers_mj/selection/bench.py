@@ -19,7 +19,8 @@ from ers_mj.selection.search import SEARCH, Budget, Search
 from ers_mj.servo.model import Model
 from ers_mj.solvers.successive_halving import carried_on
 
-A, B = TypeVar("A"), TypeVar("B")
+A = TypeVar("A")
+B = TypeVar("B")
 
 
 @dataclass(frozen=True)

@@ -89,6 +89,8 @@ class Descent(Generic[P]):
         a step promised too little.
         """
         before, slopes = self.point, self.slopes
+        if slopes is None:
+            raise ValueError("a descent needs slopes before it can advance")
         self.curvature, slope = self.problem.normal(before, slopes)
         for _ in range(tries):
             way = self.problem.step(before, self.curvature, slope, self.damping)
