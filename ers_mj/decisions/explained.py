@@ -12,7 +12,7 @@ import numpy as np
 from ers_mj.decisions.policy import POLICY, Policy
 
 
-def score(misfit: np.ndarray, tau: float) -> np.ndarray:
+def score(misfit: np.ndarray | float, tau: float) -> np.ndarray:
     """Each block's share (B,) of the cost C."""
     return np.log((tau + misfit) / (1.0 + tau))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Reason:
 UNRECORDED = "on tuning seeds; no figure was kept"
 
 
-def _threshold(value: float, unit: str, protects: str, set_by: str = UNRECORDED) -> float:
+def _threshold(value: float, unit: str, protects: str, set_by: str = UNRECORDED) -> Any:
     return field(default=value, metadata={"reason": Reason(unit, protects, set_by)})
 
 

@@ -57,7 +57,7 @@ class Rows:
     search: Search
     letters: np.ndarray
     precision: Precision
-    ends: Mapping[str, tuple[float | None, float | None]]
+    ends: Mapping[str, tuple[float | None, ...]]
     sheet: Mapping[str, float]
     y: str
     u: str
@@ -93,12 +93,12 @@ class Rows:
         """Products of powers of several letters, each under the letter that stands for it."""
         structure, names, out = self.search.structure, self.search.unknowns.names, []
         for k in structure.kept:
-            powers = structure.exponents(k)
-            if powers is not None and np.count_nonzero(powers) > 1:
+            powers, name = structure.exponents(k), structure.combination(k)
+            if powers is not None and name is not None and np.count_nonzero(powers) > 1:
                 product = lambda v, powers=powers: float(np.prod(v[powers != 0] ** powers[powers != 0]))
                 unit = unit_of_powers(names, powers, self.y, self.u)
-                known = [self.sheet.get(name) for name in names]
-                out.append(self.row(structure.combination(k), product, unit, _product(known, powers), names[k]))
+                known = [self.sheet.get(letter) for letter in names]
+                out.append(self.row(name, product, unit, _product(known, powers), names[k]))
         return out
 
     def row(
@@ -132,11 +132,12 @@ class Rows:
         """The interval: a profile's ends where it has been followed."""
         low, high = value - half, value + half
         letter = name.partition("/")[0]
-        if own not in self.ends or letter not in self.search.names:
+        if own is None or own not in self.ends or letter not in self.search.names:
             return low, high
         k = self.search.names.index(letter)
         scale = value / factor_of(letter, self.search.coordinates(self.letters)[k])
-        return tuple(x * scale if x is not None else other for x, other in zip(self.ends[own], (low, high)))
+        least, most = self.ends[own]
+        return low if least is None else least * scale, high if most is None else most * scale
 
 
 def _product(known: Sequence[float | None], powers: np.ndarray) -> float | None:

@@ -161,7 +161,7 @@ def unknowns_of(
     lower, upper = np.array([*ends.values()], float).T.copy()
     reference = np.clip([known[name] for name in ends], lower, upper)
     held = {name: x for name, x in known.items() if name not in ends}
-    return Unknowns(tuple(ends), reference, lower, upper, held, tuple(fixed), is_lumped, own, tuple(factors))
+    return Unknowns(tuple(ends), reference, lower, upper, held, tuple(fixed), is_lumped, own, (factors[0], factors[1]))
 
 
 def _searched(
@@ -173,7 +173,8 @@ def _searched(
     factors: tuple[float, float],
 ) -> dict[str, tuple[float, float]]:
     """The letters that are searched, in their order, and the ends between which."""
-    y, ends = np.concatenate([t.y[t.valid] for t in traces]), {}
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    ends: dict[str, tuple[float, float]] = {}
     for name in (n for n in (BASE if is_lumped else LETTERS) if n in known and n not in fixed):
         if name in bounds:
             ends[name] = _given(name, bounds[name], traces, known)
@@ -181,7 +182,8 @@ def _searched(
             if _has_spring(known, is_lumped):
                 ends[name] = float(y.min()), float(y.max())
         elif known[name] != 0.0 and _matters(name, traces, known, is_lumped):
-            ends[name] = tuple(sorted((factors[0] * known[name], factors[1] * known[name])))
+            low, high = sorted((factors[0] * known[name], factors[1] * known[name]))
+            ends[name] = low, high
     return ends
 
 

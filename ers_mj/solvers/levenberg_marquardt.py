@@ -89,6 +89,7 @@ class Descent(Generic[P]):
         a step promised too little.
         """
         before, slopes = self.point, self.slopes
+        assert slopes is not None, "slopes are taken before a step is"
         self.curvature, slope = self.problem.normal(before, slopes)
         for _ in range(tries):
             way = self.problem.step(before, self.curvature, slope, self.damping)
