@@ -173,7 +173,8 @@ def _searched(
     factors: tuple[float, float],
 ) -> dict[str, tuple[float, float]]:
     """The letters that are searched, in their order, and the ends between which."""
-    y, ends = np.concatenate([t.y[t.valid] for t in traces]), {}
+    y = np.concatenate([t.y[t.valid] for t in traces])
+    ends: dict[str, tuple[float, float]] = {}
     for name in (n for n in (BASE if is_lumped else LETTERS) if n in known and n not in fixed):
         if name in bounds:
             ends[name] = _given(name, bounds[name], traces, known)
