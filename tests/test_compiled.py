@@ -1,4 +1,4 @@
-"""Units: compiled apart and kept under their own fingerprints, in a folder that belongs to the user alone."""
+"""Units: compiled apart and kept under their own digests, in a folder that belongs to the user alone."""
 
 import os
 import pickle
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from ers_mj.plants.code_folder import refusal
-from ers_mj.plants.fingerprint import fingerprint
+from ers_mj.plants.digest import digest_of
 
 ROOT = Path(__file__).resolve().parents[1]
 SMALL = """
@@ -204,7 +204,7 @@ def test_a_fingerprint_tells_code_and_numbers_but_no_place():
     def of(text):
         scope = {}
         exec(text, scope)
-        return fingerprint(scope["f"], lambda _: None)
+        return digest_of(scope["f"], lambda _: None)
 
     one = of("K = 2.0\ndef f(x):\n    return K * x")
     assert one == of("K = 2.0\n\n\ndef f(x):\n    return K * x")

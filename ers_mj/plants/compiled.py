@@ -4,7 +4,7 @@
     unit     compiled once, apart from its callers, neither linked nor inlined into them
     kernel   what Python calls; it compiles, or fetches, itself and every unit that it needs when it is first called
 
-A unit is kept under its own fingerprint, so that an edited one compiles anew alone; what only calls it stays as it is.
+A unit is kept under its own digest, so that an edited one compiles anew alone; what only calls it stays as it is.
 All that leans on numba's inside is in this file: its calling convention, its records of compiled code and its cache
 (numba 0.61 to 0.68). Under NUMBA_DISABLE_JIT=1 every decorator leaves the plain function. An address holds in one
 process only, so none is kept in anything that may go to another.
@@ -30,7 +30,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.extending import intrinsic
 
 from ers_mj.plants.code_folder import code_folder, one_at_a_time
-from ers_mj.plants.fingerprint import fingerprint, read_by
+from ers_mj.plants.digest import digest_of, read_by
 
 MANY = 4  # parts to compile of which it is worth saying so
 SECONDS_EACH = 0.4
@@ -74,7 +74,7 @@ class Piece:
     def stem(self) -> str:
         """Of the names of its files in the cache: they hold for one state of the code, one numba and one processor."""
         made_by = (numba.__version__, numba.config.CPU_NAME or llvm.get_host_cpu_name(), THIS_FILE)
-        made = fingerprint(self.function, _told, str(self.signature), str(self.options), *made_by)
+        made = digest_of(self.function, _told, str(self.signature), str(self.options), *made_by)
         return f"{self.name}-{made}.py{sys.version_info[0]}{sys.version_info[1]}"
 
     def reached(self) -> list[object]:
@@ -97,7 +97,7 @@ class Piece:
 
 
 _PIECES: dict[int, Piece] = {}  # units, by the identity of what stands for them in code
-_TOLD: dict[int, str] = {}  # what a fingerprint says of an intrinsic of this file, by its identity
+_TOLD: dict[int, str] = {}  # what a digest says of an intrinsic of this file, by its identity
 _SIGNATURES: dict[int, tuple] = {}  # what is put into callers for one signature alone, with it, by its identity
 _COMPILING = threading.RLock()
 
@@ -174,9 +174,11 @@ def address_of(function: Callable, signature) -> int:
     function = getattr(function, "py_func", function)
     piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, UNCOUNTED)
     make(piece)
+    _LAWS.append(piece)  # whose code lasts as long as it is held
     return piece.address
 
 
+_LAWS: list[Piece] = []
 _PLAIN_LAWS: list[Callable] = []
 
 

@@ -9,16 +9,16 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 
-def fingerprint(function: Callable, apart: Callable[[object], str | None], *beside: str) -> str:
+def digest_of(function: Callable, apart: Callable[[object], str | None], *beside: str) -> str:
     """A digest that changes with a function's code, and with everything that the code reads.
 
     ``apart`` tells the name and signature of what is compiled apart and only called, and None of anything else;
     ``beside`` is digested as well.
     """
-    digest = hashlib.sha256()
+    made = hashlib.sha256()
     for told in (*beside, *_function(function, apart, set())):
-        digest.update(told.encode() + b"\n")
-    return digest.hexdigest()[:20]
+        made.update(told.encode() + b"\n")
+    return made.hexdigest()[:20]
 
 
 def read_by(function: Callable) -> Iterator[tuple[str, object]]:
