@@ -76,8 +76,10 @@ def test_a_shaft_whose_motor_bears_nothing_is_a_filter_in_the_drive(pushed, foun
 
 def test_what_leaves_the_same_in_all_blocks_is_no_other_offer(pushed, found):
     torque = found("load_dependent_friction", [0.01, np.inf], 2.0)
-    same, other = (replace(found("stribeck", None, 1.9), fit=replace(torque.fit, misfit=m)) for m in (
-        torque.fit.misfit, torque.fit.misfit + np.linspace(0.0, 0.5, torque.fit.misfit.size)))
+    same, other = (
+        replace(found("stribeck", None, 1.9), fit=replace(torque.fit, misfit=m))
+        for m in (torque.fit.misfit, torque.fit.misfit + np.linspace(0.0, 0.5, torque.fit.misfit.size))
+    )
     assert stands_alone(torque, [torque, same]) and not stands_alone(torque, [torque, other])
     assert stands_alone(torque, [torque, replace(other, gain=1.2)])
     assert not stands_alone(found("periodic_gust", None, 2.0), [])

@@ -88,9 +88,7 @@ def test_what_nearly_all_of_a_large_misfit_asks_for_is_named_though_its_free_run
     [(0.45, 0.12, 0.01, True), (0.45, 0.12, 0.06, False), (0.3, 0.12, 0.01, False), (0.45, 0.02, 0.0, False)],
 )
 def test_what_memory_loses_is_named_though_one_free_run_forks(explained, before, after, named):
-    case = replace(
-        RIGHT, explained=explained, left_before=left(before), left=left(after), heldout_cost=(20.0, 10.0)
-    )
+    case = replace(RIGHT, explained=explained, left_before=left(before), left=left(after), heldout_cost=(20.0, 10.0))
     assert conclusion.goes_from_memory(case) is named
     assert bool(conclusion.told_effects(case)) is named
 

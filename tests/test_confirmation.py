@@ -70,8 +70,7 @@ def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
     step = 0.016
     coarse, fine = ([trace("multisine", sensor=lambda y, s=s: s * np.round(y / s))] for s in (step, NOISE))
     small, large = (
-        having(plain.fit, "sensor_nonlinearity", [np.inf, np.inf, size * step, 0.043, 0.3]).model
-        for size in (0.3, 0.8)
+        having(plain.fit, "sensor_nonlinearity", [np.inf, np.inf, size * step, 0.043, 0.3]).model for size in (0.3, 0.8)
     )
     assert is_a_converters("sensor_nonlinearity", small, coarse)
     assert not is_a_converters("sensor_nonlinearity", large, coarse)

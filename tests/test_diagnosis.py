@@ -1,22 +1,18 @@
 """The whole way on recordings with known truth: from a wrong datasheet to the right name, number and verdict."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ers_mj.commands.output import plain
-from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
-from ers_mj.diagnosis.pipeline import _symptoms, diagnose
-from ers_mj.diagnosis.verdict import Case
+from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.selection.cross_validation import Fold, Score
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
 
-T = np.arange(0.0, 4.0, 1e-3)
+T = np.arange(0.0, 4.0, 2e-3)
 TRUTH = {
     "a_1": 25.0,
     "a_2": 50.0,
@@ -113,27 +109,6 @@ def test_a_coarse_sensor_is_told_from_the_data():
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    "degrees, travel, unit, told",
-    [
-        (0.041, 0.5, "rad", True),
-        (0.029, 0.5, "rad", False),
-        (0.0879, 1.9, "rad", False),
-        (0.041, 0.5, "V", False),
-        (0.041, 0.2, "V", True),
-    ],
-)
-def test_a_step_is_an_effect_where_rudders_converters_are_finer_or_the_travel_has_few(degrees, travel, unit, told):
-    step = np.radians(degrees)
-    y = (
-        np.round((0.5 * travel * np.sin(5.0 * T) + 1e-4 * np.random.default_rng(2).standard_normal(T.size)) / step)
-        * step
-    )
-    r = from_arrays(T, np.zeros(T.size), y, output_unit=unit)
-    found = _symptoms([r], [trace_of(r, None)], travel)
-    assert found == ({"sensor_quantisation": pytest.approx([step], rel=1e-3)} if told else {})
-
-
 @pytest.mark.parametrize("step", [0.0, np.radians(0.6)])
 def test_what_the_library_has_no_name_for_is_unexplained(step):
     """A torque that hops between two values at random times is no effect of the library; a coarse sensor is told beside
@@ -142,7 +117,7 @@ def test_what_the_library_has_no_name_for_is_unexplained(step):
     rng = np.random.default_rng(4)
     out = []
     for r in recordings():
-        hops = np.repeat(rng.choice([-25.0, 25.0], 40), 100)
+        hops = np.repeat(rng.choice([-25.0, 25.0], 40), T.size // 40)
         plant = ReducedModel(lumped(TRUTH))
         y = plant.theta(T, r.u, (TRUTH["theta_0"], 0.0), load=hops) + NOISE * rng.standard_normal(T.size)
         out.append(from_arrays(T, r.u, np.round(y / step) * step if step else y, name=r.name))
@@ -201,7 +176,7 @@ def test_dropouts_are_found_in_the_data_and_left_out(lose):
     def sensor(y):
         y, random = y.copy(), np.random.default_rng(int(1e6 * y[-1]) % 1000)
         for k in random.choice(np.arange(100, y.size - 100), 12, replace=False):
-            y[k : k + (1 if lose == "spikes" else 40)] = y[k] + 0.03 if lose == "spikes" else y[k - 1]
+            y[k : k + (1 if lose == "spikes" else 20)] = y[k] + 0.03 if lose == "spikes" else y[k - 1]
         return y
 
     document = diagnose(recordings(sensor=sensor), read_datasheet("table1")).document
@@ -209,75 +184,3 @@ def test_dropouts_are_found_in_the_data_and_left_out(lose):
     assert (
         document["fit"]["heldout_rmse_before_rad"] < (3 if lose == "spikes" else 10) * NOISE
     )  # a hold at rest may pass unseen
-
-
-@pytest.mark.parametrize("errors, lost", [((0.5, 0.4), True), ((0.5, 0.002), False)])
-def test_where_every_free_run_is_lost_the_parameters_are_not_all_that_was_off(errors, lost):
-    n = 100
-    trace = trace_of(
-        from_arrays(np.arange(n) / 1e3, np.zeros(n), 1e-3 * np.random.default_rng(0).standard_normal(n)), None
-    )
-    scores = [Score(n * e**2, n, np.ones(1)) for e in errors]
-    case = SimpleNamespace(confirmed=SimpleNamespace(before=scores, parts=[Fold(trace, None)] * len(errors)))
-    assert Case._astray(case) is lost
-
-
-@pytest.mark.parametrize(
-    "lost, left, explained",
-    [((60.0, 80.0), 0.5, 0.99), ((20.0, 25.0), 0.5, 0.495), ((20.0, 25.0), 0.0, 0.99), ((7.0, 5.0), 0.0, 0.745)],
-)
-def test_a_free_run_that_is_lost_with_and_without_the_effects_tells_nothing(lost, left, explained):
-    n = 100
-    shown = [(*(Score(n * e**2, n, np.ones(1)) for e in ends), 1.0) for ends in ((10.0, np.sqrt(1.99)), lost)]
-    case = SimpleNamespace(confirmed=SimpleNamespace(shown=shown), left={"output": left})
-    assert Case._explained_each(case) == pytest.approx(explained)
-
-
-def test_where_all_free_runs_fork_the_observer_tells_what_is_explained():
-    forked = [(Score(100 * 11.0**2, 100, np.array([9.0, 0.5])), Score(100 * 9.0**2, 100, np.array([2.0, 0.5])), 1.0)]
-    case = SimpleNamespace(confirmed=SimpleNamespace(shown=forked), left={"output": 0.0})
-    assert Case._explained_each(case) == pytest.approx(0.875)
-
-
-@pytest.mark.parametrize(
-    "before, after, named",
-    [((90.0, 60.0), (4.0, 6.0), True), ((90.0, 60.0), (40.0, 20.0), False), ((3.0, 2.0), (0.1, 0.1), False)],
-)
-def test_what_nearly_all_of_a_large_misfit_asks_for_is_named_though_its_free_runs_fork(before, after, named):
-    scores = ([Score(1.0, 1, np.exp(np.full(20, c / 20.0)) - 1.0) for c in costs] for costs in (before, after))
-    case = SimpleNamespace(confirmed=SimpleNamespace(**dict(zip(("before", "after"), scores))))
-    assert Case._goes_in_blocks(case) is named
-
-
-@pytest.mark.parametrize(
-    "explained, before, after, named",
-    [(0.45, 0.12, 0.01, True), (0.45, 0.12, 0.06, False), (0.3, 0.12, 0.01, False), (0.45, 0.02, 0.0, False)],
-)
-def test_what_memory_loses_is_named_though_one_free_run_forks(explained, before, after, named):
-    case = SimpleNamespace(
-        explained=explained, left_before={"output": before, "current": 0.0}, left={"output": after, "current": 0.0}
-    )
-    assert Case._goes_from_memory(case) is named
-
-
-@pytest.mark.parametrize("before, explained", [(0.2, 0.75), (0.05, 0.0)])
-def test_where_no_error_is_above_the_noise_memory_tells_what_is_explained(before, explained):
-    errors = [(SimpleNamespace(sure=0.99), SimpleNamespace(sure=0.9), 1.0)]
-    left, left_before = ({"output": float(np.log1p(power)), "current": 0.0} for power in (before / 4, before))
-    case = SimpleNamespace(confirmed=SimpleNamespace(shown=errors), left=left, left_before=left_before)
-    assert Case._explained_each(case) == pytest.approx(explained)
-
-
-@pytest.mark.parametrize(
-    "explained, left, after, part",
-    [(0.95, 0.2, 3.0, True), (0.99, 0.2, 3.0, False), (0.95, 0.05, 3.0, False), (0.95, 0.2, 9.0, False)],
-)
-def test_what_memory_and_held_out_error_both_miss_is_left(explained, left, after, part):
-    case = SimpleNamespace(
-        told_effects=("supply_sag",),
-        explained=explained,
-        left={"output": left},
-        fits={"heldout_rmse_after_rad": after},
-        noise=1.0,
-    )
-    assert Case._is_a_part(case) is part

@@ -51,7 +51,11 @@ def tied(pushed):
     """A constant torque and its asymmetric form are one; gravity, a third that does as well, is beaten by the two
     together, and led its round.
     """
-    torques = {"gravity_imbalance": [0.06, 0.0], "bias_torque": [0.06], "asymmetric_friction": [-0.06, 0, np.inf, np.inf]}
+    torques = {
+        "gravity_imbalance": [0.06, 0.0],
+        "bias_torque": [0.06],
+        "asymmetric_friction": [-0.06, 0, np.inf, np.inf],
+    }
     return tuple(alone(pushed, name, p) for name, p in torques.items())
 
 
