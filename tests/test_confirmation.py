@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from servo import NAMES, NOISE, SPARSE, having, recorded, started, trace
 
-from ers_mj.decisions.policy import POLICY
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import SPARSE, TRUTH, Watched, all_but, alone, bench_of, having, recorded, started
+from servo import Watched, all_but, alone, bench_of, having, recorded, started
 
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
