@@ -61,8 +61,7 @@ def test_an_impulse_gains_much_or_what_no_fork_makes(gain, best, outstanding, le
 def test_a_knock_gives_way_to_a_law_that_explains_more(gain, first):
     """The law loses too much elsewhere to be asked for by itself; that something is missing the knock has shown."""
     dead = law("drive_dead_zone", gain, z=1.7, lost=0.4 * gain)
-    assert named([dead, knock(4.4)], replace(LATER, faint=4.0)) == "load_disturbance" or gain > 9.0
-    assert named([dead, replace(knock(4.4), is_effect=True)], LATER) == first
+    assert named([dead, knock(4.4)], LATER) == first
     assert named([dead], LATER) is None
     assert named([dead, knock(4.4)], replace(LATER, beside=False)) is None  # the first round names its leader or none
 

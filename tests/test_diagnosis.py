@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from ers_mj.commands.output import plain
-from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
-from ers_mj.decisions.policy import POLICY
-from ers_mj.diagnosis.pipeline import diagnose, symptoms
+from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
@@ -25,7 +23,7 @@ TRUTH = {
     "tau_e": 9e-4,
     "emf_share": 0.94,
 }
-NOISE = 1e-4
+NOISE = 1.5e-4
 
 
 def recordings(effects=(), sensor=lambda y: y, names=("multisine", "steps", "chirp")):
@@ -111,27 +109,6 @@ def test_a_coarse_sensor_is_told_from_the_data():
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    "degrees, travel, unit, told",
-    [
-        (0.041, 0.5, "rad", True),
-        (0.029, 0.5, "rad", False),
-        (0.0879, 1.9, "rad", False),
-        (0.041, 0.5, "V", False),
-        (0.041, 0.2, "V", True),
-    ],
-)
-def test_a_step_is_an_effect_where_rudders_converters_are_finer_or_the_travel_has_few(degrees, travel, unit, told):
-    step = np.radians(degrees)
-    y = (
-        np.round((0.5 * travel * np.sin(5.0 * T) + 1e-4 * np.random.default_rng(2).standard_normal(T.size)) / step)
-        * step
-    )
-    r = from_arrays(T, np.zeros(T.size), y, output_unit=unit)
-    found = symptoms([r], [trace_of(r, None)], travel, POLICY)
-    assert found == ({"sensor_quantisation": pytest.approx([step], rel=1e-3)} if told else {})
-
-
 @pytest.mark.parametrize("step", [0.0, np.radians(0.6)])
 def test_what_the_library_has_no_name_for_is_unexplained(step):
     """A torque that hops between two values at random times is no effect of the library; a coarse sensor is told beside
@@ -199,7 +176,7 @@ def test_dropouts_are_found_in_the_data_and_left_out(lose):
     def sensor(y):
         y, random = y.copy(), np.random.default_rng(int(1e6 * y[-1]) % 1000)
         for k in random.choice(np.arange(100, y.size - 100), 12, replace=False):
-            y[k : k + (1 if lose == "spikes" else 40)] = y[k] + 0.03 if lose == "spikes" else y[k - 1]
+            y[k : k + (1 if lose == "spikes" else 20)] = y[k] + 0.03 if lose == "spikes" else y[k - 1]
         return y
 
     document = diagnose(recordings(sensor=sensor), read_datasheet("table1")).document
