@@ -30,9 +30,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ers_mj.decisions import acceptance, conclusion, confirmation, ordering
+from ers_mj.decisions import acceptance, confirmation, ordering
+from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.acceptance import Offer
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects import BY_NAME, EQUIVALENT
 
 TABLES = Path(__file__).resolve().parent / "golden"
@@ -144,7 +145,7 @@ def chance_of(pool: dict, row: dict, policy: Policy) -> float:
 
 @dataclass(frozen=True)
 class Findings:
-    """What the conclusion reads of a case's table."""
+    """What the verdict reads of a case's table."""
 
     table: dict
     policy: Policy
@@ -163,9 +164,9 @@ class Findings:
     @property
     def explained(self) -> float:
         t = self.table
-        shares = [conclusion.share(b**2, a**2, n**2) for b, a, n in t["explained_pooled"]]
-        shown = [conclusion.Shown(*row) for row in t["shown"]]
-        return max(*shares, conclusion.explained_each(shown, t["left_before"], t["left"], self.policy))
+        shares = [rules.share(b**2, a**2, n**2) for b, a, n in t["explained_pooled"]]
+        shown = [rules.Shown(*row) for row in t["shown"]]
+        return max(*shares, rules.explained_each(shown, t["left_before"], t["left"], self.policy))
 
     @property
     def free_train(self) -> float:
@@ -196,8 +197,8 @@ def decisions(table: dict, policy: Policy) -> Iterator[tuple[str, object, object
             for name, row in one["effects"].items():
                 yield f"{name} is kept", row["kept"], kept(row, folds, name, policy)
     found = Findings({**table["verdict"], "nameless": table["answer"]["nameless"]}, policy)
-    yield "verdict", table["answer"]["verdict"], conclusion.verdict(found, policy)
-    yield "more is left", table["answer"]["significant"], conclusion.is_more_left(found, policy)
+    yield "verdict", table["answer"]["verdict"], rules.verdict(found, policy)
+    yield "more is left", table["answer"]["significant"], rules.is_more_left(found, policy)
 
 
 def changed(sets: list[str], policy: Policy) -> list[tuple[str, str, object, object]]:

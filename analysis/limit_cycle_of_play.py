@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from ers_mj.control.controllers import CONTROLLERS, Aim, PidGains, Servo
 from ers_mj.control.frequency.cycle import Cycle, lasting, predicted
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants.sampled_reduced import SampledReduced
 from ers_mj.report.style import STYLE
 from ers_mj.servo.datasheet import Datasheet, read_datasheet

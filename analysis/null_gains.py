@@ -19,14 +19,14 @@ from concealed_cases import main as make_cases
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import read_recording
-from ers_mj.decisions.policy import Policy
+from ers_mj.decisions.thresholds import Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import baseline
 from ers_mj.estimation.objective import tau_of
 from ers_mj.selection.bench import Bench
+from ers_mj.selection.budget import Search
 from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import stands_alone
-from ers_mj.selection.search import Search
 from ers_mj.servo.datasheet import read_datasheet
 
 OPEN, ASKING_ALL = Policy(least_gain=0.0), Search(least_promise=0.0)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from ers_mj.decisions.acceptance import Bar, Offer, asked, bar, is_asked_for, is_steady, least_of
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 
 FIRST = Bar(usual=3.0, faint=3.0, z=1.7, outstanding=False, beside=False)
 LATER = Bar(usual=4.0, faint=1.5, z=2.0, outstanding=False, beside=True)

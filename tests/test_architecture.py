@@ -38,7 +38,7 @@ MAY_READ = {
 }  # fmt: skip
 WRITERS = {"commands", "report", "view", "proving", "cli"}  # beside these only the tables of data/ open a file to write
 FAMILIES = {
-    "effects": ("base", "records"),
+    "effects": ("base", "quantities"),
     "control/controllers": ("base", "finite_time", "pid"),
     "identification/minimisers": ("base", "iga"),
     "proving/concealed": ("base",),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from servo import NAMES, SPARSE, all_but, bench_of, recorded, started
 
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.estimation.fit import fit
 from ers_mj.estimation.objective import tau_of
 from ers_mj.plants.inputs import INPUTS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from servo import having
 
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.effects import BY_NAME
 from ers_mj.selection.comparison import judged, likeliest, likeliest_first, paired_z, rivals_of, shows, stands_alone
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from servo import SPARSE, bench_of, having, recorded, started
 
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.effects import SUSPECTS
 from ers_mj.estimation.fit import fit
+from ers_mj.selection.budget import SEARCH
 from ers_mj.selection.confounders import in_place_of_all, without_confounders
-from ers_mj.selection.search import SEARCH
 from ers_mj.selection.stepwise import Selection
 
 

@@ -10,7 +10,7 @@ from test_reduced import SCALES
 from ers_mj.data.prepared import counted, trace_of
 from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import from_arrays
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.estimation import baseline
 from ers_mj.estimation.baseline import Start, sharpened
 from ers_mj.estimation.fit import fit

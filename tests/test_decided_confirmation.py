@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, is_doubtful, is_halved, is_no_closer, paired_p
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 
 HELD = HeldOut(p=0.2, rmse=(0.6, 1.0), noise=0.1, cost=(10.0, 20.0), ratio=0.6, log_ratio=math.log(0.6))
 

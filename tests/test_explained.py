@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ers_mj.decisions import explained
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 
 QUIET = np.ones(200)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 golden = pytest.importorskip("golden", reason="analysis/ is not beside the tests")

@@ -6,7 +6,7 @@ import pytest
 
 from ers_mj.decisions.acceptance import Offer
 from ers_mj.decisions.ordering import likeliest, likeliest_first, rivals_of, stands_alone
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 
 
 def law(name, gain, z=3.0, size=6, **kind):

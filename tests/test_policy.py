@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from servo import TRUTH
 
-from ers_mj.decisions.policy import POLICY, Policy, reasons
+from ers_mj.decisions.thresholds import POLICY, Policy, reasons
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.selection.search import SEARCH, Budget
+from ers_mj.selection.budget import SEARCH, Budget
 
 
 @pytest.mark.parametrize("name", [f.name for f in fields(Policy)])

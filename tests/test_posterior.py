@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from servo import having
 
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.selection.posterior import isolability, probabilities
 
 PREFERRED = 1 / (1 + np.exp(-POLICY.wider_price))

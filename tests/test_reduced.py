@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete
 
 from ers_mj.effects import EFFECTS
-from ers_mj.effects.records import Coefficients, Scales, coupled
+from ers_mj.effects.quantities import Coefficients, Scales, coupled
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.proving import quick

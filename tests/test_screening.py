@@ -13,8 +13,8 @@ from ers_mj.estimation.baseline import baseline
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection import screening
+from ers_mj.selection.budget import SEARCH
 from ers_mj.selection.screening import Screened, screen
-from ers_mj.selection.search import SEARCH
 from ers_mj.selection.secants import promise
 from ers_mj.servo.datasheet import read_datasheet
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from servo import SPARSE, all_but, alone, having, recorded, started
 
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
 from ers_mj.selection import stepwise
+from ers_mj.selection.budget import Budget
 from ers_mj.selection.comparison import judged
-from ers_mj.selection.search import Budget
 from ers_mj.selection.stepwise import rounds_that_count, select
 
 SURE = replace(POLICY, mismatch=np.inf)  # nothing that is left is more than noise

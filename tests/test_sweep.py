@@ -6,7 +6,7 @@ import pytest
 from servo import Watched, all_but, bench_of
 
 from ers_mj.effects import BY_NAME
-from ers_mj.selection.search import SEARCH
+from ers_mj.selection.budget import SEARCH
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
 
 FEW = all_but("bias_torque", "quadratic_drag", "hinge_moment_cubic")

@@ -5,7 +5,7 @@ import pytest
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Symptoms
 

@@ -12,7 +12,7 @@ import numpy as np
 from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import Recording
 from ers_mj.data.sensor_faults import at_extreme, converter_step, frozen_spans, leapt_spans, spikes, unmoved_spans
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or BEGINNING.samples, whichever is longer

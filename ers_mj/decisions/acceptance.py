@@ -1,4 +1,4 @@
-"""Which candidate of a round is named?"""
+"""Which candidate of a round is named? The numbers and their reasons stand in thresholds.py."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 
 
 @dataclass(frozen=True)

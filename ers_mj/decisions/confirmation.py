@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 
 
 @dataclass(frozen=True)

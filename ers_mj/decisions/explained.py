@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 
 
 def score(misfit: np.ndarray | float, tau: float) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from ers_mj.decisions.acceptance import Offer
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 
 Chances = Callable[[Sequence[Offer]], Mapping[str, float]]  # of explanations, if one of them is true
 

@@ -11,11 +11,11 @@ import numpy as np
 from ers_mj import __version__
 from ers_mj.data.prepared import Trace
 from ers_mj.decisions.explained import cost
+from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.sentences import remainder, sentence, shown
-from ers_mj.diagnosis.verdict import Case
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording

@@ -13,12 +13,12 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace, counted, trace_of
 from ers_mj.data.recording import Recording
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
+from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.document import Diagnosis, told
 from ers_mj.diagnosis.mujoco_check import Rig
-from ers_mj.diagnosis.verdict import Case
 from ers_mj.effects import BY_NAME, SUSPECTS
-from ers_mj.effects.records import Symptoms
+from ers_mj.effects.quantities import Symptoms
 from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes

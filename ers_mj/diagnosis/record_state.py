@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ers_mj.data.prepared import Trace
+from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.sentences import shown
-from ers_mj.diagnosis.verdict import Case
 from ers_mj.selection.cross_validation import recalibrated
 from ers_mj.servo.model import STATES
 

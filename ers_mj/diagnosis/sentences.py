@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.localisation import Place
-from ers_mj.diagnosis.verdict import Case
 from ers_mj.effects import BY_NAME
 
 

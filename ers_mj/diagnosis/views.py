@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import RecordView, Rung
 from ers_mj.diagnosis.localisation import Samples, shaded
-from ers_mj.diagnosis.verdict import Case
 from ers_mj.effects import BY_NAME
 from ers_mj.selection.cross_validation import free_run, pooled
 

@@ -6,7 +6,7 @@ import importlib
 import pkgutil
 
 from ers_mj.effects.base import Drive, Effect, Friction, Load, Parameter, Sensor, Transmission
-from ers_mj.effects.records import Coefficients, Scales, Twin
+from ers_mj.effects.quantities import Coefficients, Scales, Twin
 
 
 def _members() -> tuple[Effect, ...]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ers_mj.effects.base import Parameter, Transmission
-from ers_mj.effects.records import coupled
+from ers_mj.effects.quantities import coupled
 
 
 class Backlash(Transmission):

@@ -16,8 +16,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.linalg.blas import dtbsv
 
-from ers_mj.decisions.policy import Policy
-from ers_mj.effects.records import Coefficients, Parameter, Scales, Symptoms, Twin
+from ers_mj.decisions.thresholds import Policy
+from ers_mj.effects.quantities import Coefficients, Parameter, Scales, Symptoms, Twin
 
 LEAST_IRON = 0.25  # share of an inductance that no current saturates
 # periods of a torque that returns with the angle which the travel must hold, overshoots set aside: less is a spring, a

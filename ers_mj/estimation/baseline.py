@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.prepared import Trace, counted
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.records import Scales
+from ers_mj.effects.quantities import Scales
 from ers_mj.errors import InputError
 from ers_mj.estimation.fit import Along, descend, fit, hopped
 from ers_mj.estimation.initial_state import with_starts, without_spikes

@@ -17,9 +17,9 @@ import numpy as np
 
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import split_delay
+from ers_mj.plants.event_integrator import faster
 from ers_mj.plants.forces import LEAST_LEVEL, PAIR, motor_level
 from ers_mj.plants.laws import drive_torque, friction_level, remember, total_torque
-from ers_mj.plants.march import faster
 from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, C, F, L, N, is_bounded, plant_in, types
 
 LONGEST = 2e-4  # [s] of a step

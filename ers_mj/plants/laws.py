@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 
 from ers_mj.effects import EFFECTS
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants.compiled import address_of, by_address, inline
 from ers_mj.plants.state import LAW, MOST_LAWS, N_CONSTANTS, PLANT, C, F
 

@@ -14,12 +14,12 @@ import mujoco
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.records import Coefficients, Twin
+from ers_mj.effects.quantities import Coefficients, Twin
 from ers_mj.errors import InputError
+from ers_mj.plants.mujoco_stepping import Law, Observer, Stepper, step_many
 from ers_mj.plants.play import rigid_play
 from ers_mj.plants.reduced import Motion
 from ers_mj.plants.skeletons import Skeleton, lumped_skeleton, rudder_skeleton
-from ers_mj.plants.stepping import Law, Observer, Stepper, step_many
 from ers_mj.plants.writing import motor_gain, write_coefficients
 
 TIMESTEP = 5e-5  # [s] RMS error on Table 1 at most 0.01 deg; twice the step, twice the error

@@ -4,7 +4,7 @@ side.
 
 import math
 
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 
 MOTOR_SHARE = 0.64  # of J on the motor's side, where no effect says otherwise: n^2 J_m = 0.00198 of 0.0031 kg m^2
 CONTACT_HZ = 2000.0  # of the reduced model's contact, against the total inertia: 0.01 deg RMS from two rigid masses

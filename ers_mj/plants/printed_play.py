@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants.compiled import inline, kernel
 from ers_mj.plants.reduced import Motion
 from ers_mj.plants.state import READ, TABLE, F, N, types

@@ -9,8 +9,8 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Effect
-from ers_mj.effects.records import Coefficients
-from ers_mj.plants import fixed_steps, march
+from ers_mj.effects.quantities import Coefficients
+from ers_mj.plants import event_integrator, fixed_steps
 from ers_mj.plants.effort import Effort
 from ers_mj.plants.laws import acting, laid_out
 from ers_mj.plants.state import N_CONSTANTS
@@ -63,7 +63,7 @@ class Motion:
 @dataclass(frozen=True)
 class Held:
     """What acts on a run beside its input: whether the circuit is closed (N,), a known acceleration of the rudder (N,),
-    and what an observer of this ``gain`` follows (N,) at one sample in ``every`` (see march.simulate).
+    and what an observer of this ``gain`` follows (N,) at one sample in ``every`` (see event_integrator.simulate).
     """
 
     enable: np.ndarray | None = None
@@ -151,14 +151,14 @@ class ReducedModel:
         both = self.bends and self.has_motor_side
         self._count(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on.pushes else PLAIN)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        run = fixed_steps.simulate if both else march.simulate
+        run = fixed_steps.simulate if both else event_integrator.simulate
         plant = laid_out(c, on, p)
         run(t, self.terminal(u), enable, load, y, held.gain, held.every, plant, refine, x0, out)
         return out
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
         """What the sensor reads (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see
-        march.simulate).
+        event_integrator.simulate).
 
         ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool. An
         observer beside a sensor effect that is not ``instant`` runs twice: what the sensor adds on the first way is

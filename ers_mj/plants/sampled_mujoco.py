@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ers_mj.plants.mechanical import MechanicalPlant
-from ers_mj.plants.stepping import unlogged
+from ers_mj.plants.mujoco_stepping import unlogged
 
 
 class SampledMuJoCo:

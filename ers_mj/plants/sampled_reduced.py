@@ -10,8 +10,8 @@ from ers_mj.effects import BY_NAME
 from ers_mj.plants import fixed_steps
 from ers_mj.plants.compiled import kernel
 from ers_mj.plants.cuts import corner_speed, cut, longest_step
+from ers_mj.plants.event_integrator import advance
 from ers_mj.plants.laws import laid_out, remember
-from ers_mj.plants.march import advance
 from ers_mj.plants.modes import start_mode, start_state
 from ers_mj.plants.reduced import ReducedModel
 from ers_mj.plants.state import MODES, PLANT, VECTOR, F, Mode, N, State, is_bounded, plant_in, types

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.plants.mjcf import read_mjcf
 from ers_mj.plants.play import MOTOR_SHARE

@@ -1,11 +1,11 @@
 """How a motion of one body changes with anything that its model is made of, to first order, without simulating it
 again.
 
-Along a motion (theta, w, j) that the kernel of march.py has made, the change (a, b, d) of the three obeys the same
-equations within each mode, driven by what the changed model adds to the forces there. The instants at which the mode
-changes are taken from the states at the ends of the sample, so a column is good to a few per cent: enough for the steps
-of a search, which weighs every step by a simulation. One costs about as much as a simulation of the bare plant, half of
-one under a law.
+Along a motion (theta, w, j) that the kernel of event_integrator.py has made, the change (a, b, d) of the three obeys
+the same equations within each mode, driven by what the changed model adds to the forces there. The instants at which
+the mode changes are taken from the states at the ends of the sample, so a column is good to a few per cent: enough for
+the steps of a search, which weighs every step by a simulation. One costs about as much as a simulation of the bare
+plant, half of one under a law.
 """
 
 from __future__ import annotations

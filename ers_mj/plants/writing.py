@@ -16,7 +16,7 @@ import math
 import mujoco
 import numpy as np
 
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.plants.skeletons import Skeleton
 

@@ -1,4 +1,6 @@
-"""The parts of a page that stands alone: frame, tiles, sections, tables, figures, places and their bars."""
+"""The parts of any page, which *_report.py put together: frame, tiles, sections, tables, figures, places and their
+bars.
+"""
 
 from __future__ import annotations
 

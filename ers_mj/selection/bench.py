@@ -11,11 +11,11 @@ import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.decisions import explained
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.estimation.fit import Along, fit
 from ers_mj.estimation.objective import Fit
+from ers_mj.selection.budget import SEARCH, Budget, Search
 from ers_mj.selection.comparison import Candidate, judged
-from ers_mj.selection.search import SEARCH, Budget, Search
 from ers_mj.servo.model import Model
 from ers_mj.solvers.successive_halving import carried_on
 

@@ -16,7 +16,7 @@ import numpy as np
 from ers_mj.decisions import ordering
 from ers_mj.decisions.acceptance import Offer
 from ers_mj.decisions.explained import score
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects import BY_NAME, EQUIVALENT
 from ers_mj.estimation.objective import Fit
 from ers_mj.selection.posterior import probabilities

@@ -12,7 +12,7 @@ import numpy as np
 from ers_mj.data.prepared import START, Blocks, Trace
 from ers_mj.decisions import confirmation as decisions
 from ers_mj.decisions.explained import cost, score
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit, polished

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ers_mj.data.prepared import Trace
 from ers_mj.decisions import explained
-from ers_mj.decisions.conclusion import is_more_than_noise
+from ers_mj.decisions.verdict import is_more_than_noise
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.estimation.fit import Along, polished
 from ers_mj.estimation.objective import Fit

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ers_mj.data.prepared import Trace
-from ers_mj.decisions.policy import Policy
+from ers_mj.decisions.thresholds import Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import Along, converged
 from ers_mj.estimation.objective import Fit, residuals_in

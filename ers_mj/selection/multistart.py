@@ -13,9 +13,9 @@ import numpy as np
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.objective import Fit
 from ers_mj.selection.bench import Bench
+from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.comparison import is_clocked, kin_of, priced
 from ers_mj.selection.screening import Begin, screen
-from ers_mj.selection.search import SEARCH, Search
 from ers_mj.servo.model import Model
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 from ers_mj.decisions.explained import score
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.objective import Fit, residuals_in
 from ers_mj.servo.model import OBSERVER_RATE

@@ -13,8 +13,8 @@ from ers_mj.decisions.explained import attainable, score
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.objective import Run, run_of
 from ers_mj.selection.bench import Bench
+from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.impulse_search import impulses
-from ers_mj.selection.search import SEARCH, Search
 from ers_mj.selection.secants import View, first_order, hopeful, of_each_form, promise, view_of
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
@@ -69,7 +69,7 @@ def screen(
     refitted follows from the first place, or from all of them where it is far from the noise, ``bent`` by what is
     missing; where it is ``quiet`` from those whose share of what is left is worth enough of the ``least`` gain that
     matters. (How far C lies above zero is no such sign: it hangs on the noise, which is an estimate.) The sizes are
-    those of ``search.Search``.
+    those of ``budget.Search``.
 
     An impulse is looked for from the first place only, what is dear to simulate is refitted from its most promising
     one, and each effect from as many starts as it declares, or ``tries`` if more.

@@ -15,7 +15,7 @@ from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.jacobian import central_jacobian
 from ers_mj.estimation.objective import Run, residuals
-from ers_mj.selection.search import SEARCH, Search
+from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 SPARSE = 2e-3  # [s] between the samples that tell a wave's share to first order

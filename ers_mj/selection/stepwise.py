@@ -13,19 +13,19 @@ from dataclasses import dataclass, replace
 
 from ers_mj.data.prepared import Trace
 from ers_mj.decisions import acceptance, explained
-from ers_mj.decisions.conclusion import is_more_than_noise
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
+from ers_mj.decisions.verdict import is_more_than_noise
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import hopped
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.objective import Fit, is_rough, tau_of
 from ers_mj.selection.bench import Bench
+from ers_mj.selection.budget import Budget
 from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import Candidate, bends_and_twists, is_dear, stands_alone
 from ers_mj.selection.drop import pruned, reconsidered
 from ers_mj.selection.moves import Grown, Move
 from ers_mj.selection.pair import beside_a_rival, paired, plants_beside
-from ers_mj.selection.search import Budget
 from ers_mj.selection.swap import exchanged, in_its_place, other_way_round, reviewed, widened
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
 from ers_mj.selection.whiteness import is_beyond_rounding, left_by_sensor

@@ -17,7 +17,7 @@ import numpy as np
 
 from ers_mj.data.prepared import BLOCK, Trace
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.estimation.objective import is_rough, residuals_in
 from ers_mj.servo.model import OBSERVER_RATE, Model
 

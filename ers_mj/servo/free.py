@@ -10,7 +10,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Parameter
-from ers_mj.effects.records import Scales
+from ers_mj.effects.quantities import Scales
 
 STATES = ("gain", "offset", "friction_level")
 MOST_TAU = 2.0  # of a datasheet's electrical time constant, up to which the baseline's is an ordinary one

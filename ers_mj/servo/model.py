@@ -11,7 +11,7 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 from ers_mj.effects import BY_NAME
-from ers_mj.effects.records import Scales
+from ers_mj.effects.quantities import Scales
 from ers_mj.plants.effort import Effort
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.free import MOST_TAU as MOST_TAU

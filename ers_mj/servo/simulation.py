@@ -14,7 +14,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME, Effect, Parameter
 from ers_mj.effects.input_delay import InputDelay
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.effects.sensor_quantisation import SensorQuantisation
 from ers_mj.errors import InputError
 from ers_mj.plants.play import stiff_play

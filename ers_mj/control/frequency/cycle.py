@@ -26,7 +26,7 @@ from ers_mj.control.closed_loop import Sampled, Sensor, close
 from ers_mj.control.controllers import Controller
 from ers_mj.control.frequency.describing import contact, controller_response, coulomb, highest_hz, preload, saturation
 from ers_mj.control.references import Reference
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 
 
 @dataclass(frozen=True)

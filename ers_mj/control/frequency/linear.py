@@ -20,7 +20,7 @@ from scipy.linalg import expm
 
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Effect
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.mjcf import unlogged

@@ -15,7 +15,7 @@ import numpy as np
 from ers_mj.control.controllers import Controller
 from ers_mj.control.frequency.describing import controller_response, coulomb, highest_hz, plant_response, preload
 from ers_mj.control.frequency.linear import LinearPlant
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 
 LOWEST_HZ = 0.5  # of all that is asked and drawn
 

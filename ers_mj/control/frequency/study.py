@@ -22,7 +22,7 @@ from ers_mj.control.trial import Conditions, make_controller, plant_under, refus
 from ers_mj.data.frequency_response import Gap, Response, frequency_response, gap
 from ers_mj.data.prepared import smooth_speed
 from ers_mj.data.recording import Recording
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.servo.datasheet import Datasheet
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from ers_mj.decisions import conclusion
-from ers_mj.decisions.conclusion import Shown
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions import verdict as rules
+from ers_mj.decisions.thresholds import POLICY
+from ers_mj.decisions.verdict import Shown
 
 
 def left(output=0.0, current=0.0):
@@ -53,8 +53,8 @@ NONE = Findings((), explained=0.0, heldout_cost=(1.0, 1.0), left_before=left())
 )
 def test_the_verdict_on_a_servo_without_names(change, said):
     case = replace(NONE, **change)
-    assert conclusion.verdict(case) == said
-    assert conclusion.is_more_left(case) is (said == "unexplained")
+    assert rules.verdict(case) == said
+    assert rules.is_more_left(case) is (said == "unexplained")
 
 
 @pytest.mark.parametrize(
@@ -70,8 +70,8 @@ def test_the_verdict_on_a_servo_without_names(change, said):
 )
 def test_the_verdict_on_a_servo_with_a_name(change, said, more):
     case = replace(RIGHT, **change)
-    assert conclusion.verdict(case) == said and conclusion.is_more_left(case) is more
-    assert tuple(conclusion.told_effects(case)) == (RIGHT.names if said == "missing_physics" else ())
+    assert rules.verdict(case) == said and rules.is_more_left(case) is more
+    assert tuple(rules.told_effects(case)) == (RIGHT.names if said == "missing_physics" else ())
 
 
 @pytest.mark.parametrize(
@@ -79,8 +79,8 @@ def test_the_verdict_on_a_servo_with_a_name(change, said, more):
 )
 def test_what_nearly_all_of_a_large_misfit_asks_for_is_named_though_its_free_runs_fork(before, after, named):
     case = replace(RIGHT, explained=0.1, heldout_cost=(before, after))
-    assert conclusion.goes_in_blocks(case) is named
-    assert bool(conclusion.told_effects(case)) is named
+    assert rules.goes_in_blocks(case) is named
+    assert bool(rules.told_effects(case)) is named
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,8 @@ def test_what_nearly_all_of_a_large_misfit_asks_for_is_named_though_its_free_run
 )
 def test_what_memory_loses_is_named_though_one_free_run_forks(explained, before, after, named):
     case = replace(RIGHT, explained=explained, left_before=left(before), left=left(after), heldout_cost=(20.0, 10.0))
-    assert conclusion.goes_from_memory(case) is named
-    assert bool(conclusion.told_effects(case)) is named
+    assert rules.goes_from_memory(case) is named
+    assert bool(rules.told_effects(case)) is named
 
 
 @pytest.mark.parametrize(
@@ -99,17 +99,17 @@ def test_what_memory_loses_is_named_though_one_free_run_forks(explained, before,
 )
 def test_what_memory_and_held_out_error_both_miss_is_left(explained, output, held, part):
     case = replace(RIGHT, explained=explained, left=left(output), free_held=held)
-    assert conclusion.is_a_part(case) is part
-    assert not conclusion.is_a_part(replace(case, names=()))
+    assert rules.is_a_part(case) is part
+    assert not rules.is_a_part(replace(case, names=()))
 
 
 def test_the_mimic_of_an_unknown_effect_takes_a_part_only():
     """A mimic in the output is seldom one in the current, which no form of the right law leaves amiss."""
-    assert not conclusion.is_more_than_noise(left(0.08), None) and conclusion.is_more_than_noise(left(0.09), None)
-    assert not conclusion.is_more_than_noise(left(0.14), left(0.5))
-    assert conclusion.is_more_than_noise(left(0.16), left(0.5))
-    assert conclusion.is_more_than_noise(left(0.0, 0.09), left(0.5, 0.5))
-    assert conclusion.is_more_than_noise(left(0.03), None, replace(POLICY, mismatch=0.02))
+    assert not rules.is_more_than_noise(left(0.08), None) and rules.is_more_than_noise(left(0.09), None)
+    assert not rules.is_more_than_noise(left(0.14), left(0.5))
+    assert rules.is_more_than_noise(left(0.16), left(0.5))
+    assert rules.is_more_than_noise(left(0.0, 0.09), left(0.5, 0.5))
+    assert rules.is_more_than_noise(left(0.03), None, replace(POLICY, mismatch=0.02))
 
 
 def shown(before, after, noise=1.0, misfits=(2.0, 1.0)):
@@ -122,21 +122,21 @@ def shown(before, after, noise=1.0, misfits=(2.0, 1.0)):
 )
 def test_a_free_run_that_is_lost_with_and_without_the_effects_tells_nothing(lost, output, explained):
     ends = [shown(10.0, np.sqrt(1.99)), shown(*lost)]
-    assert conclusion.explained_each(ends, left(0.5), left(output)) == pytest.approx(explained)
+    assert rules.explained_each(ends, left(0.5), left(output)) == pytest.approx(explained)
 
 
 def test_where_all_free_runs_fork_the_observer_tells_what_is_explained():
     forked = [shown(11.0, 9.0, misfits=(5.0, 1.5))]
-    assert conclusion.explained_each(forked, left(0.5), left()) == pytest.approx(0.875)
+    assert rules.explained_each(forked, left(0.5), left()) == pytest.approx(0.875)
 
 
 @pytest.mark.parametrize("before, explained", [(0.2, 0.75), (0.05, 0.0)])
 def test_where_no_error_is_above_the_noise_memory_tells_what_is_explained(before, explained):
     with_it, without = (left(float(np.log1p(power))) for power in (before / 4, before))
-    assert conclusion.explained_each([shown(0.99, 0.9)], without, with_it) == pytest.approx(explained)
+    assert rules.explained_each([shown(0.99, 0.9)], without, with_it) == pytest.approx(explained)
 
 
 def test_a_share_lies_between_nothing_and_all():
-    assert conclusion.share(10.0, 2.0, 1.0) == pytest.approx(8.0 / 9.0)
-    assert conclusion.share(10.0, 20.0, 1.0) == 0.0 == conclusion.share(0.5, 0.1, 1.0)
-    assert conclusion.share(10.0, 0.5, 1.0) == 1.0
+    assert rules.share(10.0, 2.0, 1.0) == pytest.approx(8.0 / 9.0)
+    assert rules.share(10.0, 20.0, 1.0) == 0.0 == rules.share(0.5, 0.1, 1.0)
+    assert rules.share(10.0, 0.5, 1.0) == 1.0

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 
 Left = Mapping[str, float]  # ln(1 + power) beyond the noise, by sensor (selection/whiteness.py)
 
@@ -28,7 +28,7 @@ class Shown:
 
 
 class Findings(Protocol):
-    """What the conclusion reads.
+    """What the verdict reads.
 
     ``names`` are the effects of the model, ``sensors`` those that show in the data itself, ``suspects`` the laws
     without a name that act here; ``explained`` is the share of the squared held-out error that goes with the names,

@@ -13,9 +13,9 @@ import numpy as np
 
 from ers_mj.data.prepared import Blocks
 from ers_mj.data.recording import Recording
-from ers_mj.decisions import conclusion
+from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.explained import cost, is_consistent
-from ers_mj.decisions.policy import POLICY, Policy
+from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.mujoco_check import Rig, run_in_mujoco
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
@@ -121,7 +121,7 @@ class Case:
             for models in (c.base_models, c.models)
         )
 
-    # -- what decisions/conclusion.py reads ----------------------------------------------------------------------------
+    # -- what decisions/verdict.py reads ----------------------------------------------------------------------------
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -138,16 +138,16 @@ class Case:
         c = self.confirmed
         noise = math.sqrt(float(np.mean([fold.held_out.sure_noise**2 for fold in c.parts])))
         ends = [(pooled(c.before), pooled(c.after)), *([self._again] if self.holdout else [])]
-        shares = [conclusion.share(before.sure**2, after.sure**2, noise**2) for before, after in ends]
-        each = conclusion.explained_each(self._shown, self.left_before, self.left, self.policy)
+        shares = [rules.share(before.sure**2, after.sure**2, noise**2) for before, after in ends]
+        each = rules.explained_each(self._shown, self.left_before, self.left, self.policy)
         return max(*shares, each)
 
     @property
-    def _shown(self) -> list[conclusion.Shown]:
+    def _shown(self) -> list[rules.Shown]:
         def misfit(s: Score) -> float:
             return float(np.mean(np.maximum(s.misfit, 1.0)))
 
-        return [conclusion.Shown(b.sure, a.sure, noise, misfit(b), misfit(a)) for b, a, noise in self.confirmed.shown]
+        return [rules.Shown(b.sure, a.sure, noise, misfit(b), misfit(a)) for b, a, noise in self.confirmed.shown]
 
     @property
     def heldout_cost(self) -> tuple[float, float]:
@@ -187,22 +187,22 @@ class Case:
     @cached_property
     def told_effects(self) -> tuple[str, ...]:
         """The effects that are named."""
-        return tuple(conclusion.told_effects(self, self.policy))
+        return tuple(rules.told_effects(self, self.policy))
 
     @cached_property
     def verdict(self) -> str:
         """One of diagnosis.json's verdicts."""
-        return conclusion.verdict(self, self.policy)
+        return rules.verdict(self, self.policy)
 
     @cached_property
     def more_is_missing(self) -> bool:
         """Whether the model leaves more than noise."""
-        return conclusion.is_more_missing(self, self.policy)
+        return rules.is_more_missing(self, self.policy)
 
     @cached_property
     def more_is_left(self) -> bool:
         """Whether a mismatch stays that nothing named accounts for."""
-        return conclusion.is_more_left(self, self.policy)
+        return rules.is_more_left(self, self.policy)
 
     def found(self, name: str) -> tuple[list[Candidate], dict[str, float]]:
         """The effects that were compared when this one was found, itself first, and their probabilities."""

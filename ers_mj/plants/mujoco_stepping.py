@@ -12,7 +12,7 @@ import mujoco.batch
 import numpy as np
 
 from ers_mj.effects.base import LEAST_IRON
-from ers_mj.effects.records import Coefficients
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants.mjcf import unlogged
 
 MOTOR_GROUP = 1  # actuator group that an open circuit disables

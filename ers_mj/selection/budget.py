@@ -1,5 +1,5 @@
 """How far a selection searches: starts, steps, laps and simulated time. None of it decides what is named (see
-decisions/policy.py); it decides what there is to choose from, and how long that takes.
+decisions/thresholds.py); it decides what there is to choose from, and how long that takes.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""The compiled integrator of Eq. (1)/(5): through a recording sample by sample, smooth flow between events, every
-switch of a Sgn located exactly.
+"""The compiled, event-exact integrator of Eq. (1)/(5): through a recording sample by sample, smooth flow between
+events, every switch of a Sgn located exactly.
 
 Where nothing happens, a precomputed map takes a whole segment of a sample (see maps); where its end says that something
 may have, the segment is gone through by events (see ``advance``).

@@ -1,7 +1,7 @@
 """Every threshold that decides: accept or reject, tie, flag, verdict.
 
 ``Policy`` is handed in, so that a replay (analysis/golden.py) can ask what another value would have decided. How far a
-search goes (steps, starts, laps) decides nothing by itself and stands in ``selection.search``.
+search goes (steps, starts, laps) decides nothing by itself and stands in ``selection.budget``.
 C is the block cost of estimation/objective.py: an effect's gain is what it takes off C after everything is refitted.
 """
 
@@ -298,7 +298,7 @@ class Policy:
     )
     peak_tail: float = _threshold(1.2, "exponent", "the same", "the same")
 
-    # -- what is left, and the verdict (conclusion.py) ----------------------------------------------------------------
+    # -- what is left, and the verdict (verdict.py) -------------------------------------------------------------------
     mismatch: float = _threshold(
         0.085,
         "ln(1 + power) in the noise's",
