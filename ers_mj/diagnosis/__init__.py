@@ -1,1 +1,5 @@
-"""The main job: recordings in, the missing physics out."""
+"""The main job: recordings in, the missing physics out.
+
+pipeline (the job) -> case (what is known in the end; the verdict's rules: decisions/verdict.py) -> document
+document: sentences, record_state, views, evidence; where: localisation, mismatch_spectrum; mujoco_check: the twin
+"""
