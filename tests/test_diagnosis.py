@@ -12,7 +12,8 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
 
-T = np.arange(0.0, 4.0, 2e-3)
+T = np.arange(0.0, 3.0, 2e-3)
+INPUT = ("multisine", "steps")
 TRUTH = {
     "a_1": 25.0,
     "a_2": 50.0,
@@ -26,10 +27,10 @@ TRUTH = {
 NOISE = 1.5e-4
 
 
-def recordings(effects=(), sensor=lambda y: y, names=("multisine", "steps", "chirp")):
-    """Three recordings of a servo that is not quite Table 1's."""
+def recordings(effects=(), sensor=lambda y: y):
+    """Recordings of a servo that is not quite Table 1's."""
     out = []
-    for k, name in enumerate(names):
+    for k, name in enumerate(INPUT):
         u = np.round(INPUTS[name](T), 4)
         y = ReducedModel(lumped(TRUTH), effects).simulate(T, u).measured
         y = sensor(y + NOISE * np.random.default_rng(k).standard_normal(T.size))
@@ -95,7 +96,7 @@ def test_a_true_datasheet_is_consistent():
     sheet = Datasheet(lumped={k: TRUTH[k] for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")})
     truth = {**TRUTH, "tau_e": 0.0}
     out = []
-    for k, name in enumerate(("multisine", "steps")):
+    for k, name in enumerate(INPUT):
         u = INPUTS[name](T)
         y = ReducedModel(lumped(truth)).simulate(T, u).theta + NOISE * np.random.default_rng(k).standard_normal(T.size)
         out.append(from_arrays(T, u, y, name=f"{name}.csv"))
@@ -109,21 +110,15 @@ def test_a_coarse_sensor_is_told_from_the_data():
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
 
 
-@pytest.mark.parametrize("step", [0.0, np.radians(0.6)])
-def test_what_the_library_has_no_name_for_is_unexplained(step):
-    """A torque that hops between two values at random times is no effect of the library; a coarse sensor is told beside
-    it.
-    """
-    rng = np.random.default_rng(4)
-    out = []
+def test_what_the_library_has_no_name_for_is_unexplained():
+    """A torque that hops between two values at random times is no effect of the library."""
+    rng, out = np.random.default_rng(4), []
     for r in recordings():
-        hops = np.repeat(rng.choice([-25.0, 25.0], 40), T.size // 40)
-        plant = ReducedModel(lumped(TRUTH))
-        y = plant.theta(T, r.u, (TRUTH["theta_0"], 0.0), load=hops) + NOISE * rng.standard_normal(T.size)
-        out.append(from_arrays(T, r.u, np.round(y / step) * step if step else y, name=r.name))
+        hops = np.repeat(rng.choice([-25.0, 25.0], 30), T.size // 30)
+        y = ReducedModel(lumped(TRUTH)).theta(T, r.u, (TRUTH["theta_0"], 0.0), load=hops)
+        out.append(from_arrays(T, r.u, y + NOISE * rng.standard_normal(T.size), name=r.name))
     document = diagnose(out, read_datasheet("table1")).document
     assert document["remainder"]["significant"]
-    assert ("sensor_quantisation" in [m["effect"] for m in document["missing"]]) is bool(step)
 
 
 def test_a_mimic_is_not_named_where_a_law_without_a_name_explains_more(dead_zone):
@@ -142,29 +137,29 @@ def test_a_mimic_is_not_named_where_a_law_without_a_name_explains_more(dead_zone
 
 
 def test_without_a_datasheet_everything_is_identified():
-    document = diagnose(recordings(names=("multisine", "steps")), None).document
+    document = diagnose(recordings(), None).document
     assert document["verdict"] != "consistent"
     assert document["parameters"]["b"]["value"] == pytest.approx(TRUTH["b"], rel=0.1)
 
 
-def acting(*per_record, names=("multisine", "steps", "chirp")):
-    """Three recordings in each of which other effects act."""
-    return [recordings(effects, names=names)[k] for k, effects in enumerate(per_record)]
+def acting(*per_record):
+    """Recordings in each of which other effects act."""
+    return [recordings(effects)[k] for k, effects in enumerate(per_record)]
 
 
 def test_a_gust_has_a_phase_of_its_own_in_every_recording():
-    gusts = [[("periodic_gust", np.array([12.0, 2.3, phase, *[np.inf] * 4]))] for phase in (0.4, 2.0, -1.3)]
+    gusts = [[("periodic_gust", np.array([12.0, 2.3, phase, *[np.inf] * 4]))] for phase in (0.4, 2.0)]
     document = diagnose(acting(*gusts), read_datasheet("table1")).document
     first = document["missing"][0]
     assert first["effect"] == "periodic_gust" and first["evidence"]["heldout_rmse_with_rad"] is None
     assert first["parameters"]["f"]["value"] == pytest.approx(2.3, rel=0.01)
     amplitude, phases = first["parameters"]["A"]["value"], np.array(first["parameters"]["phase"]["per_recording"])
-    assert np.cos(phases - [0.4, 2.0, -1.3]) * np.sign(amplitude) == pytest.approx(1.0, abs=0.05)
+    assert np.cos(phases - [0.4, 2.0]) * np.sign(amplitude) == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_knock_in_one_recording_is_found_there():
     knock = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0, np.inf]))]
-    document = diagnose(acting([], knock, []), read_datasheet("table1")).document
+    document = diagnose(acting([], knock), read_datasheet("table1")).document
     first = document["missing"][0]
     assert first["effect"] == "load_disturbance" and first["parameters"]["record"]["value"] == 1
     assert first["parameters"]["t_0"]["value"] == pytest.approx(1.2, abs=0.02)
@@ -175,7 +170,7 @@ def test_a_knock_in_one_recording_is_found_there():
 def test_dropouts_are_found_in_the_data_and_left_out(lose):
     def sensor(y):
         y, random = y.copy(), np.random.default_rng(int(1e6 * y[-1]) % 1000)
-        for k in random.choice(np.arange(100, y.size - 100), 12, replace=False):
+        for k in random.choice(np.arange(50, y.size - 50), 12, replace=False):
             y[k : k + (1 if lose == "spikes" else 20)] = y[k] + 0.03 if lose == "spikes" else y[k - 1]
         return y
 
