@@ -29,7 +29,7 @@ class LeastSquares:
     def normal(self, point, slopes):
         return slopes.T @ slopes, slopes.T @ point.e
 
-    def step(self, curvature, slope, damping):
+    def step(self, point, curvature, slope, damping):
         return -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), slope)
 
     def descent(self, z, rule=Damping()):
