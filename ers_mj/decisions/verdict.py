@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -41,7 +41,7 @@ class Findings(Protocol):
     @property
     def names(self) -> Sequence[str]: ...
     @property
-    def sensors(self) -> Sequence[str]: ...
+    def sensors(self) -> Collection[str]: ...
     @property
     def suspects(self) -> Sequence[object]: ...
     @property

@@ -116,10 +116,11 @@ class Case:
     def _again(self) -> tuple[Score, Score]:
         """The held-out scores before and after, recalibrated."""
         c = self.confirmed
-        return tuple(
+        before, after = (
             pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(models, c.parts)])
             for models in (c.base_models, c.models)
         )
+        return before, after
 
     # -- what decisions/verdict.py reads ----------------------------------------------------------------------------
 
@@ -220,6 +221,7 @@ class Case:
         """
         if self.suspects:
             return self._rivals_of_a_suspect()
+        best: tuple[tuple[str, Fit], list[tuple[str, Fit, float]]]
         best = (" and ".join(self.model.names) or "baseline", self.selection.chosen), []
         for name in self.model.names or self._last_leader():
             ranked, weights = self.found(name)

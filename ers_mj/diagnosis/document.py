@@ -175,7 +175,7 @@ def _per_recording(case: Case, name: str, parameter: Parameter, factor: float) -
 def _symptom(case: Case, name: str, values: np.ndarray) -> dict:
     """A sensor effect that was found in the data itself."""
     effect = BY_NAME[name]
-    entries = {
+    entries: dict[str, dict] = {
         p.name: {
             "value": float(v),
             "unit": unit_of(p.kind, case.output_unit, case.input_unit),

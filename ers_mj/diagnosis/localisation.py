@@ -61,9 +61,14 @@ class Place:
     region: tuple[float, float] | None
     unit: str | None
     label: str | None
-    share_of_error: float
-    share_of_time: float
+    share_of_error: float | None
+    share_of_time: float | None
     sentence: str
+
+    @property
+    def excess(self) -> float:
+        """How much more of the error lives there than its share of time."""
+        return (self.share_of_error or 0.0) - (self.share_of_time or 0.0)
 
 
 def gather(before: Model, after: Model, traces: Sequence[Trace]) -> Samples:
@@ -117,7 +122,7 @@ def places(
     time they hold.
     """
     found = [*_by_value(samples, output_unit, input_unit), *_by_direction(samples), *_by_time(samples, traces)]
-    found = [p for p in found if p.share_of_error - p.share_of_time >= TELLING.least_excess]
+    found = [p for p in found if p.excess >= TELLING.least_excess]
     if spectrum is not None and spectrum.region is not None:
         found.append(
             Place(
@@ -130,7 +135,7 @@ def places(
                 spectrum.sentence,
             )
         )
-    found.sort(key=lambda p: p.share_of_time - p.share_of_error)
+    found.sort(key=lambda p: -p.excess)
     return [*_by_subsystem(rounds, base_cost, named), *found]
 
 
@@ -213,7 +218,7 @@ def _by_time(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
                 f"{whole * time:.0%} of the time",
             )
         )
-    return sorted(out, key=lambda p: p.share_of_time - p.share_of_error)[:2]
+    return sorted(out, key=lambda p: -p.excess)[:2]
 
 
 def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named: Sequence[str]) -> list[Place]:
@@ -230,13 +235,13 @@ def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named
     ranked = sorted((s for s in best if s not in lead and best[s][0] > TELLING.least_share), key=lambda s: -best[s][0])
     out = []
     for subsystem in (*lead, *ranked):
-        share, name = best.get(subsystem, (None, None))
-        words = (
-            f"{share:.0%} of the misfit can be explained in the {subsystem} ({name.replace('_', ' ')})"
-            if share is not None
-            else f"the data itself shows it: the {subsystem}"
-        )
-        out.append(Place("subsystem", None, None, subsystem, share, None if share is None else 1.0, words))
+        if subsystem in best:
+            share, name = best[subsystem]
+            words = f"{share:.0%} of the misfit can be explained in the {subsystem} ({name.replace('_', ' ')})"
+            out.append(Place("subsystem", None, None, subsystem, share, 1.0, words))
+        else:
+            words = f"the data itself shows it: the {subsystem}"
+            out.append(Place("subsystem", None, None, subsystem, None, None, words))
     return out
 
 
@@ -251,7 +256,7 @@ def shaded(trace: Trace, record: int, samples: Samples) -> tuple[tuple[float, fl
     error = np.bincount(np.clip(np.digitize(samples.t[mask], edges) - 1, 0, 79), samples.before[mask], 80)
     order = np.argsort(-error)
     keep = np.sort(order[: max(1, int(np.searchsorted(np.cumsum(error[order]), 0.66 * error.sum())) + 1)])
-    spans = []
+    spans: list[list[float]] = []
     for k in keep:
         if spans and edges[k] - spans[-1][1] < 1e-9:
             spans[-1][1] = edges[k + 1]
@@ -263,7 +268,8 @@ def shaded(trace: Trace, record: int, samples: Samples) -> tuple[tuple[float, fl
 
 def residual_map(samples: Samples) -> ResidualMap:
     """Rms local error over angle and speed, before and after."""
-    edges = [np.linspace(*np.quantile(v, [0.001, 0.999]), 25) for v in (samples.angle, samples.speed)]
+    ends = (np.quantile(v, [0.001, 0.999]) for v in (samples.angle, samples.speed))
+    edges = [np.linspace(low, high, 25) for low, high in ends]
     count, *_ = np.histogram2d(samples.angle, samples.speed, edges)
     with np.errstate(invalid="ignore", divide="ignore"):
         rms = [

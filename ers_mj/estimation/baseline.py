@@ -149,9 +149,7 @@ def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:
     return dict(_simplest(finished).model.values)
 
 
-def _refined(
-    model: Model, traces: Sequence[Trace], jobs: int
-) -> tuple[Fit, Sequence[Trace], list[Mapping[str, float]]]:
+def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace], list[dict[str, float]]]:
     """Fit, with the initial states fitted before and after; the traces with these, and the values of another valley if
     it was met.
 

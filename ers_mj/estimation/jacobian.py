@@ -35,7 +35,8 @@ def jacobian_of(
     z, step = model.vector(layout), step_of(model)
     jacobian = np.empty((z.size, run.left.size)).T  # a column's numbers side by side
     tangible = by_tangents and has_tangents(model, traces)
-    along, apart = [], []
+    along: list[int] = []
+    apart: list[int] = []
     for k, f in enumerate(layout):
         if known and f.key in known:
             jacobian[:, k] = known[f.key]

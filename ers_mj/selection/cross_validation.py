@@ -121,7 +121,7 @@ class Fold:
     @property
     def known(self) -> list[int]:
         """The places of the training ones among all recordings."""
-        return [k for k in range(len(self.training) + (not self.halved)) if self.halved or k != self.record]
+        return [k for k in range(len(self.training or ()) + (not self.halved)) if self.halved or k != self.record]
 
 
 def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold], str]:
@@ -169,7 +169,7 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[M
 
     def along(begun: Model, fold: Fold, known: Columns) -> Model:
         slopes = Along(known=known, renewals=0)
-        return fit(begun, fold.training, tau=tau, steps=REFIT_STEPS, along=slopes, tolerance=REFIT_END).model
+        return fit(begun, fold.training or (), tau=tau, steps=REFIT_STEPS, along=slopes, tolerance=REFIT_END).model
 
     def one(fold: Fold) -> Model:
         if fold.training is None:

@@ -111,7 +111,8 @@ class Surroundings:
     """
 
     def __init__(self, run: Run, traces: Sequence[Trace], tau: float, nearing: Nearing = NEARING):
-        self.run, self.traces, self.tau, self.nearing, self.known = run, traces, tau, nearing, {}
+        self.run, self.traces, self.tau, self.nearing = run, traces, tau, nearing
+        self.known: dict[tuple[int, int, int], tuple] = {}
         self.whole = not run.model.plant().is_told_by_motion
 
     def misfit(self, trace: Trace, e: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 from ers_mj.decisions import explained
 from ers_mj.effects import BY_NAME
@@ -35,7 +36,7 @@ class Refits:
         """C and the price of the parameters."""
         return self.total(found) + self.bench.policy.parameter_price * found.size
 
-    def most_won(self, ends: Mapping[object, Fit]) -> float:
+    def most_won(self, ends: Mapping[Any, Fit]) -> float:
         return max(map(self.won, ends.values()), default=0.0)
 
     def explains_all(self, total: float) -> bool:
@@ -83,7 +84,7 @@ class Refits:
         """A fit under an observer of another rate [1/s]; nothing gives it up."""
         return fit(begin.model, self.bench.traces, rate=rate, tau=self.bench.tau, steps=steps, along=along)
 
-    def contending(self, labels: Iterable, ends: Mapping[object, Fit]) -> list:
+    def contending(self, labels: Iterable, ends: Mapping[Any, Fit]) -> list:
         """Those labels that may still be the explanation: all while none explains everything, then the best one's
         rivals.
         """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,7 +42,7 @@ class Screened:
     most: int
     search: Search = SEARCH
 
-    def promising(self, failed: Sequence[str] = ()) -> list[str]:
+    def promising(self, failed: Collection[str] = ()) -> list[str]:
         """The effects that are refitted, the most promising first.
 
         Neither an impulse's promise, what it gains as it is, is a measure for the others' secants, nor that of an

@@ -125,7 +125,7 @@ def _in_the_place_of(bench: Bench, current: Fit, ranked: Sequence[Candidate]) ->
 def _lent(model: Model, name: str, owner: Model) -> Model:
     """A model with an effect of another's, as large as it is there."""
     model = model.with_effect(name, dict(owner.effects)[name])
-    return replace(model, local={**model.local, name: owner.local[name]}) if BY_NAME[name].local else model
+    return replace(model, local={**(model.local or {}), name: owner.local[name]}) if BY_NAME[name].local else model
 
 
 def _beside(candidate: Candidate, current: Model, leader: str) -> Model:

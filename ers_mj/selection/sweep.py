@@ -70,9 +70,9 @@ def swept(
             found, _ = hopped(found, bench.traces, bench.tau, 1, hops=Hops(quiet=-math.inf))
         return bench.judged(candidate.name, found, base)
 
-    ended = bench.each(carried_on, best)
-    ended = bench.each(lambda c: carried_on(c) if c.gain >= bench.policy.least_gain else c, ended)
-    return [c for c in ended if shows(c) and _at_bound(c) <= bench.policy.at_bound]
+    swept_on = bench.each(carried_on, best)
+    swept_on = bench.each(lambda c: carried_on(c) if c.gain >= bench.policy.least_gain else c, swept_on)
+    return [c for c in swept_on if shows(c) and _at_bound(c) <= bench.policy.at_bound]
 
 
 def _nearest(ended: Sequence[Fit], most: int) -> list[Fit]:

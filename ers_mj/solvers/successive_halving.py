@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 S = TypeVar("S")
 T = TypeVar("T")
-Each = Callable[[Callable[[T], T], Iterable[T]], list[T]]  # a function of every item, side by side
 
 
 @dataclass(frozen=True)
 class Stage(Generic[T]):
     """A few steps for each that is left, and those of them that go on, in the order in which they do."""
 
-    advance: Callable[[T], T]
+    advance: Callable[[Any], T]
     keep: Callable[[Sequence[T]], Sequence[T]] = lambda ended: ended
 
 
-def halved(begun: Iterable[T], stages: Sequence[Stage[T]], each: Each[T]) -> list[T]:
+def halved(
+    begun: Iterable[Any], stages: Sequence[Stage[T]], each: Callable[[Callable[[Any], T], Iterable[Any]], list[T]]
+) -> list[T]:
     """What is left of all that was begun after the last stage."""
-    left: Sequence[T] = list(begun)
+    left: Sequence[Any] = list(begun)
     for stage in stages:
         left = stage.keep(each(stage.advance, left))
     return list(left)
