@@ -11,6 +11,7 @@ from servo import NAMES, NOISE, TRUTH, started, trace
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
 from ers_mj.data.sensor_faults import converter_step
+from ers_mj.decisions.conclusion import is_more_than_noise
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere, remembered
 
@@ -55,6 +56,19 @@ def test_a_converter_leaves_no_mismatch(times, plain):
 def test_a_mismatch_below_the_noise_is_seen():
     start = started([bent(name, 1.0, k) for k, name in enumerate(NAMES)])
     assert left_by_sensor(start.fit.model, start.traces)["output"] > 0.1
+
+
+def test_what_the_library_has_no_name_for_leaves_more_than_noise(plain):
+    """A torque that hops between two values at random times is no effect of the library."""
+    rng, traces = np.random.default_rng(4), []
+    for one in plain.traces:
+        hops = np.repeat(rng.choice([-25.0, 25.0], 30), one.t.size // 30)
+        y = ReducedModel(lumped(TRUTH)).theta(one.t, one.u, (TRUTH["theta_0"], 0.0), load=hops)
+        y += NOISE * rng.standard_normal(one.t.size)
+        traces.append(trace_of(from_arrays(one.t, one.u, y, name=one.name), None))
+    start = started(traces)
+    assert is_more_than_noise(left_by_sensor(start.fit.model, start.traces), None)
+    assert not is_more_than_noise(left_by_sensor(plain.fit.model, plain.traces), None)
 
 
 def test_what_one_recording_alone_shows_is_not_left_elsewhere(plain):
