@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -33,8 +34,9 @@ class Target:
     basis: np.ndarray
     residual: np.ndarray
 
-    @property
+    @cached_property
     def power(self) -> float:
+        """The squared size of the residual."""
         return float(self.residual @ self.residual)
 
 
