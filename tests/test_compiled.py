@@ -148,14 +148,16 @@ def test_a_law_that_fails_says_so(jit):
 
 
 def test_an_edited_law_is_run_and_leaves_the_kernels_as_they_are():
-    answers = {}
+    answers, said = {}, []
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     for law in ("-p[0] * w", "-2.0 * p[0] * w", "-p[0] * w"):
         program = LAW.format(law=law, end=0.1) + "print(model.simulate(t, np.ones(20)).theta[-1].hex())"
         done = subprocess.run(
             [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
         )
-        assert answers.setdefault(law, done.stdout) == done.stdout and "compiling" not in done.stderr
+        assert answers.setdefault(law, done.stdout) == done.stdout
+        said.append(done.stderr)
+    assert not any("compiling" in text for text in said[1:])  # the first one may find an empty cache
     assert len(set(answers.values())) == 2
 
 
