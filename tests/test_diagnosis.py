@@ -8,7 +8,7 @@ import pytest
 
 from ers_mj.commands.output import plain
 from ers_mj.data.recording import from_arrays
-from ers_mj.decisions.policy import POLICY
+from ers_mj.decisions.thresholds import POLICY
 from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped

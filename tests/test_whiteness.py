@@ -11,7 +11,7 @@ from servo import NAMES, NOISE, TRUTH, started, trace
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.decisions.conclusion import is_more_than_noise
+from ers_mj.decisions.verdict import is_more_than_noise
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere, remembered
 
