@@ -79,7 +79,7 @@ def diagnose(
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
-    named, suspects = without_confounders(selection, start.traces, jobs)
+    named, suspects = without_confounders(selection, start.traces, jobs, policy)
     if named is not selection:
         selection, judged = confirmed(start, named, held, jobs, policy)
     progress("running the MuJoCo plant", 0.84)

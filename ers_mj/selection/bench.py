@@ -15,7 +15,7 @@ from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.estimation.fit import Along, fit
 from ers_mj.estimation.objective import Fit
 from ers_mj.selection.budget import SEARCH, Budget, Search
-from ers_mj.selection.comparison import Candidate, judged
+from ers_mj.selection.comparison import Candidate, judged, priced
 from ers_mj.servo.model import Model
 from ers_mj.solvers.successive_halving import carried_on
 
@@ -56,7 +56,11 @@ class Bench:
 
     def judged(self, name: str, found: Fit, base: Fit) -> Candidate:
         """What a fit has won over the model that it extends."""
-        return judged(name, found, base, self.tau)
+        return judged(name, found, base, self.tau, self.policy)
+
+    def priced(self, found: Fit) -> float:
+        """A fit's cost and the price of its parameters."""
+        return priced(found, self.policy)
 
     def each(self, function: Callable[[A], B], items: Iterable[A]) -> list[B]:
         """The function of each item, side by side."""

@@ -39,6 +39,7 @@ class Candidate:
     lost: float
     best: float
     beside: Fit | None = None
+    policy: Policy = POLICY
 
     @cached_property
     def offer(self) -> Offer:
@@ -60,7 +61,7 @@ class Candidate:
     @property
     def worth(self) -> float:
         """Gain less the price of the parameters."""
-        return self.offer.worth()
+        return self.offer.worth(self.policy)
 
 
 def kin_of(name: str) -> frozenset[str]:
@@ -77,16 +78,17 @@ def paired_z(better: np.ndarray, worse: np.ndarray, tau: float) -> float:
     return float(np.mean(d)) * math.sqrt(d.size) / spread if spread > 0 else 0.0
 
 
-def judged(name: str, found: Fit, base: Fit, tau: float) -> Candidate:
+def judged(name: str, found: Fit, base: Fit, tau: float, policy: Policy = POLICY) -> Candidate:
     """What a fit has won over the model that it extends."""
     won = score(base.misfit, tau) - score(found.misfit, tau)
     lost = -float(np.sum(np.minimum(won, 0.0)))
-    return Candidate(name, found, float(np.sum(won)), paired_z(found.misfit, base.misfit, tau), lost, float(won.max()))
+    gain, best = float(np.sum(won)), float(won.max())
+    return Candidate(name, found, gain, paired_z(found.misfit, base.misfit, tau), lost, best, policy=policy)
 
 
-def priced(found: Fit) -> float:
+def priced(found: Fit, policy: Policy = POLICY) -> float:
     """The cost and the price of the parameters."""
-    return found.cost + POLICY.parameter_price * found.size
+    return found.cost + policy.parameter_price * found.size
 
 
 def shows(candidate: Candidate) -> bool:
@@ -111,7 +113,7 @@ def likeliest_first(ranked: Sequence[Candidate], policy: Policy = POLICY) -> lis
     by_name = {c.name: c for c in ranked}
 
     def chances(rivals: Sequence[Offer]) -> Mapping[str, float]:
-        return probabilities({offer.name: by_name[offer.name].fit for offer in rivals})
+        return probabilities({offer.name: by_name[offer.name].fit for offer in rivals}, policy)
 
     offers = ordering.likeliest_first(
         [c.offer for c in ranked],
@@ -130,7 +132,7 @@ def likeliest(fits: Mapping[str, Fit], policy: Policy = POLICY) -> str:
         for name, found in fits.items()
     ]
     curves = {name: BY_NAME[name].curves for name in fits if name in BY_NAME}
-    return ordering.likeliest(offers, curves, probabilities(fits), policy)
+    return ordering.likeliest(offers, curves, probabilities(fits, policy), policy)
 
 
 def rivals_of(ranked: Sequence[Candidate], policy: Policy = POLICY) -> int:

@@ -8,13 +8,14 @@ from dataclasses import replace
 
 from ers_mj.data.prepared import Trace
 from ers_mj.decisions import explained
+from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.decisions.verdict import is_more_than_noise
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.estimation.fit import Along, polished
 from ers_mj.estimation.objective import Fit
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.candidates import candidates
-from ers_mj.selection.comparison import Candidate, is_clocked, priced
+from ers_mj.selection.comparison import Candidate, is_clocked
 from ers_mj.selection.drop import pruned
 from ers_mj.selection.screening import Begin, screen
 from ers_mj.selection.stepwise import Selection
@@ -26,7 +27,7 @@ QUICK, LONG = 8, 20  # steps of a first refit on a borrowed Jacobian, and of one
 
 
 def without_confounders(
-    selection: Selection, traces: Sequence[Trace], jobs: int
+    selection: Selection, traces: Sequence[Trace], jobs: int, policy: Policy = POLICY
 ) -> tuple[Selection, tuple[Candidate, ...]]:
     """The selection without the effects in whose place a law without a name explains more, and these laws, each over
     the model that it extends.
@@ -35,7 +36,7 @@ def without_confounders(
     goes as well. Where nothing is named and more than noise is left, the one that explains most of it is told, if it
     explains as much as an effect must.
     """
-    bench = Bench(traces, selection.tau, jobs)
+    bench = Bench(traces, selection.tau, jobs, policy=policy)
     current = _at_observer(bench, selection.chosen)
     if not current.model.names:
         return selection, _alone(bench, current)
@@ -72,7 +73,9 @@ def _in_place_of_each(bench: Bench, current: Fit, names: Sequence[str]) -> tuple
     for name in (name for name in names if not is_clocked(name)):
         if name not in current.model.names or _is_slow(less := current.model.without_effect(name)):
             continue
-        best = min(_in_its_place(bench, bench.fit(less, LONG), current), key=lambda c: priced(c.fit), default=None)
+        best = min(
+            _in_its_place(bench, bench.fit(less, LONG), current), key=lambda c: bench.priced(c.fit), default=None
+        )
         if best is not None and _is_better(bench, best.fit, current):
             suspects.append(best)
             current = pruned(bench, best.fit, best.name)
@@ -87,7 +90,7 @@ def in_place_of_all(bench: Bench, current: Fit, base: Fit) -> tuple[Fit, list[Ca
         return current, []
     nameless = replace(bench, exclude=[name for name in BY_NAME if name not in SUSPECTS])
     found = candidates(nameless, _at_observer(bench, base))
-    best = min((c for c in found if c.name in SUSPECTS), key=lambda c: priced(c.fit), default=None)
+    best = min((c for c in found if c.name in SUSPECTS), key=lambda c: bench.priced(c.fit), default=None)
     if best is None or not _is_better(bench, best.fit, current):
         return current, []
     return best.fit, [best]
@@ -95,7 +98,7 @@ def in_place_of_all(bench: Bench, current: Fit, base: Fit) -> tuple[Fit, list[Ca
 
 def _is_better(bench: Bench, found: Fit, current: Fit) -> bool:
     """Whether a law without a name is better by more than its price."""
-    return priced(found) + bench.policy.nameless_price < priced(current)
+    return bench.priced(found) + bench.policy.nameless_price < bench.priced(current)
 
 
 def _is_slow(model: Model) -> bool:

@@ -11,7 +11,7 @@ from ers_mj.estimation.objective import Fit
 from ers_mj.plants.reduced import ReducedModel
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.candidates import candidates
-from ers_mj.selection.comparison import Candidate, is_clocked, is_dear, kin_of, priced
+from ers_mj.selection.comparison import Candidate, is_clocked, is_dear, kin_of
 from ers_mj.selection.moves import Grown
 from ers_mj.servo.model import Model
 
@@ -37,8 +37,8 @@ def paired(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate, ...]]) 
     )
     if not ends:
         return None
-    found, (a, b) = min(zip(ends, pairs, strict=True), key=lambda end: priced(end[0]))
-    if priced(found) >= priced(current) - bench.policy.tie:
+    found, (a, b) = min(zip(ends, pairs, strict=True), key=lambda end: bench.priced(end[0]))
+    if bench.priced(found) >= bench.priced(current) - bench.policy.tie:
         return None
     first = (a, *(c for c in rounds[k] if c is not a))
     return found, [*rounds[:k], first, (bench.judged(b.name, found, a.fit),)]
@@ -85,8 +85,8 @@ def beside_a_rival(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate,
     ends = _rounds_beside_rivals(bench, rounds[0])
     if not ends:
         return None
-    rival, ranked = min(ends, key=lambda end: priced(end[1][0].fit))
-    if priced(ranked[0].fit) >= priced(current) - bench.policy.tie:
+    rival, ranked = min(ends, key=lambda end: bench.priced(end[1][0].fit))
+    if bench.priced(ranked[0].fit) >= bench.priced(current) - bench.policy.tie:
         return None
     return ranked[0].fit, [(rival, *(c for c in rounds[0] if c is not rival)), tuple(ranked)]
 

@@ -10,7 +10,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import Along
 from ers_mj.estimation.objective import Fit, is_rough
 from ers_mj.selection.bench import Bench
-from ers_mj.selection.comparison import Candidate, is_dear, judged, likeliest, likeliest_first, priced, really
+from ers_mj.selection.comparison import Candidate, is_dear, likeliest, likeliest_first, really
 from ers_mj.selection.moves import Grown
 from ers_mj.selection.sweep import joined, of_one_body, of_two_bodies, swept
 from ers_mj.servo.model import Model
@@ -29,8 +29,8 @@ def reviewed(
         return None
     without = bench.fit(current.model.without_effect(rounds[k][0].name), 20)
     found = swept(bench.without(named), without, end=end, kinds=of_one_body)
-    best = min(found, key=lambda c: priced(c.fit), default=None)
-    if best is None or priced(best.fit) >= priced(current) - bench.policy.tie:
+    best = min(found, key=lambda c: bench.priced(c.fit), default=None)
+    if best is None or bench.priced(best.fit) >= bench.priced(current) - bench.policy.tie:
         return None
     return best.fit, [*rounds[:k], (best, *(c for c in rounds[k] if c.name != best.name))]
 
@@ -80,8 +80,8 @@ def exchanged(bench: Bench, current: Fit, rounds: list[tuple[Candidate, ...]]) -
         if leader not in current.model.names:
             continue
         fits = _in_the_place_of(bench, current, ranked)
-        least = min(map(priced, fits.values())) + bench.policy.tie
-        name = likeliest({n: found for n, found in fits.items() if priced(found) < least}, bench.policy)
+        least = min(map(bench.priced, fits.values())) + bench.policy.tie
+        name = likeliest({n: found for n, found in fits.items() if bench.priced(found) < least}, bench.policy)
         current = fits[name]
         if name != leader:
             rounds[k] = _led_by(name, ranked, fits)
@@ -118,7 +118,7 @@ def _in_the_place_of(bench: Bench, current: Fit, ranked: Sequence[Candidate]) ->
     )
     fits = {leader: current}
     for (name, _), found in zip(begun, ends, strict=True):
-        fits[name] = min(fits.get(name, found), found, key=priced)
+        fits[name] = min(fits.get(name, found), found, key=bench.priced)
     return fits
 
 
@@ -160,8 +160,8 @@ def widened(bench: Bench, current: Fit, newest: str) -> Fit:
             then=bench.search.sweep,
             along=Along(renewals=2),
         )
-        best = min(ends, key=priced, default=current)
-        if priced(best) < priced(current) - bench.policy.tie:
+        best = min(ends, key=bench.priced, default=current)
+        if bench.priced(best) < bench.priced(current) - bench.policy.tie:
             current = best
     return current
 
@@ -174,6 +174,6 @@ def in_its_place(bench: Bench, current: Fit, before: Fit, ranked: Sequence[Candi
     name = ranked[0].name
     if name not in current.model.names or really(name, current) == name:
         return None
-    again = [judged(name, current, before, bench.tau), *ranked[1:]]
+    again = [bench.judged(name, current, before), *ranked[1:]]
     others = likeliest_first(sorted(again, key=lambda c: -c.worth), bench.policy)
     return None if others[0].name == name else tuple(others)

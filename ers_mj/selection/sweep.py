@@ -108,4 +108,5 @@ def joined(ranked: Sequence[Candidate], others: Sequence[Candidate]) -> list[Can
     for c in others:
         if c.name not in best or c.worth > best[c.name].worth:
             best[c.name] = c
-    return likeliest_first(sorted(best.values(), key=lambda c: -c.worth))
+    ordered = sorted(best.values(), key=lambda c: -c.worth)
+    return likeliest_first(ordered, ordered[0].policy) if ordered else []
