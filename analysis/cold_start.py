@@ -25,11 +25,15 @@ ROUNDS = 5
 
 COMPILE = """
 import importlib, pkgutil
+import numpy as np
 import ers_mj.plants as plants
 modules = [importlib.import_module(f"ers_mj.plants.{m.name}") for m in pkgutil.iter_modules(plants.__path__)]
 kernels = {id(v): v.piece for m in modules for v in vars(m).values() if hasattr(v, "piece")}
+t = np.linspace(0.0, 0.01, 11)
+from ers_mj.plants.printed_play import PrintedPlay
+from ers_mj.plants.reduced import lumped
+PrintedPlay(lumped({"b": 1.0}), 0.1).simulate(t, t)
 if kernels:
-    import numpy as np
     from ers_mj.effects import EFFECTS
     from ers_mj.plants.compiled import make
     from ers_mj.plants.laws import SIGNATURES, acting, laid_out

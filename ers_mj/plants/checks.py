@@ -23,7 +23,7 @@ def _grazes(c, x, z, m, h):
     return m.side * (x.theta - c.theta_0) < inwards * h * inwards / (inwards + outwards)
 
 
-@unit(L(C, F, X, M, F, F, F))
+@inline
 def is_still(c, t, x, m, drive, tau, a_emf):
     """Whether a rudder on a bent bristle rests: in the corner, or within STILL of the bristle's whole bend from where
     it would.

@@ -2,6 +2,7 @@
 
     inline   put into its callers, for what is small or called in one place
     unit     compiled once, apart from its callers, neither linked nor inlined into them
+    compiled linked into its callers, for what makes arrays
     kernel   what Python calls; it compiles, or fetches, itself and every unit that it needs when it is first called
 
 A unit is kept under its own digest, so that an edited one compiles anew alone; what only calls it stays as it is.
@@ -36,8 +37,10 @@ MANY = 4  # parts to compile of which it is worth saying so
 SECONDS_EACH = 0.4
 THIS_FILE = Path(__file__).read_text()
 IS_PLAIN = bool(numba.config.DISABLE_JIT)
-# without counts of who holds an array, atomic additions that cost more than the arithmetic of a small function
-UNCOUNTED = {"nogil": True, "_nrt": False}
+# without counts of who holds an array, atomic additions that cost more than the arithmetic of a small function, and
+# without what Python or C would call it by
+INNER = {"nogil": True, "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+OUTER = {"nogil": True, "no_cfunc_wrapper": True}
 
 
 @dataclass(eq=False)
@@ -106,9 +109,14 @@ def _told(value: object) -> str | None:
     return _PIECES[id(value)].told if id(value) in _PIECES else _TOLD.get(id(value))
 
 
+def compiled(function: Callable) -> Callable:
+    """Compile a function that makes arrays, linked into those that call it."""
+    return numba.njit(**{**INNER, "_nrt": True})(function)
+
+
 def inline(function: Callable) -> Callable:
     """Compile a function that makes no arrays of its own into those that call it."""
-    return numba.njit(forceinline=True, **UNCOUNTED)(function)
+    return numba.njit(forceinline=True, **INNER)(function)
 
 
 def inline_as(signature) -> Callable[[Callable], Callable]:
@@ -132,7 +140,7 @@ def unit(signature) -> Callable[[Callable], Callable]:
     def declare(function: Callable) -> Callable:
         if IS_PLAIN:
             return function
-        piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, UNCOUNTED)
+        piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, INNER)
 
         def find(builder, function_type, arguments):
             return cgutils.get_or_insert_function(builder.module, function_type, piece.name), arguments
@@ -151,7 +159,7 @@ def kernel(signature) -> Callable[[Callable], Callable]:
     def declare(function: Callable) -> Callable:
         if IS_PLAIN:
             return function
-        piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, {"nogil": True})
+        piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, OUTER)
 
         @wraps(function)
         def called(*arguments):
@@ -172,7 +180,7 @@ def address_of(function: Callable, signature) -> int:
         _PLAIN_LAWS.append(function)
         return len(_PLAIN_LAWS)
     function = getattr(function, "py_func", function)
-    piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, UNCOUNTED)
+    piece = Piece(function, f"{function.__module__}.{function.__qualname__}", signature, INNER)
     make(piece)
     _LAWS.append(piece)  # whose code lasts as long as it is held
     return piece.address

@@ -6,9 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from ers_mj.plants.compiled import inline
+from ers_mj.plants.compiled import compiled, inline
 from ers_mj.plants.state import MODES, VECTOR, F, N, has_bristle, types
 
 FALL_STEP = 0.1  # length of a segment over the electrical time constant where the inductance falls with the current
@@ -61,7 +60,7 @@ def split_delay(c, h0):
     return skip, 0.0 if late < 1e-9 * h0 else late
 
 
-@njit(nogil=True)
+@compiled
 def cut(c, h0, refine):
     """A uniform sample's cuts, ``refine`` times as many."""
     step = _longest(c, h0) / refine

@@ -200,7 +200,7 @@ def _slipping(e, step, c, t, x, m, drive, tau, a_emf, load, h, extra, slips):
     return within, z if within else x, extra
 
 
-@inline
+@unit(types.Tuple((L, X))(C, F, X, M, F, F, F, F, F))
 def _resting_on_bristle(c, t, x, m, drive, tau, a_emf, load, h):
     """(whether a rudder rests on its bristle over h, the state then)."""
     z = State(x.theta, x.w, _charged(x.j, drive, tau, h), x.theta_m, x.w_m)

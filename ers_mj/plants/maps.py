@@ -6,9 +6,8 @@ way.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ers_mj.plants.compiled import inline, inline_as, unit
+from ers_mj.plants.compiled import compiled, inline, inline_as, unit
 from ers_mj.plants.flow import flow, linear
 from ers_mj.plants.forces import TRIPLE, beside, extra
 from ers_mj.plants.state import C, F, L, M, Mode, N, State, X, bends, has_bristle, types
@@ -75,7 +74,7 @@ def fill_map(e, n, c, m, tau, a_emf, h, driven):
         e[n, i, SIDE] = -c.c_1 * e[n, i, ON_RUDDER]
 
 
-@njit(nogil=True)
+@compiled
 def no_maps():
     """Room (54, 5, 17) for the maps over a step and over half of it in every mode away from the stops. NaN: not made
     yet, since most modes are never met, and half steps only under laws.
