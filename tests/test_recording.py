@@ -540,7 +540,7 @@ def test_the_servo_on_a_bus_and_its_columns():
     assert record.name == "runs.parquet#run=17"
     assert record.omega is not None and record.vin is not None and record.enable.dtype == bool
     assert problem(record, "ignored").endswith(": duty, i_slow_mA")
-    with pytest.raises(InputError, match=r"the runs are 0, 1, .* 959 \(960 in all\\)"):
+    with pytest.raises(InputError, match=r"the runs are 0, 1, .* 959 \(960 in all\)"):
         read_recording(shared("data/sts3215/runs.parquet#run=960"))
 
 
