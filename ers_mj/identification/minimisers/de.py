@@ -16,7 +16,7 @@ class DE(Minimiser):
 
     def _search(self, meter: Meter, random: np.random.Generator, start: np.ndarray | None) -> None:
         differential_evolution(
-            lambda x: np.minimum(meter(x.T), 1e300),
+            lambda x: np.minimum(meter(x.T), 1e150),  # whose square, which scipy takes, is a number too
             [(0.0, 1.0)] * meter.size,
             popsize=5,  # times the number of parameters
             tol=0.0,
