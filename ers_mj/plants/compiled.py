@@ -34,7 +34,7 @@ from ers_mj.plants.code_folder import code_folder, one_at_a_time
 from ers_mj.plants.digest import digest_of, read_by
 
 MANY = 4  # parts to compile of which it is worth saying so
-SECONDS_EACH = 0.4
+SECONDS_EACH = 0.6
 THIS_FILE = Path(__file__).read_text()
 IS_PLAIN = bool(numba.config.DISABLE_JIT)
 # without counts of who holds an array, atomic additions that cost more than the arithmetic of a small function, and
@@ -190,22 +190,19 @@ _LAWS: list[Piece] = []
 _PLAIN_LAWS: list[Callable] = []
 
 
-def by_address(record: types.Record, place: str, signature) -> Callable:
-    """A call of the function whose address a ``record`` holds at ``place``; the first that it is given are the record's
-    ``constants``.
-    """
+def by_address(record: types.Record, signature) -> Callable:
+    """A call of the function at an address, of the ``constants`` that a ``record`` holds and of what else is given."""
     if IS_PLAIN:
-        return lambda law, *rest: _PLAIN_LAWS[law[place] - 1](law["constants"].tolist(), *rest)
+        return lambda address, law, *rest: _PLAIN_LAWS[address - 1](law["constants"].tolist(), *rest)
 
     def find(builder, function_type, arguments):
-        law, rest = arguments[0], arguments[1:]
-        held = cgutils.pointer_add(builder, law, record.offset(place), cgutils.intp_t.as_pointer())
+        address, law, *rest = arguments
         constants = cgutils.pointer_add(builder, law, record.offset("constants"), cgutils.ir.DoubleType().as_pointer())
-        return builder.inttoptr(builder.load(held), function_type.as_pointer()), [constants, *rest]
+        return builder.inttoptr(address, function_type.as_pointer()), [constants, *rest]
 
-    given = (record, *signature.args[1:])
+    given = (types.int64, record, *signature.args[1:])
     stand = _intrinsic(given, lambda *_: (signature.return_type(*given), _calling(signature, find)))
-    _TOLD[id(stand)] = f"{place} {record} {signature}"
+    _TOLD[id(stand)] = f"{record} {signature}"
     return stand
 
 

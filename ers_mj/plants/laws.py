@@ -13,7 +13,7 @@ from numba import types
 from ers_mj.effects import EFFECTS
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants.compiled import address_of, by_address, inline
-from ers_mj.plants.state import LAW, MOST_LAWS, N_CONSTANTS, PLANT, C, F
+from ers_mj.plants.state import COUNTED, LAW, MOST_LAWS, N_CONSTANTS, PLANT, C, F
 
 MEMORY = 4  # the constant of a law that may be a memory
 CONSTANTS = types.CPointer(F)
@@ -23,9 +23,8 @@ SIGNATURES = {
     "inertia": types.UniTuple(F, 2)(CONSTANTS, F),
     "memory": F(CONSTANTS, F, F, F, F),
 }
-KINDS = {"torque": "torques", "friction": "frictions", "inertia": "inertias", "memory": "memories"}
-_torque_of, _friction_of, _inertia_of, _memory_of = (
-    by_address(C.fields["laws"].type.dtype, kind, signature) for kind, signature in SIGNATURES.items()
+_torque, _friction, _inertia, _memory = (
+    by_address(C.fields["laws"].type.dtype, signature) for signature in SIGNATURES.values()
 )
 
 
@@ -34,7 +33,7 @@ def total_torque(c, theta, w, j, t):
     """Sum of the torques of the effects that are on: those on the rudder only where the motor is a body of its own."""
     a = 0.0
     for i in range(c.torques):
-        a += _torque_of(c.laws[c.with_torque[i]], theta, w, j, t)
+        a += _torque(c.torque_at[i], c.laws[c.torque_of[i]], theta, w, j, t)
     return a
 
 
@@ -43,7 +42,7 @@ def drive_torque(c, theta_m, w_m, j, t):
     """The same on a motor that is a body of its own, at its angle and speed seen at the output."""
     a = 0.0
     for i in range(c.motor_torques):
-        a += _torque_of(c.laws[c.with_motor_torque[i]], theta_m, w_m, j, t)
+        a += _torque(c.motor_torque_at[i], c.laws[c.motor_torque_of[i]], theta_m, w_m, j, t)
     return a
 
 
@@ -51,7 +50,7 @@ def drive_torque(c, theta_m, w_m, j, t):
 def friction_level(c, level, theta, w, j, direction):
     """The friction level after every effect that is on."""
     for i in range(c.frictions):
-        level = _friction_of(c.laws[c.with_friction[i]], level, theta, w, j, direction)
+        level = _friction(c.friction_at[i], c.laws[c.friction_of[i]], level, theta, w, j, direction)
     return level
 
 
@@ -59,7 +58,7 @@ def friction_level(c, level, theta, w, j, direction):
 def moved(c, theta, w, a):
     """The acceleration that is left of ``a``, per total inertia, where effects change the inertia along the travel."""
     for i in range(c.inertias):
-        inertia, half_slope = _inertia_of(c.laws[c.with_inertia[i]], theta)
+        inertia, half_slope = _inertia(c.inertia_at[i], c.laws[c.inertia_of[i]], theta)
         a = (a - half_slope * w * w) / inertia
     return a
 
@@ -68,11 +67,11 @@ def moved(c, theta, w, a):
 def remember(c, theta, w, j, theta_m, w_m, h):
     """Bring the memories of effects, their fifth constants, on by a sample of length h from this state."""
     for i in range(c.memories):
-        law = c.laws[c.with_memory[i]]
+        law = c.laws[c.memory_of[i]]
         if law.at_motor == 0:
-            law.constants[MEMORY] = _memory_of(law, theta, w, j, h)
+            law.constants[MEMORY] = _memory(c.memory_at[i], law, theta, w, j, h)
         else:
-            law.constants[MEMORY] = _memory_of(law, theta_m, w_m, j, h)
+            law.constants[MEMORY] = _memory(c.memory_at[i], law, theta_m, w_m, j, h)
 
 
 class Acting(NamedTuple):
@@ -110,16 +109,17 @@ def _without_numbers(on: Acting) -> np.ndarray:
     flat = np.zeros(PLANT.itemsize // np.float64().nbytes)
     plant, effects = flat.view(PLANT)[0], [EFFECTS[row] for row in on.rows]
     for law, effect in zip(plant.laws, effects, strict=False):
-        for kind, signature in SIGNATURES.items():
-            if getattr(effect, kind):
-                law[kind] = address_of(getattr(effect, kind), signature)
         law["at_motor"] = on.parted and effect.at_motor
-    own = [i for i, law in enumerate(plant.laws) if law.torque and law.at_motor]
-    for kind in SIGNATURES:
-        having = [i for i, law in enumerate(plant.laws) if law[kind] and not (kind == "torque" and i in own)]
-        plant[KINDS[kind]] = len(having)
-        plant[f"with_{kind}"][: len(having)] = having
-    plant.motor_torques, plant.with_motor_torque[: len(own)] = len(own), own
+    for kind in COUNTED:
+        law, is_own = kind.removeprefix("motor_"), kind.startswith("motor_")
+        having = [
+            i
+            for i, effect in enumerate(effects)
+            if getattr(effect, law) and (law != "torque" or is_own == (on.parted and effect.at_motor))
+        ]
+        plant[COUNTED[kind]], plant[f"{kind}_of"][: len(having)] = len(having), having
+        addresses = [address_of(getattr(effects[i], law), SIGNATURES[law]) for i in having]
+        plant[f"{kind}_at"][: len(having)] = addresses
     plant.lawful = plant.torques + plant.frictions + plant.motor_torques
     return flat
 

@@ -54,21 +54,27 @@ def _record(fields: list[tuple]) -> np.dtype:
     return np.dtype((np.record, np.dtype(fields, align=True)))
 
 
+# kinds of laws and the count of each; the last ones are torques of a motor that is a body of its own
+COUNTED = {
+    "torque": "torques",
+    "friction": "frictions",
+    "inertia": "inertias",
+    "memory": "memories",
+    "motor_torque": "motor_torques",
+}
 LAW = _record(
     [
-        *((kind, np.int64) for kind in ("torque", "friction", "inertia", "memory")),  # addresses, 0 where it has none
-        ("at_motor", np.int64),  # whether torque and memory are those of a motor that is a body of its own
+        ("at_motor", np.int64),  # whether its memory is of a motor that is a body of its own
         ("constants", np.float64, (N_CONSTANTS,)),
     ]
 )
-# numbers of laws; lawful: of those that add to the forces
-COUNTS = ("torques", "frictions", "inertias", "memories", "motor_torques", "lawful")
-HAVING = ("with_torque", "with_friction", "with_inertia", "with_memory", "with_motor_torque")  # which laws those are
 PLANT = _record(
     [
         *((letter, np.float64) for letter in Coefficients._fields),
-        *((count, np.int64) for count in COUNTS),
-        *((having, np.uint64, (MOST_LAWS,)) for having in HAVING),
+        ("lawful", np.int64),  # laws that add to the forces
+        *((count, np.int64) for count in COUNTED.values()),  # numbers of laws, where their code lies, whose it is
+        *((f"{kind}_at", np.int64, (MOST_LAWS,)) for kind in COUNTED),
+        *((f"{kind}_of", np.uint64, (MOST_LAWS,)) for kind in COUNTED),
         ("laws", LAW, (MOST_LAWS,)),
     ]
 )
