@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ers_mj import cli
+from ers_mj import diagnosis as diagnosis_room
 from ers_mj.commands import output
 from ers_mj.data.recording import read_recording
 from ers_mj.diagnosis.evidence import Evidence
@@ -293,10 +294,9 @@ def stub(monkeypatch, **changes) -> list:
             model=changes.get("model", Datasheet(lumped={"b": 1.0})),
         )
 
-    monkeypatch.setitem(sys.modules, "ers_mj.diagnosis.pipeline", SimpleNamespace(diagnose=diagnose))
-    import ers_mj
-
-    monkeypatch.setattr(ers_mj, "diagnosis", sys.modules["ers_mj.diagnosis.pipeline"], raising=False)
+    stub = SimpleNamespace(diagnose=diagnose)
+    monkeypatch.setitem(sys.modules, "ers_mj.diagnosis.pipeline", stub)
+    monkeypatch.setattr(diagnosis_room, "pipeline", stub, raising=False)  # where it has been imported already
     return calls
 
 
