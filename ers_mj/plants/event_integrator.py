@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ers_mj.effects.base import LEAST_IRON
+from ers_mj.plants.calm import is_plain, rests_on, slips_on
 from ers_mj.plants.checks import is_calm, is_clean, is_steady, is_still, turns
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import CUTS, corner_speed, cut, law_step, longest_step
@@ -303,6 +304,20 @@ def _event_budget(c, n, cuts):
     return EVENT_BUDGET * n * (cuts.ends.size if has_bristle(c) else 1) + 1000
 
 
+@inline
+def _until(k, n, gain, every):
+    """The sample up to which no observer corrects what begins at sample k."""
+    return min(n - 1, (k // every + 1) * every) if gain > 0.0 else n - 1
+
+
+@inline
+def _calm(t, u, enable, load, c, cuts, e, k, last, x, m, slips, out):
+    """(sample, state) up to which nothing happens from sample k on."""
+    if m.s == 0:
+        return rests_on(t, u, enable, load, c, cuts, k, last, x, m, out)
+    return slips_on(t, u, enable, load, c, cuts, e, k, last, x, m, slips, out)
+
+
 @unit(types.void(READ, READ, READ_BOOL, READ, READ, F, N, C, N, VECTOR, CUTS, OF_A_SAMPLE, L, TABLE))
 def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps, out):
     """See ``simulate``: through the samples, by maps over segments or, if it ``leaps``, over a whole sample."""
@@ -313,7 +328,9 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
     extra = np.nan  # what the laws add where a segment ended that holds no event
     x = start_state(c, x0[0], x0[1], x0[2], 0.5 * (c.c_2_plus + c.c_2_minus))
     m = start_mode(c, x)
-    for k in range(n):
+    k, plain = -1, is_plain(c, cuts)
+    while k < n - 1:
+        k += 1
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x.theta, x.w, x.j, x.theta if bristle else x.theta_m
         if k == n - 1:
             break
@@ -321,6 +338,11 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
         if gain > 0.0 and k % every == 0 and y[k] == y[k]:
             resting, extra = -1, np.nan
             x, m = corrected(c, t[k], x, m, gain * (y[k] - x.theta))
+        if plain and m.stop == 0:
+            calm, x = _calm(t, u, enable, load, c, cuts, maps.late, k, _until(k, n, gain, every), x, m, slips, out)
+            if calm > k:
+                resting, extra, k = -1, np.nan, calm - 1
+                continue
         now = _sample(t, u, enable, load, c, cuts, k)
         if leaps and now.is_usual and now.closed and m.stop == 0 and is_calm(c, x, cuts.h0):
             done, x = _leap(maps, c, now, cuts.h0, x, m)
