@@ -13,6 +13,7 @@ from ers_mj import diagnosis as diagnosis_room
 from ers_mj.commands import output
 from ers_mj.data.recording import read_recording
 from ers_mj.diagnosis.evidence import Evidence
+from ers_mj.door.saving import as_json
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 
 N = 200
@@ -266,7 +267,7 @@ def stub(monkeypatch, **changes) -> list:
     """Put a diagnosis in the place of the real one; its calls."""
     calls = []
 
-    def diagnose(recordings, datasheet, holdout, *, seed, jobs, progress):
+    def diagnose(recordings, datasheet, holdout, *, seed, jobs, progress, search):
         calls.append(SimpleNamespace(recordings=recordings, datasheet=datasheet, holdout=holdout, seed=seed, jobs=jobs))
         progress("fitting", 0.5)
         if "raises" in changes:
@@ -569,7 +570,7 @@ def test_progress_is_silent_in_a_pipe(capsys):
 
 
 def test_json_has_no_nan():
-    assert json.loads(output.as_json({"a": np.array([1.0, np.nan]), "b": (np.int64(2), float("inf"))})) == {
+    assert json.loads(as_json({"a": np.array([1.0, np.nan]), "b": (np.int64(2), float("inf"))})) == {
         "a": [1.0, None],
         "b": [2, None],
     }

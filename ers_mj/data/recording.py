@@ -14,13 +14,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from ers_mj.data.checks import FEWEST_SAMPLES as FEWEST_SAMPLES
 from ers_mj.data.checks import GAP as GAP
 from ers_mj.data.checks import checked, ignored, locked, problems_of, refuse_time
 from ers_mj.data.columns import COLUMNS, OPTIONAL, choose_columns, refuse_unknown_unit
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.data.tables import cell_of, listed, numbers, parse_table, read_content, select_run, split_spec, write_whole
+from ers_mj.data.tables import (
+    cell_of,
+    listed,
+    numbers,
+    parse_table,
+    read_content,
+    reason,
+    select_run,
+    split_spec,
+    write_whole,
+)
 from ers_mj.errors import InputError
 
 
@@ -67,6 +78,12 @@ class Recording:
         """Lock the arrays again: a copy that has been to another process comes back writeable."""
         self.__dict__.update({key: locked(x) if isinstance(x, np.ndarray) else x for key, x in state.items()})
 
+    def __repr__(self) -> str:
+        return (
+            f"<Recording {self.name}: {self.t.size} samples over {self.duration:.4g} s, input in {self.input_unit},"
+            f" output in {self.output_unit}>"
+        )
+
     @property
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
@@ -110,6 +127,39 @@ def read_recording(path_or_spec: str | os.PathLike[str], mapping: Mapping[str, s
     name = path.name if run is None else f"{path.name}#run={run}"
     content = read_content(path)
     table = select_run(parse_table(content, path.suffix.lower(), name), run, name)
+    return _of_table(table, mapping, name, str(path), hashlib.sha256(content).hexdigest())
+
+
+def from_columns(
+    columns: Mapping[str, Any], mapping: Mapping[str, str] | None = None, name: str = "array"
+) -> Recording:
+    """A recording from columns (N,) under the names and units that a file's columns have; they are copied.
+
+    Args:
+        columns: name -> what makes an array (N,); those that mean nothing here are ignored and told.
+        mapping: as `read_recording` takes it.
+        name: what the recording is called.
+
+    Raises:
+        InputError: as `read_recording` does.
+    """
+    arrays = {str(label): np.asarray(column) for label, column in columns.items()}
+    for label, x in arrays.items():
+        if x.ndim != 1:
+            raise InputError(f"{name}: {label} has shape {x.shape}, (N,) was expected")
+    count = {label: x.size for label, x in arrays.items()}
+    if len(set(count.values())) > 1:
+        raise InputError(f"{name}: columns of one length are expected, these have {count}")
+    try:
+        table = pa.table(arrays)
+    except pa.ArrowException as error:
+        raise InputError(f"{name}: holds what is no column of numbers ({reason(error)})") from None
+    content = b"".join(label.encode() + x.tobytes() for label, x in arrays.items())
+    return _of_table(table, mapping, name, "", hashlib.sha256(content).hexdigest())
+
+
+def _of_table(table: pa.Table, mapping: Mapping[str, str] | None, name: str, path: str, sha256: str) -> Recording:
+    """The recording in a table of named columns."""
     chosen = choose_columns(table.column_names, dict(mapping or {}), name)
     raw = {contract: numbers(table[column], column, name) for contract, column in chosen.items()}
     roles = {COLUMNS[contract].field: COLUMNS[contract] for contract in chosen}
@@ -119,7 +169,7 @@ def read_recording(path_or_spec: str | os.PathLike[str], mapping: Mapping[str, s
     units: dict[str, Any] = {"input_unit": roles["u"].unit, "output_unit": roles["y"].unit}
     step = converter_step(printed["y"])
     problems = problems_of(fields, printed, labels, step) + ignored(table.column_names, labels)
-    origin: dict[str, Any] = {"name": name, "path": str(path), "sha256": hashlib.sha256(content).hexdigest()}
+    origin: dict[str, Any] = {"name": name, "path": path, "sha256": sha256}
     return Recording(**fields, **units, **origin, quantum=step * roles["y"].factor, problems=tuple(problems))
 
 
