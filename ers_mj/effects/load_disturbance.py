@@ -19,6 +19,7 @@ class LoadDisturbance(Load):
     name = "load_disturbance"
     sentence = "in one recording a load of {A} acts from {t_0} for {width}"
     mjcf = "none: the ctrl of the load actuator is set step by step from the clock"
+    apart = "one impulse in one recording at one time; what returns with the angle or the clock is another effect"
     parameters = (
         Parameter("A", "torque", "torque of the knock", positive=False, per_record=True),
         Parameter("t_0", "time", "when it begins", positive=False, per_record=True),

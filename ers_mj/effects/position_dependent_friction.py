@@ -20,6 +20,10 @@ class PositionDependentFriction(Friction):
     name = "position_dependent_friction"
     sentence = "friction changes along the travel by {dF} (around {place}, within ±{width}; every {period})"
     mjcf = "none: frictionloss is set step by step from the angle"
+    apart = (
+        "returns at the same place in both directions and reverses with the motion; cogging and a cubic moment "
+        "keep their sign"
+    )
     parameters = (
         Parameter(
             "dF", "torque", "friction at the place minus friction elsewhere, or amplitude of the wave", positive=False
