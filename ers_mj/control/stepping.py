@@ -79,7 +79,8 @@ class Stepper:
     @property
     def state(self) -> np.ndarray:
         """All that tells what comes (n,), in numbers without a unit of their own."""
-        return np.concatenate([self._runs.state, *(late.state for late in self._late)])
+        packed: np.ndarray = np.concatenate([self._runs.state, *(late.state for late in self._late)])
+        return packed
 
     @state.setter
     def state(self, packed: np.ndarray) -> None:

@@ -154,7 +154,7 @@ def from_columns(
         table = pa.table(arrays)
     except pa.ArrowException as error:
         raise InputError(f"{name}: holds what is no column of numbers ({reason(error)})") from None
-    content = b"".join(label.encode() + x.tobytes() for label, x in arrays.items())
+    content = b"".join(label.encode() + arrays[label].tobytes() for label in sorted(arrays))
     return _of_table(table, mapping, name, "", hashlib.sha256(content).hexdigest())
 
 

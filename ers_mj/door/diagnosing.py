@@ -72,13 +72,17 @@ class Diagnosis(Result):
 
         return summary_page(self._document, self._found.evidence)
 
-    def _writers(self) -> Writers:
+    @cached_property
+    def _report(self) -> str:
         from ers_mj.report.diagnosis_report import report_page
         from ers_mj.view.frames import frames_of
 
+        found = self._found
+        return report_page(self._document, found.evidence, frames_of(found.plant, found.evidence))
+
+    def _writers(self) -> Writers:
         found, document = self._found, self._document
-        page = report_page(document, found.evidence, frames_of(found.plant, found.evidence))
-        writers = report_writers("diagnosis.json", document, page) | {
+        writers = report_writers("diagnosis.json", document, self._report) | {
             "model.toml": lambda path: write_model(path, found.model),
             "plant.xml": lambda path: write_text(path, found.plant.xml()),
         }

@@ -138,7 +138,7 @@ def simulate(
     Example:
         >>> import ers_mj as ers
         >>> ers.simulate("table1", "steps", duration=2.0, rate_hz=500.0, effects=["bias_torque:tau_0=0.1"])
-        <Simulation steps: 1000 samples over 1.998 s, -17.0 to 52.5 deg, reduced plant>
+        <Simulation steps: 1000 samples over 1.998 s, -3.0 to 74.7 deg, reduced plant>
 
     Source: Energies 2020, Eq. (5), or Eq. (1) with the inductance.
     """

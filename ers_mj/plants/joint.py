@@ -114,7 +114,7 @@ def joint_lines(
 
 
 def _lowered(plant: ReducedModel) -> Coefficients:
-    return Coefficients(*plant._lowered[0])
+    return Coefficients(*map(float, plant._lowered[0]))
 
 
 def _actuator(plant: ReducedModel, c: Coefficients, J: float, joint: str, wound: bool) -> dict[str, object]:
