@@ -12,13 +12,14 @@ HEAD = """# Effects
 
 <!-- written by `python analysis/catalogue.py`: edit the effect's own file -->
 
-What `ers diagnose` can name, in the order in which a signal travels. A law is given as the term it adds to Eq. (6), theta in output
-units; `ers simulate --effect NAME:key=value,...` puts it into a servo. [A new effect](extending.md) is one file.
+What `ers diagnose` can name, in the order in which a signal travels. A law is given as the term it adds to Eq. (6),
+theta in output units; `ers simulate --effect NAME:key=value,...` puts it into a servo. [A new effect](extending.md) is
+one file.
 """
 NAMELESS = """## Laws that are never named
 
-These are confounders: each is tried in the place of what is named. Where one explains more, the verdict is `unexplained`, with the
-law under `suspects`.
+These are confounders: each is tried in the place of what is named. Where one explains more, the verdict is
+`unexplained`, with the law under `suspects`.
 """
 CLASSES = """## Scored as one
 

@@ -1,4 +1,4 @@
-"""The example of a new effect in docs/extending.md, taken at its word: one file, and every part of the package knows it."""
+"""The example of docs/extending.md, taken at its word: one file, and every part of the package knows it."""
 
 import os
 import re
