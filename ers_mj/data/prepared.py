@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ers_mj.data.kept import Kept
 from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import Recording
 from ers_mj.data.sensor_faults import at_extreme, converter_step, frozen_spans, leapt_spans, spikes, unmoved_spans
@@ -108,6 +109,11 @@ class Trace:
     def sample_time(self) -> float:
         """Median step [s]."""
         return float(np.median(np.diff(self.t)))
+
+    @cached_property
+    def runs(self) -> Kept:
+        """What models' runs along it left."""
+        return Kept()
 
     @cached_property
     def is_uniform(self) -> bool:
