@@ -123,7 +123,8 @@ def system(plant: ReducedModel, rate_hz: float, names: tuple[str, str]) -> contr
     def update(t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
         stepper.state = rest + x
         stepper.step(float(np.ravel(u)[0]))
-        return stepper.state - rest
+        moved: np.ndarray = stepper.state - rest
+        return moved
 
     def output(t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
         stepper.state = rest + x

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ers_mj.data.columns import input_name
 from ers_mj.data.recording import Recording
 from ers_mj.door.known import Known, known
 from ers_mj.door.results import frame, framed
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from ers_mj.plants.mechanical import MechanicalPlant
     from ers_mj.plants.reduced import ReducedModel
 
-INPUT_NAMES = {"V": "u_V", "%": "u_duty_pct", "pct": "u_duty_pct"}
 OUTPUT_NAMES = {"rad": "theta_rad", "m": "x_m", "V": "y_sensor_V"}
 
 
@@ -41,7 +41,7 @@ class Model:
     Args:
         datasheet: a path (a datasheet or model.toml), "table1", a mapping laid out as the TOML, a datasheet, a model.
         output_unit: rad, m or V: the unit that Eq. (6)'s letters are in.
-        input_unit: V, or % of duty.
+        input_unit: V, % of duty, N m or A.
         inductance: whether the winding's time constant acts; by default where a diagnosis has found one, and not that
             of a bare datasheet.
 
@@ -174,7 +174,7 @@ class Model:
     @property
     def signals(self) -> tuple[str, str]:
         """Names of input and output, with their units."""
-        return INPUT_NAMES[self.input_unit], OUTPUT_NAMES[self.output_unit]
+        return input_name(self.input_unit), OUTPUT_NAMES[self.output_unit]
 
     def to_control(
         self, theta: float | None = None, omega: float = 1.0, *, rate_hz: float | None = None, pade: int = 4

@@ -13,7 +13,7 @@ from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.cuts import CUTS
 from ers_mj.plants.events import direction_from_rest
 from ers_mj.plants.maps import CONSTANT, DRIVE, MAPS, ON_RUDDER, SIDE, map_of
-from ers_mj.plants.state import READ, READ_BOOL, TABLE, C, L, M, N, State, X, is_bounded, types, with_drive
+from ers_mj.plants.state import READ, READ_BOOL, TABLE, C, L, M, N, State, X, has_bristle, is_bounded, types, with_drive
 
 
 @inline
@@ -28,8 +28,9 @@ def _is_usual(t, enable, cuts, k):
 
 
 @inline
-def _written(out, k, x):
-    out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x.theta, x.w, x.j, x.theta_m
+def written(out, k, c, x):
+    """Fill in row k of what is told of a motion."""
+    out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x.theta, x.w, x.j, x.theta if has_bristle(c) else x.theta_m
 
 
 @unit(types.Tuple((N, X))(READ, READ, READ_BOOL, READ, C, CUTS, MAPS, N, N, X, M, L, TABLE))
@@ -61,7 +62,7 @@ def slips_on(t, u, enable, load, c, cuts, maps, k, last, x, m, slips, out):
         if abs(w) < 0.2 * abs(x.w) and turns(c, t[k], x, z, m, drive, tau, a_emf, cuts.h0):
             break
         k, x = k + 1, z
-        _written(out, k, x)
+        written(out, k, c, x)
     return k, x
 
 
@@ -86,5 +87,5 @@ def rests_on(t, u, enable, load, c, cuts, k, last, x, m, out):
         if not (_is_held(c, j, push, up, down) and _is_held(c, later, push, up, down)):
             break
         k, x = k + 1, State(x.theta, 0.0, later, x.theta_m, x.w_m)
-        _written(out, k, x)
+        written(out, k, c, x)
     return k, x
