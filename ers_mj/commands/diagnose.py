@@ -108,11 +108,14 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     lines += _section(
         "problems in the data", [str(problem) for problem in (document.get("data") or {}).get("problems") or []][:6]
     )
-    left_out = [str(part["sentence"]) for part in document.get("left_out") or []]
-    lines += _section("left out by --quick", left_out)
+    return lines + _told_rest(document) + _section("written", [str(path) for path in files])
+
+
+def _told_rest(document: dict) -> list[str]:
+    """What a quick look left out, and what to record next."""
+    lines = _section("left out by --quick", [str(part["sentence"]) for part in document.get("left_out") or []])
     following = (document.get("next_recording") or {}).get("sentence")
-    lines += _section("record next", [following] if following else [])
-    return lines + _section("written", [str(path) for path in files])
+    return lines + _section("record next", [following] if following else [])
 
 
 def _section(title: str, sentences: list[str]) -> list[str]:

@@ -142,14 +142,7 @@ def simulate(
 
     Source: Energies 2020, Eq. (5), or Eq. (1) with the inductance.
     """
-    for what, chosen, there in (
-        ("plant", options.get("plant", "reduced"), PLANTS),
-        ("linkage", options.get("linkage", "constant"), LINKAGES),
-        ("play", options.get("play", "gap"), PLAYS),
-    ):
-        refuse_other(what, chosen, there)
-    if not 0 <= noise < np.inf:
-        raise InputError(f"the noise is {noise:g} rad, zero or more was expected")
+    _refuse_options(options, noise)
     sheet = known(model) or Datasheet()
     added = [parse_effect(effect) if isinstance(effect, str) else effect for effect in effects]
     name, t, u = _signal(input, rate_hz, duration)
@@ -172,6 +165,14 @@ def simulate(
         "theta_max_rad": float(theta.max()),
     }
     return Simulation(columns["t_s"], columns["u_V"], theta, summary)
+
+
+def _refuse_options(options: PlantOptions, noise: float) -> None:
+    refuse_other("plant", options.get("plant", "reduced"), PLANTS)
+    refuse_other("linkage", options.get("linkage", "constant"), LINKAGES)
+    refuse_other("play", options.get("play", "gap"), PLAYS)
+    if not 0 <= noise < np.inf:
+        raise InputError(f"the noise is {noise:g} rad, zero or more was expected")
 
 
 def _signal(given: Voltage, rate_hz: float | None, duration: float | None) -> tuple[str, np.ndarray, np.ndarray]:
