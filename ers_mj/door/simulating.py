@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
-MOST_SAMPLES = 20_000_000
 Voltage = str | os.PathLike[str] | Recording | tuple[Any, Any]  # an input
 Effect = str | tuple[str, Mapping[str, float]]
 
@@ -178,10 +177,10 @@ def _refuse_options(options: PlantOptions, noise: float) -> None:
 def _signal(given: Voltage, rate_hz: float | None, duration: float | None) -> tuple[str, np.ndarray, np.ndarray]:
     """Name, times [s] and voltages [V] of an input."""
     if isinstance(given, str) and given in INPUTS:
-        rate, seconds = rate_hz or RATE_HZ, duration or DURATION
-        if not 2 <= rate * seconds <= MOST_SAMPLES:
+        rate, seconds, most = rate_hz or RATE_HZ, duration or DURATION, 20_000_000
+        if not 2 <= rate * seconds <= most:
             raise InputError(
-                f"{seconds:g} s at {rate:g} Hz are {rate * seconds:.3g} samples, 2 to {MOST_SAMPLES:.0e} were expected"
+                f"{seconds:g} s at {rate:g} Hz are {rate * seconds:.3g} samples, 2 to {most:.0e} were expected"
             )
         t = np.arange(round(rate * seconds)) / rate
         return given, t, INPUTS[given](t)
