@@ -37,37 +37,49 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
+__all__ = [
+    "read",
+    "from_arrays",
+    "diagnose",
+    "identify",
+    "simulate",
+    "validate",
+    "load_model",
+    "Recording",
+    "Datasheet",
+    "Model",
+    "JointLines",
+    "Diagnosis",
+    "Identification",
+    "Simulation",
+    "Validation",
+    "ErsError",
+    "InputError",
+    "MissingPackage",
+]
 _HOMES = {
-    "read": "door.reading",
-    "from_arrays": "door.reading",
-    "diagnose": "door.diagnosing",
-    "identify": "door.identifying",
-    "simulate": "door.simulating",
-    "validate": "door.validating",
-    "load_model": "door.model",
-    "Recording": "data.recording",
-    "Datasheet": "servo.datasheet",
-    "Model": "door.model",
-    "JointLines": "plants.joint",
-    "Diagnosis": "door.diagnosing",
-    "Identification": "door.identifying",
-    "Simulation": "door.simulating",
-    "Validation": "door.validating",
-    "ErsError": "errors",
-    "InputError": "errors",
-    "MissingPackage": "errors",
+    "data.recording": ("Recording",),
+    "door.diagnosing": ("Diagnosis", "diagnose"),
+    "door.identifying": ("Identification", "identify"),
+    "door.model": ("Model", "load_model"),
+    "door.reading": ("from_arrays", "read"),
+    "door.simulating": ("Simulation", "simulate"),
+    "door.validating": ("Validation", "validate"),
+    "errors": ("ErsError", "InputError", "MissingPackage"),
+    "plants.joint": ("JointLines",),
+    "servo.datasheet": ("Datasheet",),
 }
-__all__ = [*_HOMES]
 
 
 def __getattr__(name: str) -> Any:
     """What is asked for, loaded now (PEP 562)."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {', '.join(_HOMES)}")
-    found = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    home = next((home for home, names in _HOMES.items() if name in names), None)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {', '.join(__all__)}")
+    found = getattr(importlib.import_module(f"{__name__}.{home}"), name)
     globals()[name] = found
     return found
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    return sorted({*globals(), *__all__})

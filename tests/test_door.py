@@ -47,6 +47,12 @@ def test_importing_loads_nothing_and_compiles_nothing():
     assert done.stdout.strip() == "[]" and done.stderr == ""
 
 
+def test_every_name_is_there_and_typed():
+    lines = [line.split(" as ") for line in inspect.getsource(ers).splitlines() if line.startswith("    from ")]
+    assert sorted(ers.__all__) == sorted(typed for _, typed in lines)
+    assert all(getattr(ers, name).__name__ == name for name in ers.__all__)
+
+
 def test_what_is_not_there_is_said():
     with pytest.raises(AttributeError, match="has no attribute 'diagnoze'; it has read, from_arrays, diagnose"):
         ers.diagnoze  # noqa: B018
@@ -179,6 +185,7 @@ def test_arrays_that_are_no_recording_are_refused(given, words):
         (lambda: ers.diagnose("missing.csv"), "there is no such file"),
         (lambda: ers.from_arrays(3), "a data frame or a mapping was expected"),
         (lambda: ers.load_model({"parameters": {"JJ": 1.0}}), "there is no key 'JJ'; did you mean J"),
+        (lambda: ers.load_model("table1", output_unit="deg"), "there is no output unit 'deg'; there are rad, m, V"),
         (lambda: ers.load_model(3), "a path, a mapping, a datasheet or a model was expected"),
         (lambda: ers.simulate(input="stepz"), "no input of that name"),
         (lambda: ers.simulate(plant="real"), "there is no plant 'real'; there are reduced, mujoco"),

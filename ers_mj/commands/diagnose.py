@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_common, add_map, add_out, add_recordings, mapping, results_folder
+from ers_mj.commands.options import add_common, add_input, add_map, add_out, add_recordings, mapping, results_folder
 from ers_mj.commands.output import Progress, bold
 from ers_mj.door.saving import as_json
 
@@ -36,6 +37,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable"
     )
     add_map(parser)
+    add_input(parser)
+    parser.add_argument(
+        "--second", metavar="COLUMN", help="explain this column as well, as in u_V beside theta_ref_rad"
+    )
     add_quick(parser)
     add_out(parser)
     add_common(parser)
@@ -55,8 +60,9 @@ def run(arguments: argparse.Namespace) -> int:
     names = mapping(arguments.map)
     from ers_mj.door.reading import read
 
-    recordings = [read(spec, names) for spec in arguments.recordings]
-    holdout = [read(spec, names) for spec in arguments.holdout]
+    take = partial(read, map=names, input=arguments.input, second=arguments.second)
+    recordings = [take(spec) for spec in arguments.recordings]
+    holdout = [take(spec) for spec in arguments.holdout]
     return diagnose_and_tell(recordings, holdout, arguments.datasheet, folder, arguments)
 
 
@@ -102,11 +108,14 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     lines += _section(
         "problems in the data", [str(problem) for problem in (document.get("data") or {}).get("problems") or []][:6]
     )
-    left_out = [str(part["sentence"]) for part in document.get("left_out") or []]
-    lines += _section("left out by --quick", left_out)
+    return lines + _told_rest(document) + _section("written", [str(path) for path in files])
+
+
+def _told_rest(document: dict) -> list[str]:
+    """What a quick look left out, and what to record next."""
+    lines = _section("left out by --quick", [str(part["sentence"]) for part in document.get("left_out") or []])
     following = (document.get("next_recording") or {}).get("sentence")
-    lines += _section("record next", [following] if following else [])
-    return lines + _section("written", [str(path) for path in files])
+    return lines + _section("record next", [following] if following else [])
 
 
 def _section(title: str, sentences: list[str]) -> list[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ers_mj.commands.options import (
     add_common,
+    add_input,
     add_map,
     add_out,
     add_recordings,
@@ -41,6 +42,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     _add_way(parser)
     _add_search(parser)
     add_map(parser)
+    add_input(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -113,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     with Progress() as progress:
         found = identify(
-            [read(spec, names) for spec in arguments.recordings],
+            [read(spec, names, input=arguments.input) for spec in arguments.recordings],
             arguments.datasheet,
             method=arguments.method,
             plant=arguments.plant,

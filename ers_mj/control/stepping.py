@@ -17,8 +17,6 @@ from ers_mj.errors import InputError
 from ers_mj.plants.reduced import ReducedModel
 from ers_mj.plants.sampled_reduced import SampledReduced
 
-MOST_LATE = 100_000  # samples of dead time, each of which is a number of the state
-
 
 class Stepper:
     """A reduced plant with its drive and its sensor.
@@ -35,10 +33,11 @@ class Stepper:
     def __init__(self, plant: ReducedModel, rate_hz: float, theta: float | None = None, omega: float = 0.0):
         if not 0 < rate_hz < np.inf:
             raise InputError(f"the sample rate is {rate_hz:g} Hz, more than zero was expected")
+        most = 100_000  # samples of dead time, each of which is a number of the state
         late = sum(BY_NAME[name].dead_time(p) + BY_NAME[name].remembers(p)[1] for name, p in plant.effects)
-        if late * rate_hz > MOST_LATE:
+        if late * rate_hz > most:
             raise InputError(
-                f"a dead time of {late:g} s is {late * rate_hz:.3g} samples at {rate_hz:g} Hz, {MOST_LATE} at most were"
+                f"a dead time of {late:g} s is {late * rate_hz:.3g} samples at {rate_hz:g} Hz, {most} at most were"
                 " expected"
             )
         theta = plant.coefficients.theta_0 if theta is None else theta
@@ -123,7 +122,8 @@ def system(plant: ReducedModel, rate_hz: float, names: tuple[str, str]) -> contr
     def update(t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
         stepper.state = rest + x
         stepper.step(float(np.ravel(u)[0]))
-        return stepper.state - rest
+        moved: np.ndarray = stepper.state - rest
+        return moved
 
     def output(t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
         stepper.state = rest + x

@@ -23,9 +23,9 @@ from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes
 from ers_mj.selection.budget import SEARCH, Budget, Search
-from ers_mj.selection.confirmation import confirmed
+from ers_mj.selection.confirmation import Confirmed, confirmed
 from ers_mj.selection.confounders import without_confounders
-from ers_mj.selection.stepwise import select
+from ers_mj.selection.stepwise import Selection, select
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import MOST_TAU, Model
 
@@ -87,28 +87,20 @@ def diagnose(
     if named is not selection:
         selection, judged = confirmed(start, named, held, jobs, policy)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
-    multibody: tuple[float | None, float | None] = None, None
-    if search.in_mujoco:
-        progress("running the MuJoCo plant", 0.84)
-        before = rig.rmse(judged.base_models, judged.parts, jobs)
-        multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
+    multibody = _in_mujoco(rig, selection, judged, jobs, progress) if search.in_mujoco else (None, None)
     progress("locating", 0.92)
-    case = Case(
-        recordings,
-        list(holdout),
-        datasheet,
-        start,
-        selection,
-        judged,
-        sensors,
-        suspects,
-        seed,
-        rig,
-        multibody,
-        policy,
-        search,
-    )
+    given = recordings, list(holdout), datasheet
+    case = Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search)
     return told(case, held)
+
+
+def _in_mujoco(
+    rig: Rig, selection: Selection, judged: Confirmed, jobs: int, progress: Progress
+) -> tuple[float | None, float | None]:
+    """The held-out errors of the MuJoCo plants before and after, the same where nothing is named."""
+    progress("running the MuJoCo plant", 0.84)
+    before = rig.rmse(judged.base_models, judged.parts, jobs)
+    return before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
 
 
 def _ordinary(model: Model, policy: Policy) -> list[str]:

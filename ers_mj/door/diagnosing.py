@@ -11,7 +11,7 @@ from ers_mj.door.model import Model
 from ers_mj.door.reading import Given, recordings_of
 from ers_mj.door.results import Progress, Result, Writers, parameter_rows, silent
 from ers_mj.door.saving import report_writers, write_text
-from ers_mj.door.together import refuse_mixed_units, refuse_twice
+from ers_mj.door.together import refuse_mixed_inputs, refuse_twice
 from ers_mj.errors import InputError
 from ers_mj.selection.budget import QUICK, SEARCH
 from ers_mj.servo.datasheet import write_model
@@ -130,7 +130,7 @@ def diagnose(
     if not trained:
         raise InputError("no recording was given, at least one was expected")
     refuse_twice(trained, held)
-    refuse_mixed_units([*trained, *held])
+    refuse_mixed_inputs([*trained, *held])
     found = pipeline.diagnose(
         trained,
         known(datasheet),
@@ -145,7 +145,8 @@ def diagnose(
 
 def input_table(excitation: dict[str, Any]) -> str:
     """The input to record next, as `ers simulate --input` takes it."""
+    from ers_mj.data.columns import input_name
     from ers_mj.data.excitation import signal
 
-    column = {"%": "u_duty_pct"}.get(excitation["input_unit"], f"u_{excitation['input_unit']}")
+    column = input_name(excitation["input_unit"])
     return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation), strict=True))]) + "\n"

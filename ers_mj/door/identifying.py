@@ -13,7 +13,7 @@ from ers_mj.door.model import Model
 from ers_mj.door.reading import Given, recordings_of
 from ers_mj.door.results import Progress, Result, Writers, parameter_rows, silent
 from ers_mj.door.saving import report_writers, versions
-from ers_mj.door.together import refuse_mixed_units, refuse_twice
+from ers_mj.door.together import refuse_mixed_inputs, refuse_twice
 from ers_mj.errors import InputError, refuse_other
 from ers_mj.identification import estimate
 from ers_mj.identification.answer import Identified
@@ -130,7 +130,7 @@ def identify(
     if not given:
         raise InputError("no recording was given, at least one was expected")
     refuse_twice(given, [])
-    refuse_mixed_units(given)
+    refuse_mixed_inputs(given)
     return Identification(estimate.identify(given, known(datasheet), settings, progress), given)
 
 
@@ -157,7 +157,9 @@ def _document(found: Identified, recordings: Sequence[Recording]) -> dict[str, A
             "sha256": [r.sha256 for r in recordings],
             "output_unit": recordings[0].output_unit,
             "input_unit": recordings[0].input_unit,
+            "input_kind": recordings[0].input_kind,
             "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems],
+            "faults": [fault.as_document(r.name) for r in recordings for fault in r.faults],
         },
         "seed": found.settings.seed,
         "versions": versions(),

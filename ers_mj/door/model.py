@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ers_mj.data.columns import COLUMNS, INPUTS, input_name
 from ers_mj.data.recording import Recording
 from ers_mj.door.known import Known, known
 from ers_mj.door.results import frame, framed
 from ers_mj.door.saving import make_room, plain
 from ers_mj.door.simulating import Simulation, Voltage, simulate
-from ers_mj.errors import InputError
+from ers_mj.errors import InputError, refuse_other
 from ers_mj.servo.datasheet import Datasheet, write_model
 from ers_mj.servo.simulation import build_plant, inertia_of
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from ers_mj.plants.mechanical import MechanicalPlant
     from ers_mj.plants.reduced import ReducedModel
 
-INPUT_NAMES = {"V": "u_V", "%": "u_duty_pct", "pct": "u_duty_pct"}
+INPUT_UNITS = ("%", *dict.fromkeys(COLUMNS[name].unit for name in INPUTS))
 OUTPUT_NAMES = {"rad": "theta_rad", "m": "x_m", "V": "y_sensor_V"}
 
 
@@ -41,12 +42,12 @@ class Model:
     Args:
         datasheet: a path (a datasheet or model.toml), "table1", a mapping laid out as the TOML, a datasheet, a model.
         output_unit: rad, m or V: the unit that Eq. (6)'s letters are in.
-        input_unit: V, or % of duty.
+        input_unit: V, % of duty, N m or A.
         inductance: whether the winding's time constant acts; by default where a diagnosis has found one, and not that
             of a bare datasheet.
 
     Raises:
-        InputError: the datasheet cannot be meant.
+        InputError: the datasheet cannot be meant, or there is no such unit.
 
     Example:
         >>> import ers_mj as ers
@@ -63,6 +64,8 @@ class Model:
         sheet = known(datasheet)
         if sheet is None:
             raise InputError("no datasheet was given, a path, a mapping, a datasheet or a model was expected")
+        refuse_other("output unit", output_unit, OUTPUT_NAMES)
+        refuse_other("input unit", input_unit, INPUT_UNITS)
         self._datasheet = sheet
         self.output_unit, self.input_unit = output_unit, input_unit
         self.inductance = sheet.baseline.get("tau_e", 0.0) > 0 if inductance is None else inductance
@@ -174,7 +177,7 @@ class Model:
     @property
     def signals(self) -> tuple[str, str]:
         """Names of input and output, with their units."""
-        return INPUT_NAMES[self.input_unit], OUTPUT_NAMES[self.output_unit]
+        return input_name(self.input_unit), OUTPUT_NAMES[self.output_unit]
 
     def to_control(
         self, theta: float | None = None, omega: float = 1.0, *, rate_hz: float | None = None, pade: int = 4

@@ -14,12 +14,16 @@ Given = Path | Recording  # what a job takes for one recording
 ALIASES = {"t": "t_s"}  # short names that from_arrays takes as well
 
 
-def read(path: Path, map: Mapping[str, str] | None = None) -> Recording:
+def read(
+    path: Path, map: Mapping[str, str] | None = None, *, input: str | None = None, second: str | None = None
+) -> Recording:
     """Read one recording.
 
     Args:
         path: a CSV or Parquet file, or "FILE.parquet#run=17" for one run of a file that holds several.
         map: contract name -> column of the file, where it uses names of its own.
+        input: the column that the servo is told, where several could be.
+        second: a column to explain beside the output, such as the duty beside a position command.
 
     Returns:
         The recording: arrays (N,), time in s, input and output in its `input_unit` and `output_unit`.
@@ -37,21 +41,29 @@ def read(path: Path, map: Mapping[str, str] | None = None) -> Recording:
 
     Source: the columns are those of `ers diagnose`, with their units as suffixes.
     """
-    return read_recording(path, map)
+    return read_recording(path, map, input_column=input, second=second)
 
 
 def from_arrays(
-    table: Any = None, /, *, map: Mapping[str, str] | None = None, name: str = "array", **columns: Any
+    table: Any = None,
+    /,
+    *,
+    map: Mapping[str, str] | None = None,
+    input: str | None = None,
+    second: str | None = None,
+    name: str = "array",
+    **columns: Any,
 ) -> Recording:
     """A recording from arrays, or from a data frame.
 
     Args:
         table: a data frame (pandas, polars) or a mapping of columns, if there is one.
         map: contract name -> column, where the table uses names of its own.
+        input, second: as `read` takes them.
         name: what the recording is called in results.
-        columns: arrays (N,) under the names that a file's columns have, unit and all: `t` or `t_s` [s], `u_V` or
-            `u_duty_pct`, `theta_rad`, `theta_deg`, `x_m` or `y_sensor_V`, and what else was recorded (`i_A`, `vin_V`,
-            `omega_rad_s`, ...). NaN where a sample is missing. They are copied.
+        columns: arrays (N,) under the names that a file's columns have, unit and all: `t` or `t_s` [s], `u_V`,
+            `u_duty_pct`, `tau_cmd_Nm`, `i_cmd_A` or a reference, `theta_rad`, `theta_deg`, `x_m` or `y_sensor_V`, and
+            what else was recorded (`i_A`, `vin_V`, `omega_rad_s`, ...). NaN where a sample is missing. They are copied.
 
     Returns:
         The recording, under the same checks that a file gets.
@@ -72,7 +84,7 @@ def from_arrays(
         if known in given:
             raise InputError(f"{name}: the column {known} is given twice, once was expected")
         given[known] = column
-    return from_columns(given, map, name)
+    return from_columns(given, map, name, input_column=input, second=second)
 
 
 def _labels(table: Any) -> Iterable[Any]:

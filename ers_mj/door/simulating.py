@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
-MOST_SAMPLES = 20_000_000
 Voltage = str | os.PathLike[str] | Recording | tuple[Any, Any]  # an input
 Effect = str | tuple[str, Mapping[str, float]]
 
@@ -142,14 +141,7 @@ def simulate(
 
     Source: Energies 2020, Eq. (5), or Eq. (1) with the inductance.
     """
-    for what, chosen, there in (
-        ("plant", options.get("plant", "reduced"), PLANTS),
-        ("linkage", options.get("linkage", "constant"), LINKAGES),
-        ("play", options.get("play", "gap"), PLAYS),
-    ):
-        refuse_other(what, chosen, there)
-    if not 0 <= noise < np.inf:
-        raise InputError(f"the noise is {noise:g} rad, zero or more was expected")
+    _refuse_options(options, noise)
     sheet = known(model) or Datasheet()
     added = [parse_effect(effect) if isinstance(effect, str) else effect for effect in effects]
     name, t, u = _signal(input, rate_hz, duration)
@@ -174,13 +166,21 @@ def simulate(
     return Simulation(columns["t_s"], columns["u_V"], theta, summary)
 
 
+def _refuse_options(options: PlantOptions, noise: float) -> None:
+    refuse_other("plant", options.get("plant", "reduced"), PLANTS)
+    refuse_other("linkage", options.get("linkage", "constant"), LINKAGES)
+    refuse_other("play", options.get("play", "gap"), PLAYS)
+    if not 0 <= noise < np.inf:
+        raise InputError(f"the noise is {noise:g} rad, zero or more was expected")
+
+
 def _signal(given: Voltage, rate_hz: float | None, duration: float | None) -> tuple[str, np.ndarray, np.ndarray]:
     """Name, times [s] and voltages [V] of an input."""
     if isinstance(given, str) and given in INPUTS:
-        rate, seconds = rate_hz or RATE_HZ, duration or DURATION
-        if not 2 <= rate * seconds <= MOST_SAMPLES:
+        rate, seconds, most = rate_hz or RATE_HZ, duration or DURATION, 20_000_000
+        if not 2 <= rate * seconds <= most:
             raise InputError(
-                f"{seconds:g} s at {rate:g} Hz are {rate * seconds:.3g} samples, 2 to {MOST_SAMPLES:.0e} were expected"
+                f"{seconds:g} s at {rate:g} Hz are {rate * seconds:.3g} samples, 2 to {most:.0e} were expected"
             )
         t = np.arange(round(rate * seconds)) / rate
         return given, t, INPUTS[given](t)

@@ -24,7 +24,6 @@ from ers_mj.errors import InputError
 from ers_mj.plants.reduced import ReducedModel
 
 ACTUATORS = ("motor", "dcmotor")
-PROBE = 1e6  # [input unit] beyond every drive's limit
 
 
 @dataclass(frozen=True)
@@ -135,9 +134,9 @@ def _actuator(plant: ReducedModel, c: Coefficients, J: float, joint: str, wound:
 
 def _clip(plant: ReducedModel) -> float | None:
     """The limit of a drive that does nothing but clip its input, None where there is none."""
-    u = np.concatenate([[-PROBE], np.linspace(-1.0, 1.0, 101), [PROBE]])
-    low, high = plant.terminal(u)[[0, -1]]
-    if high >= PROBE or low != -high:
+    beyond = 1e6  # [input unit] of every drive's limit
+    low, high = plant.terminal(np.array([-beyond, beyond]))
+    if high >= beyond or low != -high:
         return None
     u = np.linspace(-2.0 * high, 2.0 * high, 401)
     return float(high) if np.allclose(plant.terminal(u), np.clip(u, low, high), rtol=1e-9, atol=1e-12) else None
