@@ -145,7 +145,7 @@ class Model:
             The first reading [output unit].
 
         Raises:
-            InputError: a rate that cannot be, or a dead time of too many samples.
+            InputError: a rate that cannot be, or a dead time beyond what a loop keeps.
         """
         from ers_mj.control.stepping import Stepper
 
