@@ -186,6 +186,8 @@ def test_arrays_that_are_no_recording_are_refused(given, words):
         (lambda: ers.from_arrays(3), "a data frame or a mapping was expected"),
         (lambda: ers.load_model({"parameters": {"JJ": 1.0}}), "there is no key 'JJ'; did you mean J"),
         (lambda: ers.load_model("table1", output_unit="deg"), "there is no output unit 'deg'; there are rad, m, V"),
+        (lambda: ers.load_model(ers.Datasheet(parameters={"JJ": 1.0})), "there is no key 'JJ'"),
+        (lambda: ers.load_model(ers.Datasheet(lumped={"a_2": -1.0, "b": 1.0})), "negative a_2"),
         (lambda: ers.load_model(3), "a path, a mapping, a datasheet or a model was expected"),
         (lambda: ers.simulate(input="stepz"), "no input of that name"),
         (lambda: ers.simulate(plant="real"), "there is no plant 'real'; there are reduced, mujoco"),

@@ -27,7 +27,10 @@ def known(given: Known) -> Datasheet | None:
     Raises:
         InputError: it is none of these, or cannot be meant.
     """
-    if given is None or isinstance(given, Datasheet):
+    if given is None:
+        return None
+    if isinstance(given, Datasheet):
+        datasheet_of({"parameters": given.parameters, "lumped": given.lumped, "baseline": given.baseline}, given.name)
         return given
     if isinstance(given, str | os.PathLike):
         return read_datasheet(given)

@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -67,8 +67,9 @@ class Model:
         refuse_other("output unit", output_unit, OUTPUT_NAMES)
         refuse_other("input unit", input_unit, INPUT_UNITS)
         self._datasheet = sheet
-        self.output_unit, self.input_unit = output_unit, input_unit
-        self.inductance = sheet.baseline.get("tau_e", 0.0) > 0 if inductance is None else inductance
+        self.output_unit: Final = output_unit
+        self.input_unit: Final = input_unit
+        self.inductance: Final = sheet.baseline.get("tau_e", 0.0) > 0 if inductance is None else inductance
         self._loop: Stepper | None = None
 
     @property

@@ -196,7 +196,7 @@ def _effect(entry: object, path: Path) -> tuple[str, dict[str, float]]:
 
 def _numbers(table: object, where: str, known: Iterable[str] | None = None) -> dict[str, float]:
     """The finite numbers of a table, under known keys where any are given."""
-    if not isinstance(table, dict):
+    if not isinstance(table, Mapping):
         raise InputError(f"{where} is {_kind(table)}, a table was expected")
     if known is not None:
         _refuse_unknown(table, known, "key", where)
