@@ -140,7 +140,8 @@ class Model:
 
         Args:
             rate_hz: of its samples [Hz].
-            theta, omega: where the servo starts [output unit], [output unit/s]; at rest at theta_0 by default.
+            theta: where the servo starts [output unit]; theta_0 by default.
+            omega: its speed there [output unit/s].
 
         Returns:
             The first reading [output unit].
@@ -189,7 +190,8 @@ class Model:
         with their slopes (`losses("control")` says what does not).
 
         Args:
-            theta, omega: the point [output unit], [output unit/s]; theta_0 and 1 by default.
+            theta: the point [output unit]; theta_0 by default.
+            omega: its speed [output unit/s].
             rate_hz: of a loop: the plant from sample to sample, dead times exact. None: continuous.
             pade: order of the approximations that stand for dead times in continuous time.
 
@@ -372,7 +374,8 @@ def load_model(path: Known, output_unit: str = "rad", input_unit: str = "V") -> 
 
     Args:
         path: the file; "table1" is the paper's servo.
-        output_unit, input_unit: of the servo, which the file does not tell: rad, m or V; V or %.
+        output_unit: of the servo, which the file does not tell: rad, m or V.
+        input_unit: as well: V or %.
 
     Raises:
         InputError: the file cannot be meant, in one sentence.

@@ -59,7 +59,8 @@ def from_arrays(
     Args:
         table: a data frame (pandas, polars) or a mapping of columns, if there is one.
         map: contract name -> column, where the table uses names of its own.
-        input, second: as `read` takes them.
+        input: as `read` takes it.
+        second: as `read` takes it.
         name: what the recording is called in results.
         columns: arrays (N,) under the names that a file's columns have, unit and all: `t` or `t_s` [s], `u_V`,
             `u_duty_pct`, `tau_cmd_Nm`, `i_cmd_A` or a reference, `theta_rad`, `theta_deg`, `x_m` or `y_sensor_V`, and

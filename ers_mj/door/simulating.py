@@ -127,7 +127,8 @@ def simulate(
         effects: further ones, (name, {parameter: value}) in SI, or as the command line has them: "stribeck:dF_s=0.1".
         noise: standard deviation of the sensor's noise [rad].
         seed: of the noise.
-        rate_hz, duration: of a named input [Hz], [s]; 1000 and 10 by default.
+        rate_hz: of a named input [Hz]; 1000 by default.
+        duration: of a named input [s]; 10 by default.
         options: plant="reduced", gap=0.0 [rad], linkage="constant", play="gap", inductance=False: the command's
             defaults. A model's own `simulate` runs it as it was identified.
 
