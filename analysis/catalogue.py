@@ -55,13 +55,13 @@ def entry(effect: Effect) -> str:
         [
             f"### {effect.name}\n",
             f"{' '.join(source.__doc__.split())}\n",
-            f"Law: {_linked(' '.join(inspect.getdoc(type(effect)).split()))}\n",
+            f"**Law.** {_linked(' '.join(inspect.getdoc(type(effect)).split()))}\n",
             "| parameter | unit | meaning |",
             "|---|---|---|",
             *rows,
             "",
-            f"In MuJoCo: {effect.mjcf.replace('none: ', 'no element; ')}.\n",
-            f"Told apart: {_linked(effect.apart)}.\n",
+            f"**In MuJoCo.** {effect.mjcf.replace('none: ', 'no element; ')}.\n",
+            f"**Told apart.** {_linked(effect.apart)}.\n",
         ]
     )
 

@@ -49,7 +49,7 @@ class Model:
     Raises:
         InputError: the datasheet cannot be meant, or there is no such unit.
 
-    Example:
+    Examples:
         >>> import ers_mj as ers
         >>> model = ers.load_model("table1")
         >>> model.to_control().input_labels, model.to_control().output_labels
@@ -160,7 +160,7 @@ class Model:
         Returns:
             The reading at its end [output unit], which is what a controller has for its next u.
 
-        Example:
+        Examples:
             >>> import ers_mj as ers
             >>> model = ers.load_model("table1")
             >>> theta = model.reset(rate_hz=1000.0)
@@ -225,7 +225,7 @@ class Model:
         Args:
             rate_hz: of its samples [Hz].
 
-        Example:
+        Examples:
             >>> import control, numpy as np, ers_mj as ers
             >>> servo = ers.load_model("table1").to_nonlinear(rate_hz=500.0)
             >>> t = np.arange(50) / 500.0
@@ -270,7 +270,7 @@ class Model:
         Raises:
             InputError: the inertia is not known, or what was given cannot be.
 
-        Example:
+        Examples:
             >>> import ers_mj as ers
             >>> lines = ers.load_model("table1").joint_lines("elbow")
             >>> lines.joint["armature"], lines.actuator["gear"]
@@ -380,7 +380,7 @@ def load_model(path: Known, output_unit: str = "rad", input_unit: str = "V") -> 
     Raises:
         InputError: the file cannot be meant, in one sentence.
 
-    Example:
+    Examples:
         >>> import ers_mj as ers
         >>> ers.load_model("table1")
         <Model table1: no effect, V to rad>

@@ -31,7 +31,7 @@ def read(
     Raises:
         InputError: the file cannot be read or used, in one sentence.
 
-    Example:
+    Examples:
         >>> import tempfile, pathlib
         >>> import ers_mj as ers
         >>> file = pathlib.Path(tempfile.mkdtemp()) / "run.csv"
@@ -72,7 +72,7 @@ def from_arrays(
     Raises:
         InputError: the columns cannot be used, in one sentence.
 
-    Example:
+    Examples:
         >>> import numpy as np
         >>> import ers_mj as ers
         >>> t = np.arange(500) / 100.0

@@ -135,7 +135,7 @@ def simulate(
     Raises:
         InputError: what was given cannot be simulated, in one sentence.
 
-    Example:
+    Examples:
         >>> import ers_mj as ers
         >>> ers.simulate("table1", "steps", duration=2.0, rate_hz=500.0, effects=["bias_torque:tau_0=0.1"])
         <Simulation steps: 1000 samples over 1.998 s, -3.0 to 74.7 deg, reduced plant>
