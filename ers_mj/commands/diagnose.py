@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import add_common, add_map, add_out, add_recordings, mapping, results_folder
-from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, write_results, write_text
+from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, today, write_results, write_text
 from ers_mj.commands.recordings import refuse_mixed_units, refuse_twice
 
 if TYPE_CHECKING:
@@ -71,28 +71,27 @@ def diagnose_and_tell(
             recordings, datasheet, holdout, seed=arguments.seed, jobs=arguments.jobs, progress=progress
         )
         document = plain(found.document)
-        files = _write(folder, document, found, progress) if folder is not None else []
+        files = _write(folder, document, found, progress, arguments) if folder is not None else []
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
     return 0
 
 
-def _write(folder: Path, document: dict, found: Diagnosis, progress: Progress) -> list[Path]:
-    from ers_mj.report.diagnosis_report import report_page
+def _write(
+    folder: Path, document: dict, found: Diagnosis, progress: Progress, arguments: argparse.Namespace
+) -> list[Path]:
+    from ers_mj.report.diagnosis_report import NEXT_INPUT, Made, report_page
     from ers_mj.servo.datasheet import write_model
     from ers_mj.view.frames import frames_of
 
     progress("drawing the report", 1.0)
-    page = report_page(document, found.evidence, frames_of(found.plant, found.evidence))
     following = (document.get("next_recording") or {}).get("excitation")
-    return write_results(
-        folder,
-        report_writers("diagnosis.json", document, page)
-        | {
-            "model.toml": lambda path: write_model(path, found.model),
-            "plant.xml": lambda path: write_text(path, found.plant.xml()),
-        }
-        | ({"next_recording.csv": lambda path: write_text(path, input_table(following))} if following else {}),
-    )
+    beside = {
+        "model.toml": lambda path: write_model(path, found.model),
+        "plant.xml": lambda path: write_text(path, found.plant.xml()),
+    } | ({NEXT_INPUT: lambda path: write_text(path, input_table(following))} if following else {})
+    made = Made(getattr(arguments, "told", ""), today(), ("diagnosis.json", *beside))
+    page = report_page(document, found.evidence, frames_of(found.plant, found.evidence), made)
+    return write_results(folder, report_writers("diagnosis.json", document, page) | beside)
 
 
 def input_table(excitation: dict) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from ers_mj.diagnosis.mismatch_spectrum import Mismatch
 class RecordView:
     """One recording beside its free runs, each (N,): t [s], u, and outputs in output units, NaN where missing.
 
-    ``shaded`` are the spans of time [s] in which the located mismatch lives.
+    ``shaded`` are the spans of time [s] in which the located mismatch lives. ``without`` are the free runs of the model
+    after with one named effect taken out of it and nothing refitted, by the effect's name.
     """
 
     name: str
@@ -24,6 +26,7 @@ class RecordView:
     before: np.ndarray
     after: np.ndarray
     shaded: tuple[tuple[float, float], ...] = ()
+    without: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
