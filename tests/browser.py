@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import json
-import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -15,6 +15,7 @@ QUIET = (
     " --disable-component-update --disable-sync --disable-dev-shm-usage --hide-scrollbars --mute-audio"
     " --remote-debugging-pipe"
 ).split()
+PIPED = 'exec "$@" 3<&0 4>&1 0</dev/null 1>/dev/null'  # Chromium reads the protocol from 3 and answers at 4
 
 
 class Browser:
@@ -26,21 +27,13 @@ class Browser:
     def __init__(self, profile: Path):
         self.said: list[str] = []
         self._serial, self._waiting, self._buffer = 0, [], b""
-        theirs, self._to = os.pipe()
-        self._from, back = os.pipe()
-
-        def places() -> None:  # Chromium reads from 3 and writes to 4
-            ends = os.dup(theirs), os.dup(back)  # copies, in case that either lies at 3 or 4 already
-            for wanted, end in zip((3, 4), ends):
-                os.dup2(end, wanted)
-
         self._process = subprocess.Popen(
-            [CHROMIUM or "chromium", *QUIET, f"--user-data-dir={profile}", "about:blank"],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            preexec_fn=places, close_fds=False,
-        )  # fmt: skip
-        os.close(theirs)
-        os.close(back)
+            ["sh", "-c", PIPED, "sh", CHROMIUM or "chromium", *QUIET, f"--user-data-dir={profile}", "about:blank"],
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
         target = next(t for t in self._call("Target.getTargets")["targetInfos"] if t["type"] == "page")
         self._session = self._call("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
@@ -50,13 +43,11 @@ class Browser:
         return self
 
     def __exit__(self, *_: object) -> None:
-        try:
+        with contextlib.suppress(OSError, EOFError):
             self._call("Browser.close")
-        except (OSError, EOFError):
-            pass
         self._process.wait(20)
-        os.close(self._to)
-        os.close(self._from)
+        for pipe in (self._process.stdin, self._process.stdout):
+            pipe.close()
 
     # -- what a reader does ----------------------------------------------------------------------------------------
 
@@ -118,7 +109,8 @@ class Browser:
     def _call(self, method: str, session: str | None = None, **parameters) -> dict:
         self._serial += 1
         message = {"id": self._serial, "method": method, "params": parameters}
-        os.write(self._to, json.dumps(message | ({"sessionId": session} if session else {})).encode() + b"\0")
+        text = json.dumps(message | ({"sessionId": session} if session else {}))
+        self._process.stdin.write(text.encode() + b"\0")
         while (got := self._next()).get("id") != message["id"]:
             self._waiting.append(got.get("method"))
         if "error" in got:
@@ -132,7 +124,7 @@ class Browser:
 
     def _next(self) -> dict:
         while b"\0" not in self._buffer:
-            if not (read := os.read(self._from, 1 << 20)):
+            if not (read := self._process.stdout.read(1 << 20)):
                 raise EOFError("Chromium has ended")
             self._buffer += read
         line, _, self._buffer = self._buffer.partition(b"\0")

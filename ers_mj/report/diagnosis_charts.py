@@ -86,10 +86,10 @@ def _input(t: np.ndarray, u: np.ndarray) -> dict:
 def switched(view: RecordView, effects: Sequence[str], unit: Unit) -> dict[str, str]:
     """A sentence for each place of the switches: all effects on, one off, all off."""
     error = {name: _rms(view, x) for name, x in {"": view.after, "before": view.before, **view.without}.items()}
-    told = f"rms error on {view.name}: {unit(error[''])}"
+    told, before = f"rms error on {view.name}: {unit(error[''])}", unit(error["before"])
     out = {
         "none": f"The curve “after” has all named effects in it; {told}.",
-        "all": f"Without any named effect, refitted, which is “before”; {told} with them, {unit(error['before'])} without.",
+        "all": f"Without any named effect, refitted, which is “before”; {told} with them, {before} without.",
     }
     for k, name in enumerate(effects):
         without = unit(error[name]) if name in error else "not at work there"
@@ -109,6 +109,7 @@ def _rms(view: RecordView, x: np.ndarray) -> float:
 
 def residual_map(residuals: ResidualMap, evidence: Evidence) -> dict:
     """Rms residual over (angle, speed), before and after on one scale of colour."""
+    residuals = _known(residuals)
     angle = shown(evidence.output_unit, largest(residuals.angle_edges))
     speed = Unit("mm/s", 1e3) if angle.label == "mm" else shown(f"{evidence.output_unit}/s")
     size = shown(evidence.output_unit, largest(residuals.rms_before))
@@ -127,6 +128,20 @@ def residual_map(residuals: ResidualMap, evidence: Evidence) -> dict:
         "before": packed(before.ravel()),
         "after": packed(after.ravel()),
     }
+
+
+def _known(residuals: ResidualMap) -> ResidualMap:
+    """The part of the map in which some bin holds data."""
+    known = np.isfinite(residuals.rms_before) | np.isfinite(residuals.rms_after)
+    if not known.any():
+        return residuals
+    (a, b), (c, d) = ((k[0], k[-1] + 1) for k in (np.flatnonzero(known.any(axis=axis)) for axis in (1, 0)))
+    return ResidualMap(
+        residuals.angle_edges[a : b + 1],
+        residuals.speed_edges[c : d + 1],
+        residuals.rms_before[a:b, c:d],
+        residuals.rms_after[a:b, c:d],
+    )
 
 
 # -- the error over frequency --------------------------------------------------------------------------------------
@@ -176,24 +191,25 @@ def spectrum(found: Mismatch, evidence: Evidence) -> dict:
 # -- the ladder of candidates --------------------------------------------------------------------------------------
 
 
-def ladder(rungs: Sequence[Rung], evidence: Evidence, baseline: float | None) -> dict:
-    """What each candidate scores on held-out data (or gains on the training data, where nothing is held out)."""
-    held_out = any(rung.heldout_rmse is not None for rung in rungs)
-    scores = [rung.heldout_rmse if held_out else rung.gain for rung in rungs[:MOST_RUNGS]]
-    unit = shown(evidence.output_unit, max((x for x in scores if x), default=None)) if held_out else Unit("")
-    name = f"held-out error [{unit.label}]" if held_out else "gain in block cost on the training recordings"
+def ladder(rungs: Sequence[Rung], evidence: Evidence) -> dict:
+    """What each candidate takes off the training cost of the baseline, and its held-out error where it was scored;
+    once, where several rounds compared it.
+    """
+    once: dict[str, Rung] = {}
+    for rung in rungs:
+        once.setdefault(rung_name(rung), rung)
+    unit = shown(evidence.output_unit, max((rung.heldout_rmse or 0.0 for rung in rungs), default=0.0) or None)
     return {
         "kind": "ladder",
-        "name": name,
-        "start": (baseline or 0.0) * unit.factor if held_out else 0.0,
-        "noise": _finite(evidence.noise * unit.factor) if held_out else None,
+        "name": "taken off the cost of the training recordings",
         "rungs": [
             {
-                "name": rung_name(rung),
+                "name": name,
                 "chosen": rung.chosen,
-                "score": None if x is None else _finite(x * unit.factor),
+                "gain": _finite(rung.gain),
+                "scored": "" if rung.heldout_rmse is None else f"held out {unit(rung.heldout_rmse)}",
             }
-            for rung, x in zip(rungs, scores)
+            for name, rung in list(once.items())[:MOST_RUNGS]
         ],
     }
 

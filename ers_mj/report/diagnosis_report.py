@@ -77,9 +77,7 @@ def _chart_data(document: Mapping, evidence: Evidence) -> dict:
     if _has_spectrum(document, evidence):
         out["spectrum"] = diagnosis_charts.spectrum(evidence.spectrum, evidence)
     if evidence.ladder:
-        baseline = next((r.heldout_rmse for r in evidence.ladder if not r.effects), None)
-        baseline = (document.get("fit") or {}).get("heldout_rmse_before_rad") if baseline is None else baseline
-        out["ladder"] = diagnosis_charts.ladder(evidence.ladder, evidence, baseline)
+        out["ladder"] = diagnosis_charts.ladder(evidence.ladder, evidence)
     switched = diagnosis_charts.switched(records[0], effects, _error_unit(document, evidence)) if effects else {}
     return {"charts": out, "switched": switched}
 
@@ -175,7 +173,7 @@ def _switches(evidence: Evidence, records: list[RecordView]) -> str:
     several = ", one at a time or all together" if len(effects) > 1 else ""
     return (
         f'<fieldset id="switches" hidden><legend>Switch an effect off in “after”{several}</legend>'
-        f'{"".join(boxes)}<output></output></fieldset>'
+        f"{''.join(boxes)}<output></output></fieldset>"
     )
 
 
@@ -187,8 +185,8 @@ def _frames(frames: Frames | None) -> str:
     if frames.why_not:
         return page.section(title, "", f'<p class="note">No frames are shown: {page.text(frames.why_not)}.</p>')
     lead = (
-        f"{page.text(frames.name)} on the plant in three dimensions, when the model before is furthest off. Solid is the"
-        f" simulated {frames.rig}, translucent amber the measured one."
+        f"{page.text(frames.name)} on the plant in three dimensions, when the model before is furthest off. Solid is"
+        f" the simulated {frames.rig}, translucent amber the measured one."
     )
     if frames.enlarged > 1:
         lead += f" The difference between them is drawn {frames.enlarged} times as large as it is."
@@ -215,8 +213,8 @@ def _where(document: Mapping, evidence: Evidence) -> str:
     drawn = charts.place(
         "spectrum",
         "the error over frequency, and measured over simulated motion",
-        "The error of an observer that forgets within 33 ms. Linear is what a linear filter of input and motion explains"
-        " of it; no such filter explains a distortion. Measured over simulated motion only where both cohere.",
+        "The error of an observer that forgets within 33 ms. Linear is what a linear filter of input and motion"
+        " explains of it; no such filter explains a distortion. Measured over simulated motion only where both cohere.",
     )
     return page.section("Where it fails", lead, places + drawn)
 

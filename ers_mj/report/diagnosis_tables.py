@@ -28,7 +28,9 @@ def candidates(evidence: Evidence, unit: Unit) -> str:
     """The section of everything that was tried, as a figure and as a table, errors in this unit."""
     if not evidence.ladder:
         return ""
-    drawn = charts.place("ladder", "the candidates and their errors; the same stands in the table below")
+    drawn = charts.place(
+        "ladder", "the candidates and what each takes off the cost; the same stands in the table below"
+    )
     heads = ["candidate", f">held-out error [{page.text(unit.label)}]", ">gain", ">z", ">numbers", "note"]
     table = page.table(heads, [(_rung(rung, unit), "chosen" if rung.chosen else "") for rung in evidence.ladder])
     if len(evidence.ladder) > MOST_RUNGS:

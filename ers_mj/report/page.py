@@ -93,14 +93,19 @@ def table(heads: Sequence[str], rows: Iterable[Row]) -> str:
     """A table in its own scrolling box; heads that begin with > stand on the right, as their cells do. On a phone each
     row stands for itself, its cells under their heads.
     """
-    mark = [' class="n"' if head.startswith(">") else "" for head in heads]
+    right = ["n" if head.startswith(">") else "" for head in heads]
     names = [head.lstrip(">") for head in heads]
-    head = "".join(f"<th{m}>{name}</th>" if name else f"<td{m}></td>" for name, m in zip(names, mark, strict=True))
-    labels = [f' data-label="{name}"' if name else "" for name in names]
+    head = "".join(
+        f'<th class="{side}">{name}</th>' if name else "<td></td>" for name, side in zip(names, right, strict=True)
+    )
+
+    def one(cell: str, name: str, side: str) -> str:
+        kind = f"{side} none" if cell == NONE else side
+        label = f' data-label="{name}"' if name else ""
+        return f'<td class="{kind}"{label}>{cell}</td>'
+
     lines = [
-        f'<tr class="{kind}">'
-        + "".join(f"<td{m}{label}>{cell}</td>" for cell, m, label in zip(cells, mark, labels, strict=True))
-        + "</tr>"
+        f'<tr class="{kind}">{"".join(one(*cell) for cell in zip(cells, names, right, strict=True))}</tr>'
         for cells, kind in rows
     ]
     body = "\n".join(lines)

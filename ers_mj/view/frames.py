@@ -111,7 +111,7 @@ def _drawn(plant: MechanicalPlant, view: RecordView, chosen: np.ndarray, enlarge
     shown = np.concatenate([measured + enlarged * (x - measured) for x in (before, after)])
     unit = "rad" if plant.is_angle else "m"
     film = posed(plant, np.concatenate([t, t]), shown, output_unit=unit)
-    with Painter(film.model, *CHOICE.size) as painter:
+    with Painter(film.model, *CHOICE.size, plain=True) as painter:
         pictures = [
             jpeg_bytes(painter.draw(qpos, y))
             for qpos, y in zip(film.qpos, np.concatenate([measured, measured]), strict=True)

@@ -97,7 +97,7 @@ function logarithmic([low, high], from, to) {
   scale.back = pixel => 10 ** inner.back(pixel);
   scale.ticks = most => {
     const decades = Math.log10(high / low), out = [];
-    const parts = decades * 3 <= most ? [1, 2, 5] : [1];
+    const parts = decades * 2 <= most ? [1, 2, 5] : [1];
     const every = Math.max(1, Math.ceil(decades / most));
     for (let d = Math.floor(Math.log10(low)); d <= Math.log10(high); d += every) {
       for (const n of parts) if (n * 10 ** d >= low && n * 10 ** d <= high) out.push(n * 10 ** d);
@@ -109,7 +109,7 @@ function logarithmic([low, high], from, to) {
 
 // Grid, numbers and names of one panel; box is {x, y, w, h} in pixels. The name of the vertical axis lies above it.
 function axes(svg, box, x, y, names) {
-  for (const v of y.ticks(Math.max(2, Math.floor(box.h / 36)))) {
+  for (const v of y.ticks(Math.max(3, Math.floor(box.h / 36)))) {
     make("line", { class: "grid", x1: box.x, x2: box.x + box.w, y1: y(v), y2: y(v) }, svg);
     make("text", { class: "number end", x: box.x - 6, y: y(v) + 4 }, svg, told(v));
   }

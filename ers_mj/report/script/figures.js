@@ -144,28 +144,24 @@ class Spectrum extends Chart {
 // -- the ladder of candidates --------------------------------------------------------------------------------------
 
 class Ladder extends Chart {
-  entries() { return this.data.noise ? [["rule-before", "before"], ["rule-noise", "noise floor"]] : [["rule-before", "before"]]; }
+  entries() { return []; }
 
   paint() {
-    const { rungs, start, noise, name } = this.data, beside = this.width >= WIDE;
-    const left = beside ? Math.min(290, this.width * 0.36) : 12, row = beside ? 27 : 42;
-    const box = { x: left, y: 8, w: this.width - left - 66, h: rungs.length * row };
-    const svg = this.sheet(box.h + 56), scores = rungs.map(rung => rung.score ?? start);
-    const top = Math.max(start, noise || 0, ...scores), low = Math.min(0, ...scores);
-    const x = linear([low, top > low ? top : low + 1], box.x, box.x + box.w);
+    const { rungs, name } = this.data, beside = this.width >= WIDE;
+    const left = beside ? Math.min(290, this.width * 0.36) : 6, row = beside ? 27 : 42;
+    const box = { x: left, y: 4, w: this.width - left - (beside ? 190 : 150), h: rungs.length * row };
+    const svg = this.sheet(box.h + 56), gains = rungs.map(({ gain }) => gain ?? 0);
+    const x = linear([Math.min(0, ...gains), Math.max(...gains) > 0 ? Math.max(...gains) : 1], box.x, box.x + box.w);
     axes(svg, box, x, Object.assign(() => 0, { ticks: () => [] }), { y: "", x: name });
-    for (const [at, kind] of [[start, "before"], [noise, "noise-line"]]) {
-      if (at !== null) make("line", { class: `rule ${kind}`, x1: x(at), x2: x(at), y1: box.y, y2: box.y + box.h }, svg);
-    }
     rungs.forEach((rung, k) => {
       const y = box.y + row * (k + (beside ? 0.5 : 0.72)), kind = rung.chosen ? "chosen" : "other";
       make("text", beside ? { class: `rung end ${kind}`, x: left - 10, y: y + 4 }
         : { class: `rung ${kind}`, x: left, y: y - 9 }, svg, shortened(rung.name, (beside ? left : this.width) / 7));
-      if (rung.score === null) return make("text", { class: "number", x: x(start) + 6, y: y + 4 }, svg, "not scored");
-      make("line", { class: `bar-line ${kind}`, x1: x(start), x2: x(rung.score), y1: y, y2: y }, svg);
-      make("circle", { class: `end-dot ${kind}`, cx: x(rung.score), cy: y, r: rung.chosen ? 5 : 3.5 }, svg);
-      return make("text", { class: `number ${kind}`, x: Math.max(x(rung.score), x(start)) + 9, y: y + 4 }, svg,
-        told(rung.score, 3));
+      const end = x(rung.gain ?? 0), words = [rung.gain === null ? "not fitted" : told(rung.gain, 3), rung.scored];
+      make("line", { class: `bar-line ${kind}`, x1: x(0), x2: end, y1: y, y2: y }, svg);
+      make("circle", { class: `end-dot ${kind}`, cx: end, cy: y, r: rung.chosen ? 5 : 3.5 }, svg);
+      make("text", { class: `number ${kind}`, x: Math.max(end, x(0)) + 10, y: y + 4 }, svg,
+        words.filter(Boolean).join(" · "));
     });
   }
 }
