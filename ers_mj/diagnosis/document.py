@@ -303,7 +303,9 @@ def _data(case: Case) -> dict:
         "sha256": [r.sha256 for r in every],
         "output_unit": case.output_unit,
         "input_unit": case.input_unit,
+        "input_kind": case.recordings[0].input_kind,
         "problems": problems,
+        "faults": [fault.as_document(r.name) for r in every for fault in r.faults],
     }
 
 
