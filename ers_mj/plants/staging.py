@@ -7,12 +7,14 @@ from __future__ import annotations
 import math
 
 import mujoco
+import numpy as np
 
 from ers_mj.plants.mjcf import read_mjcf
 
 PREFIX = "stage_"
 MASS = "imbalance"  # body off the shaft on which gravity pulls, written by its effect
 CAMERAS = (f"{PREFIX}side", "side")  # put here, or the model's own
+ARM_FLOOR = -0.09  # [m] by which the floor lies lower under an arm, which may hang down
 REACH = 0.11  # [m] to either side of the shaft: what the camera of scene.xml sees, with room for a carriage
 STOP_RADIUS, STOP_OFFSET = 0.0328, 0.027  # [m] of the levers' stop about the shaft, and along it
 STEEL, WHITE, BLUE, RED = (0.45, 0.47, 0.50, 1), (0.82, 0.83, 0.82, 1), (0.17, 0.38, 0.68, 1), (0.80, 0.18, 0.14, 1)
@@ -110,11 +112,15 @@ def _shape_arm(spec: mujoco.MjSpec) -> None:
     length = math.hypot(x, z)
     x, z = (x / length, z / length) if length > 0 else (1.0, 0.0)
     turned = [math.cos(0.5 * math.atan2(-z, x)), 0.0, math.sin(0.5 * math.atan2(-z, x)), 0.0]  # x onto the arm
+    for floor in spec.geoms:
+        if floor.type == mujoco.mjtGeom.mjGEOM_PLANE:
+            floor.pos = floor.pos + np.array([0.0, 0.0, ARM_FLOOR])
     rudder = _bare(spec, "rudder")
-    _add(spec.worldbody, box, (0.022, 0.018, 0.012), (0, 0.018, 0), BLUE)
-    _add(rudder, rod, (0.006, 0.026, 0), (0, 0.026, 0), STEEL, along)
-    _add(rudder, box, (0.055, 0.005, 0.007), (0.055 * x, 0.050, 0.055 * z), WHITE, turned)
-    _add(rudder, rod, (0.017, 0.012, 0), (0.11 * x, 0.050, 0.11 * z), RED, along)
+    _add(spec.worldbody, box, (0.024, 0.020, 0.014), (0, 0.034, 0), BLUE)
+    _add(spec.worldbody, box, (0.010, 0.010, 0.065), (0, 0.034, -0.078), WHITE)
+    _add(rudder, rod, (0.006, 0.016, 0), (0, 0.002, 0), STEEL, along)
+    _add(rudder, box, (0.046, 0.004, 0.006), (0.040 * x, -0.010, 0.040 * z), WHITE, turned)
+    _add(rudder, rod, (0.015, 0.010, 0), (0.086 * x, -0.010, 0.086 * z), RED, along)
 
 
 def _shape_slide(spec: mujoco.MjSpec, scale: float) -> None:

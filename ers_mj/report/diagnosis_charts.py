@@ -12,7 +12,7 @@ import numpy as np
 from ers_mj.diagnosis.evidence import Evidence, RecordView, ResidualMap, Rung
 from ers_mj.diagnosis.mismatch_spectrum import Mismatch
 from ers_mj.report.charts import packed
-from ers_mj.report.display import Unit, noun, pretty, shown
+from ers_mj.report.display import Unit, noun, shown
 from ers_mj.report.thinning import decimate, largest, merged, worst_span
 
 MOST_RUNGS = 16  # candidates in the ladder
@@ -33,7 +33,8 @@ def trace(view: RecordView, evidence: Evidence, effects: Sequence[str]) -> dict:
     if worst is not None and n > POINTS:
         spans.append(slice(*np.searchsorted(view.t, worst)))
     closest = float(view.t[-1] - view.t[0]) * COARSEST if n else 0.0
-    input_unit = pretty(evidence.input_unit)
+    given = shown(evidence.input_unit, largest(view.u))
+    called = "input" if evidence.input_unit not in ("rad", "m") else "position command"
     return {
         "kind": "trace",
         "output": {"name": f"{noun(evidence.output_unit)} [{unit.label}]", "unit": unit.label},
@@ -42,15 +43,18 @@ def trace(view: RecordView, evidence: Evidence, effects: Sequence[str]) -> dict:
             "unit": fine.label,
             "band": _finite(2 * evidence.noise * fine.factor),
         },
-        "input": {"name": f"input [{input_unit}]", "unit": input_unit},
+        "input": {"name": f"{called} [{given.label}]", "unit": given.label},
         "shaded": [[begin, max(end, begin + closest)] for begin, end in merged(view.shaded, closest)],
         "worst": worst,
-        "levels": [_level(view, effects, span, unit, fine) for span in spans],
+        "levels": [_level(view, effects, span, (unit, fine, given)) for span in spans],
     }
 
 
-def _level(view: RecordView, effects: Sequence[str], span: slice, unit: Unit, fine: Unit) -> dict:
-    """The samples of a span, thinned; runs that leave all bounds are cut where no chart would show them."""
+def _level(view: RecordView, effects: Sequence[str], span: slice, units: tuple[Unit, Unit, Unit]) -> dict:
+    """The samples of a span, thinned, in the units of output, residual and input; runs that leave all bounds are cut
+    where no chart would show them.
+    """
+    unit, fine, given = units
     t, measured = view.t[span], view.measured[span]
     runs = {"before": view.before[span], "after": view.after[span]}
     out = {name: view.without[name][span] for name in effects if name in view.without}
@@ -70,7 +74,7 @@ def _level(view: RecordView, effects: Sequence[str], span: slice, unit: Unit, fi
         "measured": drawn(measured, unit.factor),
         "output": each(lambda x: x, unit.factor),
         "residual": each(lambda x: measured - x, fine.factor),
-        "u": _input(t, view.u[span]),
+        "u": _input(t, view.u[span] * given.factor),
     }
 
 
