@@ -40,8 +40,8 @@ def evidence(unit="rad") -> Evidence:
     rms[0] = np.nan
     rungs = (
         Rung((), 0.0, 0.0, 0.05, False, "", 6),
-        Rung(("stribeck",), 30.0, 5.0, 0.01, True, NASTY, 3),
-        Rung(("backlash", "end_stop"), 2.0, 0.3, None, False, "did not converge", 6),
+        Rung(("stribeck",), 30.0, 5.0, 0.01, True, NASTY, 3, 30.0),
+        Rung(("backlash", "end_stop"), 2.0, 0.3, None, False, "did not converge", 6, 12.0),
     )
     maps = ResidualMap(np.linspace(-1, 1, 7), np.linspace(-2, 2, 5), rms, 0.1 * rms)
     return Evidence((view(), view("held.csv", True)), rungs, maps, 1e-3, unit, "V")

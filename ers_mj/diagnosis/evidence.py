@@ -28,10 +28,19 @@ class RecordView:
     shaded: tuple[tuple[float, float], ...] = ()
     without: Mapping[str, np.ndarray] = field(default_factory=dict)
 
+    @property
+    def error_before(self) -> float:
+        """Root mean square of what the model before leaves [output unit], 0 where nothing was measured."""
+        error = self.measured - self.before
+        known = error[np.isfinite(error)]
+        return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
+
 
 @dataclass(frozen=True)
 class Rung:
-    """One candidate: what it gains in block cost over the baseline, how surely, and what it scores on held-out data."""
+    """One candidate: what it gains in block cost over what its round began with, how surely, what it scores on held-out
+    data, and ``total``, what it takes off the baseline's block cost.
+    """
 
     effects: tuple[str, ...]
     gain: float
@@ -40,6 +49,7 @@ class Rung:
     chosen: bool
     note: str
     parameters: int
+    total: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,3 +77,8 @@ class Evidence:
     output_unit: str
     input_unit: str
     spectrum: Mismatch | None = None
+
+    @property
+    def told(self) -> list[RecordView]:
+        """The recordings as a reader meets them: held-out ones first, among them where the model before does worst."""
+        return sorted(self.records, key=lambda view: (not view.held_out, -view.error_before))

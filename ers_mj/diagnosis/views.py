@@ -56,4 +56,5 @@ def ladder(case: Case) -> Iterator[Rung]:
                 chosen,
                 "" if candidate.name in BY_NAME else "differs between recordings",
                 candidate.fit.size,
+                case.start.fit.cost - candidate.fit.cost,
             )

@@ -205,12 +205,12 @@ def ladder(rungs: Sequence[Rung], evidence: Evidence) -> dict:
     unit = shown(evidence.output_unit, max((rung.heldout_rmse or 0.0 for rung in rungs), default=0.0) or None)
     return {
         "kind": "ladder",
-        "name": "taken off the cost of the training recordings",
+        "name": "taken off the baseline’s cost of the training recordings",
         "rungs": [
             {
                 "name": name,
                 "chosen": rung.chosen,
-                "gain": _finite(rung.gain),
+                "gain": _finite(rung.total),
                 "scored": "" if rung.heldout_rmse is None else f"held out {unit(rung.heldout_rmse)}",
             }
             for name, rung in list(once.items())[:MOST_RUNGS]

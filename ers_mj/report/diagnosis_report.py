@@ -69,7 +69,7 @@ def summary(document: Mapping, evidence: Evidence) -> str:
 
 def _chart_data(document: Mapping, evidence: Evidence) -> dict:
     """The data of every chart, by the name of its place."""
-    records = _drawn(evidence)
+    records = evidence.told[:MOST_DRAWN]
     effects = diagnosis_charts.effects_of(records)
     out = {f"trace-{k}": diagnosis_charts.trace(view, evidence, effects) for k, view in enumerate(records)}
     if evidence.residual_map is not None:
@@ -129,14 +129,9 @@ def _tiles(document: Mapping, unit: Unit) -> list[tuple[str, str]]:
     return tiles
 
 
-def _drawn(evidence: Evidence) -> list[RecordView]:
-    """The recordings on the page, held-out ones first."""
-    return sorted(evidence.records, key=lambda view: not view.held_out)[:MOST_DRAWN]
-
-
 def _curves(evidence: Evidence) -> str:
     """The first recording open, the others to unfold, and the switches of the effects."""
-    records = _drawn(evidence)
+    records = evidence.told[:MOST_DRAWN]
     if not records:
         return ""
     content = [_switches(evidence, records), f'<p class="note">{_record_title(records[0])}</p>', _record(0, records[0])]

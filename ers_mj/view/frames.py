@@ -77,7 +77,7 @@ def frames_of(plant: MechanicalPlant, evidence: Evidence) -> Frames | None:
         return None
     if not evidence.records:
         return None
-    view = min(evidence.records, key=lambda view: not view.held_out)
+    view = evidence.told[0]
     chosen = worst_moments(view)
     error = np.abs(view.before - view.measured)[chosen]
     gained = np.nan_to_num(np.abs(view.before - view.after)[chosen])

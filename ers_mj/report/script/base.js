@@ -83,7 +83,7 @@ function linear([low, high], from, to) {
   scale.back = pixel => low + (pixel - from) / (to - from) * (high - low);
   scale.ticks = most => {
     const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough));
-    const step = power * [1, 2, 5, 10].find(n => n * power >= rough * 0.999);
+    const step = power * [1, 2, 5, 10].find(n => n * power >= rough * 0.75);
     const first = Math.ceil(low / step - 1e-9), out = [];
     for (let k = first; k * step <= high + 1e-9 * step; k++) out.push(+(k * step).toPrecision(12));
     return out;
