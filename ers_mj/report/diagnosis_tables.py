@@ -37,7 +37,7 @@ def candidates(evidence: Evidence, unit: Unit) -> str:
         table = f"<details><summary>All {len(evidence.ladder)} candidates as a table</summary>{table}</details>"
     lead = (
         "Every candidate was fitted in simulation. The chart shows what it takes off the baseline’s cost; in the table"
-        " gain is what it takes off that of its round, z how surely, paired by blocks of time, numbers how many it adds."
+        " gain is what it takes off its round’s, z how surely, paired by blocks of time, numbers how many it adds."
     )
     return page.section("The candidates", lead, drawn + table)
 

@@ -62,21 +62,6 @@ def margins(figure: Figure, top: float = 0.1) -> None:
         ax.yaxis.set_label_coords(-0.62 / (width - 0.92), 0.5)
 
 
-def rect(figure: Figure, left: float, bottom: float, right: float, top: float) -> tuple[float, float, float, float]:
-    """Where axes lie in a figure, from distances in inches to its left and lower edge; a negative ``right`` or ``top``
-    to the opposite one.
-    """
-    width, height = figure.get_size_inches()
-    right, top = right if right > 0 else width + right, top if top > 0 else height + top
-    return left / width, bottom / height, (right - left) / width, (top - bottom) / height
-
-
-def label_aside(ax: Axes) -> None:
-    """The label of the vertical axis at the same distance from it whatever the numbers between them."""
-    width = ax.figure.get_size_inches()[0]
-    ax.yaxis.set_label_coords(-0.62 / (ax.get_position().width * width), 0.5)
-
-
 def plain_ticks(ax: Axes, ticks: Sequence[float]) -> None:
     """These ticks alone along a logarithmic axis, in plain numbers."""
     ax.set_xticks(ticks, [f"{t:g}" for t in ticks])

@@ -73,9 +73,9 @@ def frames_of(plant: MechanicalPlant, evidence: Evidence) -> Frames | None:
     None where no picture would help: the output is neither angle nor way, or before and after do not differ beyond
     noise.
     """
-    if evidence.output_unit not in ("rad", "m") or plant.is_angle != (evidence.output_unit == "rad"):
+    if not evidence.records or evidence.output_unit not in ("rad", "m"):
         return None
-    if not evidence.records:
+    if plant.is_angle != (evidence.output_unit == "rad"):
         return None
     view = evidence.told[0]
     chosen = worst_moments(view)
