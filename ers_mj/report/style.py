@@ -15,6 +15,7 @@ class Style:
         measured, before, after: of the three curves that every page compares; ``after`` is what is right or chosen.
         shade: of a region that is marked, as where a model fails.
         grid, ink, faint: of lines behind, of words, and of lines that only guide.
+        distortion: of what no linear model explains.
         wide, narrow: of a figure for a desktop and for a phone [in].
         dark: share of the scale of :data:`HEAT` from which numbers upon it are white.
     """
@@ -26,6 +27,7 @@ class Style:
     grid: str = "#e6e9ee"
     ink: str = "#3b4654"
     faint: str = "#8b95a3"
+    distortion: str = "#a83a1e"
     wide: float = 9.8
     narrow: float = 4.5
     dark: float = 0.55
