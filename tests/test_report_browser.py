@@ -99,6 +99,16 @@ def test_the_zoom_is_one_for_all_recordings(browser, page):
     assert browser.run(TIMES) == whole
 
 
+def test_the_worst_span_shows_every_sample(browser, page):
+    """A long recording is thinned as a whole, but not where the model before does worst."""
+    browser.show(page)
+    browser.run("document.querySelector('.tools button').click()")
+    browser.settle()
+    ends = browser.run(TIMES)
+    shown = browser.run(AFTER).count("L") + 1
+    assert 0 < max(ends) - min(ends) < 5 and shown > 330  # of 12 % of 3000 samples
+
+
 def test_the_keyboard_zooms_and_reads(browser, page):
     browser.show(page)
     whole = browser.run(TIMES)

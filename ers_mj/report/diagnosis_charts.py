@@ -31,7 +31,9 @@ def trace(view: RecordView, evidence: Evidence, effects: Sequence[str]) -> dict:
     worst, n = worst_span(view), view.t.size
     spans = [slice(0, n)]
     if worst is not None and n > POINTS:
-        spans.append(slice(*np.searchsorted(view.t, worst)))
+        begin, end = np.searchsorted(view.t, worst)
+        room = (end - begin) // 10 + 1  # so that a zoom to the span lies within what is told of it
+        spans.append(slice(max(begin - room, 0), end + room))
     closest = float(view.t[-1] - view.t[0]) * COARSEST if n else 0.0
     given = shown(evidence.input_unit, largest(view.u))
     called = "input" if evidence.input_unit not in ("rad", "m") else "position command"
