@@ -14,7 +14,7 @@ from reported import NASTY, document, evidence, spectral, view
 
 from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.report.charts import packed
-from ers_mj.report.diagnosis_report import VERDICTS, Made, report_page, summary
+from ers_mj.report.diagnosis_report import VERDICTS, Made, report_page, summary_page
 from ers_mj.report.display import figure, interval, pretty, shown, spoken
 from ers_mj.report.thinning import decimate, merged
 
@@ -98,7 +98,7 @@ def test_the_page_stands_alone_and_parses(verdict, full):
 def test_a_document_may_lack_parts(changes):
     some = Evidence((), evidence().ladder, None, 1e-3, "rad", "V")
     read(report_page(document(**changes), some))
-    read(f"<main>{summary(document(**changes), some)}</main>")
+    read(summary_page(document(**changes), some))
 
 
 def test_a_page_of_nothing_at_all():

@@ -9,13 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import add_common, add_input, add_map, add_out, add_recordings, mapping, results_folder
-<<<<<<< HEAD
 from ers_mj.commands.output import Progress, bold
 from ers_mj.door.saving import as_json
-=======
-from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, today, write_results, write_text
-from ers_mj.commands.recordings import refuse_mixed_inputs, refuse_twice
->>>>>>> report
 
 if TYPE_CHECKING:
     from ers_mj.door.known import Known
@@ -91,47 +86,13 @@ def diagnose_and_tell(
             progress=progress,
             quick=arguments.quick,
         )
-<<<<<<< HEAD
+        found.made_by = getattr(arguments, "told", "")
         files = found.save(folder, force=True, progress=progress) if folder is not None else []
     document = found.to_dict()
-=======
-        document = plain(found.document)
-        files = _write(folder, document, found, progress, arguments) if folder is not None else []
->>>>>>> report
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
     return 0
 
 
-<<<<<<< HEAD
-=======
-def _write(
-    folder: Path, document: dict, found: Diagnosis, progress: Progress, arguments: argparse.Namespace
-) -> list[Path]:
-    from ers_mj.report.diagnosis_report import NEXT_INPUT, Made, report_page
-    from ers_mj.servo.datasheet import write_model
-    from ers_mj.view.frames import frames_of
-
-    progress("drawing the report", 1.0)
-    following = (document.get("next_recording") or {}).get("excitation")
-    beside = {
-        "model.toml": lambda path: write_model(path, found.model),
-        "plant.xml": lambda path: write_text(path, found.plant.xml()),
-    } | ({NEXT_INPUT: lambda path: write_text(path, input_table(following))} if following else {})
-    made = Made(getattr(arguments, "told", ""), today(), ("diagnosis.json", *beside))
-    page = report_page(document, found.evidence, frames_of(found.plant, found.evidence), made)
-    return write_results(folder, report_writers("diagnosis.json", document, page) | beside)
-
-
-def input_table(excitation: dict) -> str:
-    """The input to record next, as `ers simulate --input` takes it."""
-    from ers_mj.data.columns import input_name
-    from ers_mj.data.excitation import signal
-
-    column = input_name(excitation["input_unit"])
-    return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation), strict=True))]) + "\n"
-
-
->>>>>>> report
 # -- the diagnosis in lines ---------------------------------------------------------------------------------------
 
 

@@ -5,13 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-<<<<<<< HEAD
 from collections.abc import Sequence
-=======
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime
->>>>>>> report
 from pathlib import Path
 
 
@@ -40,25 +34,6 @@ class Progress:
             sys.stderr.flush()
 
 
-<<<<<<< HEAD
-=======
-def today() -> str:
-    """The day as a page tells it; SOURCE_DATE_EPOCH [s] fixes it where pages are to be equal."""
-    fixed = os.environ.get("SOURCE_DATE_EPOCH", "")
-    now = datetime.fromtimestamp(int(fixed), UTC) if fixed.isdigit() else datetime.now().astimezone()
-    return f"{now.day} {now:%B %Y}"
-
-
-def versions() -> dict[str, str]:
-    """Of this package and MuJoCo."""
-    import mujoco
-
-    from ers_mj import __version__
-
-    return {"ers-mj": __version__, "mujoco": mujoco.__version__}
-
-
->>>>>>> report
 def written(files: Sequence[Path]) -> list[str]:
     """The lines that tell which files were written, none where there are none."""
     return ["", bold("written"), *(f"  {path}" for path in files)] if files else []

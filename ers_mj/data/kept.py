@@ -10,8 +10,8 @@ import numpy as np
 
 
 class Kept:
-    """Pairs of arrays by what they were computed from; those not asked for longest go first. A copy in another process begins
-    empty.
+    """Pairs of arrays by what they were computed from; those not asked for longest go first. A copy in another process
+    begins empty.
     """
 
     def __init__(self, most_bytes: int = 16_000_000):

@@ -61,12 +61,6 @@ def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = N
     return charts.frame(title, verdict, "\n".join(parts), _chart_data(document, evidence))
 
 
-def summary(document: Mapping, evidence: Evidence) -> str:
-    """The verdict and the table of errors as HTML without a script, to stand in another page."""
-    unit = _error_unit(document, evidence)
-    return _header(document, unit) + fit_table(document, unit)
-
-
 def _chart_data(document: Mapping, evidence: Evidence) -> dict:
     """The data of every chart, by the name of its place."""
     records = evidence.told[:MOST_DRAWN]
@@ -84,16 +78,16 @@ def _chart_data(document: Mapping, evidence: Evidence) -> dict:
 
 def summary_page(document: Mapping, evidence: Evidence) -> str:
     """The verdict, the first recording and the table of errors: what a notebook shows of it."""
-    restart_ids()
-    verdict, unit = str(document.get("verdict") or ""), _error_unit(document, evidence)
-    records = sorted(evidence.records, key=lambda view: not view.held_out)
-    parts = (
+    verdict, unit, records = str(document.get("verdict") or ""), _error_unit(document, evidence), evidence.told[:1]
+    body = (
         _header(document, unit),
-        page.section("Measured and simulated", "", _record(records[0], evidence)) if records else "",
+        *(page.section("Measured and simulated", "", _record(0, view)) for view in records),
         missing_physics(document, unit),
         fit_table(document, unit),
     )
-    return page.frame(VERDICTS.get(verdict, verdict), verdict, "\n".join(parts))
+    drawn = {f"trace-{k}": diagnosis_charts.trace(view, evidence, ()) for k, view in enumerate(records)}
+    data = {"charts": drawn, "switched": {}}
+    return charts.frame(VERDICTS.get(verdict, verdict), verdict, "\n".join(body), data)
 
 
 def _error_unit(document: Mapping, evidence: Evidence) -> Unit:
@@ -108,10 +102,8 @@ def _error_unit(document: Mapping, evidence: Evidence) -> Unit:
 
 def _header(document: Mapping, unit: Unit, below: str = "") -> str:
     verdict = str(document.get("verdict") or "")
-<<<<<<< HEAD
-    header = page.header(
-        verdict, VERDICTS.get(verdict, "No verdict"), verdict, document.get("sentence"), _tiles(document, unit)
-    )
+    named = VERDICTS.get(verdict, "No verdict")
+    header = page.header(verdict, named, verdict, document.get("sentence"), _tiles(document, unit), below)
     return header + _left_out(document)
 
 
@@ -119,9 +111,6 @@ def _left_out(document: Mapping) -> str:
     """What a quick look left out."""
     told = [str(part.get("sentence")) for part in document.get("left_out") or ()]
     return f'<p class="note">A quick look: {page.text("; ".join(told))}.</p>' if told else ""
-=======
-    named = VERDICTS.get(verdict, "No verdict")
-    return page.header(verdict, named, verdict, document.get("sentence"), _tiles(document, unit), below)
 
 
 def _made(made: Made) -> str:
@@ -131,7 +120,6 @@ def _made(made: Made) -> str:
     told = [page.text(made.day), f"<code>{page.text(made.command)}</code>" if made.command else ""]
     line = " · ".join(filter(None, told))
     return links + (f'<p class="made">{line}</p>\n' if line else "")
->>>>>>> report
 
 
 def _tiles(document: Mapping, unit: Unit) -> list[tuple[str, str]]:
