@@ -13,6 +13,7 @@ import pytest
 
 from ers_mj import cli
 from ers_mj.diagnosis import pipeline
+from ers_mj.effects import EFFECTS
 from ers_mj.selection.budget import QUICK
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -143,6 +144,12 @@ def test_what_was_measured_has_a_command_beside_it(page):
 
 def test_readme_is_one_page():
     assert len((ROOT / "README.md").read_text().split()) <= 500
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/limits.md"])
+def test_a_page_counts_the_effects_that_there_are(page):
+    counted = re.search(r"(\d+) effects", (ROOT / page).read_text())
+    assert int(counted[1]) == sum(effect.named for effect in EFFECTS)
 
 
 def test_the_catalogue_is_what_the_effects_say():

@@ -37,7 +37,8 @@ def candidates(evidence: Evidence, unit: Unit) -> str:
         table = f"<details><summary>All {len(evidence.ladder)} candidates as a table</summary>{table}</details>"
     lead = (
         "Every candidate was fitted in simulation. The chart shows by how much it lowers the baseline’s robust cost; in"
-        " the table gain is the same against its round’s, z how surely, paired by blocks of time, numbers how many it adds."
+        " the table gain is the same against its round’s, z how surely, paired by blocks of time, numbers how many it"
+        " adds."
     )
     return page.section("The candidates", lead, drawn + table)
 
