@@ -28,6 +28,9 @@ class Presliding(Friction):
     name = "presliding"
     sentence = "friction gives like a spring before it slips: its level over its stiffness is {x_s}"
     mjcf = "LuGre friction of a dcmotor without torque on the absolute angle (lugre), in place of frictionloss"
+    apart = (
+        "the rudder gives and springs back within the stuck phase, where stribeck and Coulomb friction hold it still"
+    )
     parameters = (
         Parameter("x_s", "position", "level of friction over its stiffness at rest"),
         Parameter(
