@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_common, add_input, add_map, add_out, add_recordings, mapping, results_folder
+from ers_mj.commands.options import add_common, add_out, add_reading, add_recordings, results_folder
 from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, write_results, write_text
-from ers_mj.commands.recordings import refuse_mixed_inputs, refuse_twice
+from ers_mj.commands.recordings import reader, refuse_mixed_inputs, refuse_twice
 
 if TYPE_CHECKING:
     from ers_mj.data.recording import Recording
@@ -36,8 +35,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable"
     )
-    add_map(parser)
-    add_input(parser)
+    add_reading(parser)
     parser.add_argument(
         "--second", metavar="COLUMN", help="explain this column as well, as in u_V beside theta_ref_rad"
     )
@@ -49,12 +47,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write, tell; 0 whatever the verdict."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    names = mapping(arguments.map)
-    from ers_mj.data.recording import read_recording
+    read = reader(arguments)
     from ers_mj.servo.datasheet import read_datasheet
 
     datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
-    read = partial(read_recording, mapping=names, input_column=arguments.input, second=arguments.second)
     recordings = [read(spec) for spec in arguments.recordings]
     holdout = [read(spec) for spec in arguments.holdout]
     return diagnose_and_tell(recordings, holdout, datasheet, folder, arguments)

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import (
     add_common,
-    add_input,
-    add_map,
     add_out,
+    add_reading,
     add_recordings,
-    mapping,
     number,
     one_of,
     pair,
@@ -21,7 +19,7 @@ from ers_mj.commands.options import (
     whole,
 )
 from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
-from ers_mj.commands.recordings import refuse_mixed_inputs, refuse_twice
+from ers_mj.commands.recordings import reader, refuse_mixed_inputs, refuse_twice
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,8 +44,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add_recordings(parser)
     _add_way(parser)
     _add_search(parser)
-    add_map(parser)
-    add_input(parser)
+    add_reading(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -113,14 +110,13 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Identify, write, tell; 0 whatever comes out."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    names = mapping(arguments.map)
+    read = reader(arguments)
     fixed, bounds = _values(arguments.fix, "--fix", _value), _values(arguments.bounds, "--bounds", _ends)
     if len(arguments.within) != 2 or not arguments.within[0] < 1 < arguments.within[1]:
         raise InputError(
             f"--within gives {', '.join(f'{x:g}' for x in arguments.within)}, a factor below one and one above it were"
             " expected"
         )
-    from ers_mj.data.recording import read_recording
     from ers_mj.identification.estimate import identify
     from ers_mj.identification.finding import Settings
     from ers_mj.servo.datasheet import read_datasheet
@@ -138,7 +134,7 @@ def run(arguments: argparse.Namespace) -> int:
         **({"timestep": arguments.timestep} if arguments.timestep else {}),
     )
     datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
-    recordings = [read_recording(spec, names, input_column=arguments.input) for spec in arguments.recordings]
+    recordings = [read(spec) for spec in arguments.recordings]
     refuse_twice(recordings, [])
     refuse_mixed_inputs(recordings)
     with Progress() as progress:

@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
+from ers_mj.commands.options import mapping
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
     from ers_mj.data.recording import Recording
+
+
+def reader(arguments: argparse.Namespace) -> Callable[[str], Recording]:
+    """Reads a recording as the options say; what --map says goes before the file of --map-file."""
+    from ers_mj.data.mapping import read_map_file
+    from ers_mj.data.recording import read_recording
+
+    kept = read_map_file(arguments.map_file) if arguments.map_file is not None else {}
+    first = lambda option: getattr(arguments, option, None) or kept.get(option)
+    return partial(
+        read_recording,
+        mapping={**kept.get("map", {}), **mapping(arguments.map)},
+        input_column=first("input"),
+        second=first("second"),
+        episode=first("episode"),
+    )
 
 
 def refuse_twice(recordings: list[Recording], holdout: list[Recording]) -> None:
