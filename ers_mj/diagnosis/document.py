@@ -16,6 +16,7 @@ from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.sentences import remainder, sentence, shown
+from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
@@ -80,7 +81,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "record_state": states,
         "fit": case.fits,
         "parameters": _parameters(case),
-        "next_recording": next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit),
+        "next_recording": _advice(case),
         "data": _data(case),
         "trail": [_move(move) for move in case.selection.trail],
         "seed": case.seed,
@@ -98,6 +99,14 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         spectrum,
     )
     return Diagnosis(document, evidence, _improved(case), case.rig.plant(model if case.told_effects else base))
+
+
+def _advice(case: Case) -> dict:
+    """What to record next."""
+    traces = case.start.traces
+    if is_unexcited(traces):
+        return moving_input(traces, case.input_unit, case.output_unit)
+    return next_recording(*case.rivals(), traces, case.input_unit, case.output_unit)
 
 
 def _missing(case: Case) -> list[dict]:

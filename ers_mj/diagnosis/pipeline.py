@@ -17,14 +17,15 @@ from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.document import Diagnosis, told
 from ers_mj.diagnosis.mujoco_check import Rig
+from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.effects.quantities import Symptoms
 from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes
-from ers_mj.selection.confirmation import confirmed
+from ers_mj.selection.confirmation import Confirmed, confirmed
 from ers_mj.selection.confounders import without_confounders
-from ers_mj.selection.stepwise import select
+from ers_mj.selection.stepwise import Selection, select
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import MOST_TAU, Model
 
@@ -62,12 +63,13 @@ def diagnose(
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
-    sensors = symptoms(recordings, start.traces, travel, policy)
+    still = is_unexcited(start.traces)  # nothing can be told then, and nothing is named
+    sensors = {} if still else symptoms(recordings, start.traces, travel, policy)
     chosen = select(
         start.fit,
         start.traces,
         anchors=start.anchors,
-        exclude=(*_ordinary(start.fit.model, policy), *SUSPECTS),
+        exclude=tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,
         policy=policy,
@@ -79,18 +81,23 @@ def diagnose(
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
-    named, suspects = without_confounders(selection, start.traces, jobs, policy)
+    named, suspects = (selection, ()) if still else without_confounders(selection, start.traces, jobs, policy)
     if named is not selection:
         selection, judged = confirmed(start, named, held, jobs, policy)
     progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
-    before = rig.rmse(judged.base_models, judged.parts, jobs)
-    multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
+    multibody = _in_mujoco(rig, selection, judged, jobs)
     progress("locating", 0.92)
     case = Case(
         recordings, list(holdout), datasheet, start, selection, judged, sensors, suspects, seed, rig, multibody, policy
     )
     return told(case, held)
+
+
+def _in_mujoco(rig: Rig, selection: Selection, judged: Confirmed, jobs: int) -> tuple[float | None, float | None]:
+    """The MuJoCo plant's errors before and after the effects."""
+    before = rig.rmse(judged.base_models, judged.parts, jobs)
+    return before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
 
 
 def _ordinary(model: Model, policy: Policy) -> list[str]:
