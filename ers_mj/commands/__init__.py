@@ -11,6 +11,7 @@ from ers_mj.commands import (
     frequency,
     gains,
     identify,
+    inspect,
     prove,
     simulate,
     trial,
@@ -19,4 +20,4 @@ from ers_mj.commands import (
     watch,
 )
 
-COMMANDS = (demo, diagnose, identify, simulate, validate, view, prove, trial, gains, frequency, watch, excite)
+COMMANDS = (demo, diagnose, inspect, identify, simulate, validate, view, prove, trial, gains, frequency, watch, excite)

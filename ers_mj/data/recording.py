@@ -34,6 +34,7 @@ from ers_mj.data.consistency import consistent
 from ers_mj.data.consistency.sheet import Fault, Sheet
 from ers_mj.data.expressions import Column
 from ers_mj.data.formats import load
+from ers_mj.data.inspection import Inspection, inspected
 from ers_mj.data.mapping import Source
 from ers_mj.data.sensor_faults import converter_step
 from ers_mj.data.tables import cell_of, element, listed, numbers, seconds, select_run, split_spec, write_whole
@@ -125,6 +126,10 @@ class Recording:
         names |= {"second": self.second_name} if self.second_name else {}
         there = {name: getattr(self, field) for field, name in names.items() if getattr(self, field) is not None}
         return {name: np.full(self.t.size, x) if isinstance(x, float) else x for name, x in there.items()}
+
+    def inspect(self) -> Inspection:
+        """What it holds and could tell, before anything is fitted."""
+        return inspected(self)
 
 
 # -- the three ways in and out --------------------------------------------------------------------------
