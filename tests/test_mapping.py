@@ -179,4 +179,4 @@ def test_a_mapping_is_kept_in_a_file(put, tmp_path, capsys):
     assert "the output angle is constant" in capsys.readouterr().err
     kept.write_text('maps = "u"\n')
     assert cli.main(["diagnose", file, "--map-file", str(kept), "--json"]) == 2
-    assert "rig.toml: holds maps, known are map, input, second, episode" in capsys.readouterr().err
+    assert "rig.toml: holds maps, known are map, input, second, episode, dbc" in capsys.readouterr().err

@@ -114,6 +114,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     add_map(parser)
     parser.add_argument("--input", metavar="COLUMN", help="what the servo is told, where several columns could be")
     parser.add_argument("--episode", metavar="N", help="one run of a file that holds several, as FILE#run=N does")
+    parser.add_argument("--dbc", metavar="FILE", help="what the messages of a CAN log mean")
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:

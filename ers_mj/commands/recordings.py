@@ -28,6 +28,7 @@ def reader(arguments: argparse.Namespace) -> Callable[[str], Recording]:
         input_column=first("input"),
         second=first("second"),
         episode=first("episode"),
+        dbc=first("dbc"),
     )
 
 

@@ -22,7 +22,7 @@ from ers_mj.data.tables import listed, read_content, reason
 from ers_mj.data.units import COUNTS, Unit, conversion, is_unit, split_header
 from ers_mj.errors import InputError
 
-KEYS = ("map", "input", "second", "episode")  # of a mapping that is kept in a TOML
+KEYS = ("map", "input", "second", "episode", "dbc")  # of a mapping that is kept in a TOML
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def source_of(
 def _column(contract: str, text: str, part: Column, target: Target, file_units: Mapping[str, str], name: str) -> Source:
     """A column by itself, in the unit that its file or its header says, else in that of the contract's name."""
     said = file_units.get(part[0]) or split_header(part[0])[1]
-    if said is None or target[0] == "-":
+    if said is None or not is_unit(said) or target[0] == "-":
         return Source(text, (part,), Unit("", target[1]))
     turned = _conversion(contract, said, target[0], name)
     if turned.factor == target[1]:
@@ -107,10 +107,18 @@ def _column(contract: str, text: str, part: Column, target: Target, file_units: 
 def _split_unit(text: str, columns: Sequence[str]) -> tuple[str, str | None]:
     """Arithmetic and unit of "Time [ms]" and of "enc:counts/4096"; no unit where there is none."""
     bracket = re.fullmatch(r"(.*?)\s*\[\s*([^\[\]]+?)\s*\]\s*", text)
-    if bracket and not bracket[2].isdigit() and not text.endswith(tuple(f"[{c}]" for c in columns)):
+    if bracket and not bracket[2].isdigit() and not _is_readable(text, columns):
         return bracket[1], bracket[2]
     head, colon, tail = text.rpartition(":")
     return (head, tail.strip()) if colon and (is_unit(tail) or head.strip() in columns) else (text, None)
+
+
+def _is_readable(text: str, columns: Sequence[str]) -> bool:
+    """Whether it is arithmetic as it stands: names of columns may end in brackets."""
+    try:
+        return bool(tokens(text, columns))
+    except Unreadable:
+        return False
 
 
 def _parts(body: str, columns: Sequence[str], name: str) -> list[str | float | Column]:

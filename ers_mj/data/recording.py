@@ -142,6 +142,7 @@ def read_recording(
     input_column: str | None = None,
     second: str | None = None,
     episode: str | int | None = None,
+    dbc: str | os.PathLike[str] | None = None,
 ) -> Recording:
     """Read one recording from a file of any format that `formats` knows.
 
@@ -151,6 +152,7 @@ def read_recording(
         input_column: the column that the servo is told, where several could be.
         second: a column to explain beside the output, such as the duty beside a position command.
         episode: one run of a file that holds several, where the path names none.
+        dbc: what the messages of a CAN log mean.
 
     Raises:
         InputError: whatever makes the file unusable, in one sentence that names it.
@@ -158,7 +160,7 @@ def read_recording(
     path, run = split_spec(os.fspath(path_or_spec))
     run = str(episode) if run is None and episode is not None else run
     name = path.name if run is None else f"{path.name}#run={run}"
-    loaded, digest = load(path, name, dict(mapping or {}))
+    loaded, digest = load(path, name, dict(mapping or {}), [Path(dbc)] if dbc is not None else [])
     table = select_run(loaded.table, run, name)
     choice = choose_columns(table.column_names, Asking(dict(mapping or {}), input_column, second), name, loaded.units)
     sources = {field: choice.sources[contract] for field, contract in choice.roles().items()}
