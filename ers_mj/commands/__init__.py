@@ -20,4 +20,4 @@ from ers_mj.commands import (
     watch,
 )
 
-COMMANDS = (demo, diagnose, inspect, identify, simulate, validate, view, prove, trial, gains, frequency, watch, excite)
+COMMANDS = (demo, diagnose, identify, simulate, validate, view, inspect, prove, trial, gains, frequency, watch, excite)
