@@ -14,7 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from ers_mj import __version__
 from ers_mj.commands import COMMANDS
-from ers_mj.errors import InputError
+from ers_mj.errors import ErsError, InputError
 
 
 class Parser(argparse.ArgumentParser):
@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         arguments = parse(list(sys.argv[1:] if argv is None else argv))
         return arguments.run(arguments)
-    except InputError as error:
+    except ErsError as error:
         print(f"ers: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

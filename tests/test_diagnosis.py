@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj.commands.output import plain
 from ers_mj.data.recording import from_arrays
 from ers_mj.decisions.thresholds import POLICY
 from ers_mj.diagnosis.pipeline import diagnose
+from ers_mj.door.saving import plain
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model

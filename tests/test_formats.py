@@ -11,7 +11,7 @@ import pytest
 from pyarrow import feather
 
 from ers_mj.data.recording import read_recording
-from ers_mj.errors import InputError
+from ers_mj.errors import ErsError
 
 N = 400
 T = 0.01 * np.arange(N)
@@ -31,7 +31,7 @@ def checked(path, mapping=None, atol=1e-9, **asked):
 
 def refusal(path, mapping=None, **asked):
     """The one sentence with which a file is refused."""
-    with pytest.raises(InputError) as found:
+    with pytest.raises(ErsError) as found:
         read_recording(path, mapping, **asked)
     assert "\n" not in str(found.value)
     return str(found.value)

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import add_out, add_reading, add_recordings, results_folder
-from ers_mj.commands.output import as_json, bold, plain, report_writers, write_results, written
+from ers_mj.commands.output import bold, written
 from ers_mj.commands.recordings import reader
+from ers_mj.door.saving import as_json, plain, report_writers, write_results
 
 if TYPE_CHECKING:
     from ers_mj.data.inspection import Inspection

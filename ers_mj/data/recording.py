@@ -10,7 +10,7 @@ told in `Recording.problems`. Time is axis 0, every array is (N,).
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +34,11 @@ from ers_mj.data.consistency import consistent
 from ers_mj.data.consistency.sheet import Fault, Sheet
 from ers_mj.data.expressions import Column
 from ers_mj.data.formats import load
+from ers_mj.data.formats.base import Loaded
 from ers_mj.data.inspection import Inspection, inspected
 from ers_mj.data.mapping import Source
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.data.tables import cell_of, element, listed, numbers, seconds, select_run, split_spec, write_whole
+from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec, write_whole
 from ers_mj.errors import InputError
 
 
@@ -99,6 +100,12 @@ class Recording:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Lock the arrays again: a copy that has been to another process comes back writeable."""
         self.__dict__.update({key: locked(x) if isinstance(x, np.ndarray) else x for key, x in state.items()})
+
+    def __repr__(self) -> str:
+        return (
+            f"<Recording {self.name}: {self.t.size} samples over {self.duration:.4g} s, input in {self.input_unit},"
+            f" output in {self.output_unit}>"
+        )
 
     @property
     def duration(self) -> float:
@@ -162,7 +169,51 @@ def read_recording(
     name = path.name if run is None else f"{path.name}#run={run}"
     loaded, digest = load(path, name, dict(mapping or {}), [Path(dbc)] if dbc is not None else [])
     table = select_run(loaded.table, run, name)
-    choice = choose_columns(table.column_names, Asking(dict(mapping or {}), input_column, second), name, loaded.units)
+    asked = Asking(dict(mapping or {}), input_column, second)
+    return _of_table(replace(loaded, table=table), asked, name, path=str(path), sha256=digest)
+
+
+def from_columns(
+    columns: Mapping[str, Any],
+    mapping: Mapping[str, str] | None = None,
+    name: str = "array",
+    *,
+    input_column: str | None = None,
+    second: str | None = None,
+) -> Recording:
+    """A recording from columns (N,) under the names and units that a file's columns have; they are copied.
+
+    Args:
+        columns: name -> what makes an array (N,), or one number of the whole recording; those that mean nothing here
+            are ignored and told.
+        mapping, input_column, second: as `read_recording` takes them.
+        name: what the recording is called.
+
+    Raises:
+        InputError: as `read_recording` does.
+    """
+    arrays = {str(label): np.asarray(column) for label, column in columns.items()}
+    longest = max((x.size for x in arrays.values()), default=0)
+    arrays = {label: np.full(longest, x) if x.ndim == 0 else x for label, x in arrays.items()}
+    for label, x in arrays.items():
+        if x.ndim != 1:
+            raise InputError(f"{name}: {label} has shape {x.shape}, (N,) was expected")
+    count = {label: x.size for label, x in arrays.items()}
+    if len(set(count.values())) > 1:
+        raise InputError(f"{name}: columns of one length are expected, these have {count}")
+    try:
+        table = pa.table(arrays)
+    except pa.ArrowException as error:
+        raise InputError(f"{name}: holds what is no column of numbers ({reason(error)})") from None
+    content = b"".join(label.encode() + arrays[label].tobytes() for label in sorted(arrays))
+    asked = Asking(dict(mapping or {}), input_column, second)
+    return _of_table(Loaded(table), asked, name, path="", sha256=hashlib.sha256(content).hexdigest())
+
+
+def _of_table(loaded: Loaded, asked: Asking, name: str, **origin: Any) -> Recording:
+    """The recording in a table of named columns, as it was asked for."""
+    table = loaded.table
+    choice = choose_columns(table.column_names, asked, name, loaded.units)
     sources = {field: choice.sources[contract] for field, contract in choice.roles().items()}
     printed, factors = _printed(table, sources, name)
     units = {field: COLUMNS[contract].unit for field, contract in choice.roles().items()}
@@ -171,7 +222,7 @@ def read_recording(
     found = read.fields(printed, factors, _notes(loaded.notes, sources, table.column_names))
     if choice.second:
         found |= {"second_name": choice.second, "second_unit": units["second"]}
-    return Recording(**found, path=str(path), sha256=digest)
+    return Recording(**found, **origin)
 
 
 def _notes(told: Sequence[str], sources: Mapping[str, Source], columns: list[str]) -> list[Fault]:

@@ -81,7 +81,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "record_state": states,
         "fit": case.fits,
         "parameters": _parameters(case),
-        "next_recording": _advice(case),
+        "next_recording": _next_recording(case),
         "data": _data(case),
         "trail": [_move(move) for move in case.selection.trail],
         "seed": case.seed,
@@ -89,6 +89,8 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
     }
     if verdict == "unexplained" or case.suspects:
         document["suspects"] = _suspects(case)
+    if left_out := case.search.left_out():
+        document["left_out"] = [{"part": part, "sentence": sentence} for part, sentence in left_out]
     evidence = Evidence(
         tuple(views(case, samples)),
         tuple(ladder(case)),
@@ -99,14 +101,6 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         spectrum,
     )
     return Diagnosis(document, evidence, _improved(case), case.rig.plant(model if case.told_effects else base))
-
-
-def _advice(case: Case) -> dict:
-    """What to record next."""
-    traces = case.start.traces
-    if is_unexcited(traces):
-        return moving_input(traces, case.input_unit, case.output_unit)
-    return next_recording(*case.rivals(), traces, case.input_unit, case.output_unit)
 
 
 def _missing(case: Case) -> list[dict]:
@@ -278,6 +272,15 @@ def _combinations(case: Case, rows: dict) -> dict:
         return {}
     named = {"k_s/J": "a_1", "n K_t/(J R)": "b", "T_LH/J": "c_1", "F_c/J": "c_2", "L/R": "tau_e", "n K_t/J": "ampere"}
     return {combination: rows[name] for combination, name in named.items() if name in rows}
+
+
+def _next_recording(case: Case) -> dict:
+    """What to record next, where that is designed."""
+    if not case.search.advised:
+        return {"sentence": "not designed in a quick look", "excitation": None}
+    if is_unexcited(case.start.traces):
+        return moving_input(case.start.traces, case.input_unit, case.output_unit)
+    return next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit)
 
 
 def _move(move: Move) -> dict:

@@ -48,6 +48,20 @@ def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = N
     return page.frame(f"{VERDICTS.get(verdict, verdict)} · servo diagnosis", verdict, "\n".join(parts))
 
 
+def summary_page(document: Mapping, evidence: Evidence) -> str:
+    """The verdict, the first recording and the table of errors: what a notebook shows of it."""
+    restart_ids()
+    verdict, unit = str(document.get("verdict") or ""), _error_unit(document, evidence)
+    records = sorted(evidence.records, key=lambda view: not view.held_out)
+    parts = (
+        _header(document, unit),
+        page.section("Measured and simulated", "", _record(records[0], evidence)) if records else "",
+        missing_physics(document, unit),
+        fit_table(document, unit),
+    )
+    return page.frame(VERDICTS.get(verdict, verdict), verdict, "\n".join(parts))
+
+
 def _error_unit(document: Mapping, evidence: Evidence) -> Unit:
     """One unit for all errors of the page."""
     sizes = [x for key, x in (document.get("fit") or {}).items() if key.endswith("_rad") and not missing(x)]
@@ -60,9 +74,16 @@ def _error_unit(document: Mapping, evidence: Evidence) -> Unit:
 
 def _header(document: Mapping, unit: Unit) -> str:
     verdict = str(document.get("verdict") or "")
-    return page.header(
+    header = page.header(
         verdict, VERDICTS.get(verdict, "No verdict"), verdict, document.get("sentence"), _tiles(document, unit)
     )
+    return header + _left_out(document)
+
+
+def _left_out(document: Mapping) -> str:
+    """What a quick look left out."""
+    told = [str(part.get("sentence")) for part in document.get("left_out") or ()]
+    return f'<p class="note">A quick look: {page.text("; ".join(told))}.</p>' if told else ""
 
 
 def _tiles(document: Mapping, unit: Unit) -> list[tuple[str, str]]:

@@ -62,11 +62,12 @@ def select(
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle,
-    is left out as the ``budget`` of simulation is spent, the selection's own unless one is handed in.
+    is left out as the ``budget`` of simulation is spent, the selection's own unless one is handed in; its sizes are
+    those of the search.
     """
     budget = Budget(traces) if budget is None else budget
     base = replace(base, model=replace(base.model, effort=budget.effort))
-    bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget=budget)
+    bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget.search, budget)
     return _Stepwise(bench, base, anchors, progress).run()
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from ers_mj.data.tables import listed
-from ers_mj.errors import InputError
+from ers_mj.errors import InputError, MissingPackage
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,12 @@ def library(module: str, package: str, extra: str, name: str) -> ModuleType:
     """The library that reads a format.
 
     Raises:
-        InputError: it is not installed.
+        MissingPackage: it is not installed.
     """
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise InputError(
+        raise MissingPackage(
             f"{name}: is read by the package {package}, which is not installed: pip install 'ers-mj[{extra}]'"
         ) from None
 

@@ -9,7 +9,7 @@ import numpy as np
 from ers_mj.data.formats.base import File, Loaded, library
 from ers_mj.data.formats.clocks import Signal, on_one_clock
 from ers_mj.data.tables import reason
-from ers_mj.errors import InputError
+from ers_mj.errors import ErsError, InputError
 
 
 def load(file: File) -> Loaded:
@@ -20,7 +20,7 @@ def load(file: File) -> Loaded:
     try:
         with asammdf.MDF(io.BytesIO(file.content)) as mdf:
             return on_one_clock(_signals(mdf), file.wanted, file.name)
-    except InputError:
+    except ErsError:
         raise
     except Exception as error:  # asammdf raises what its parsers meet
         raise InputError(f"{file.name}: is not a readable MDF file ({reason(error)})") from None

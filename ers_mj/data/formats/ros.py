@@ -16,7 +16,7 @@ import numpy as np
 from ers_mj.data.formats.base import File, Loaded, library
 from ers_mj.data.formats.clocks import Signal, on_one_clock
 from ers_mj.data.tables import reason
-from ers_mj.errors import InputError
+from ers_mj.errors import ErsError, InputError
 
 NANO = 1e-9
 APART = 5.0  # [s] between a header's stamp and the log's, from which they are of different clocks
@@ -101,7 +101,7 @@ def load(file: File) -> Loaded:
     topics = Topics()
     try:
         notes = _bag(file, topics) if file.path.suffix.lower() != ".mcap" or not file.content else _mcap(file, topics)
-    except InputError:
+    except ErsError:
         raise
     except Exception as error:  # readers raise what they meet
         raise InputError(f"{file.name}: is not a readable log of messages ({reason(error)})") from None
