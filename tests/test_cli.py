@@ -348,6 +348,7 @@ def test_the_sentence_says_what_exists(argv, words, place, monkeypatch, capsys):
 
 def test_diagnose_writes_its_files_and_tells(place, monkeypatch, capsys):
     calls = stub(monkeypatch)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
     assert (
         cli.main("diagnose good.csv --holdout second.csv --datasheet good.toml --seed 5 --jobs 2 --out res".split())
         == 0
@@ -361,6 +362,9 @@ def test_diagnose_writes_its_files_and_tells(place, monkeypatch, capsys):
     ]
     document = json.loads((place / "res/diagnosis.json").read_text())
     assert document["fit"]["heldout_rmse_after_rad"] is None and document["seed"] == 5
+    page = (place / "res/report.html").read_text()
+    assert "2 January 1970 · <code>ers diagnose good.csv --holdout second.csv" in page
+    assert all(f'href="{name}"' in page for name in ("diagnosis.json", "model.toml", "plant.xml"))
     assert read_datasheet(place / "res/model.toml").lumped["b"] == 1.0
     assert "PARAMETERS_ONLY" in out and "parameters_only" in out and "report.html" in out and err == ""
     (call,) = calls

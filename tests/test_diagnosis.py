@@ -56,6 +56,14 @@ def test_a_concealed_dead_zone_is_named_and_measured(dead_zone):
     assert document["where"][0]["label"] == "drive"
 
 
+def test_a_report_can_show_what_a_named_effect_does(dead_zone):
+    """Taken out of the model, with nothing refitted, it leaves far more in every recording."""
+    for view in dead_zone.evidence.records:
+        assert list(view.without) == ["drive_dead_zone"]
+        left = {name: np.sqrt(np.nanmean((run - view.measured) ** 2)) for name, run in view.without.items()}
+        assert left["drive_dead_zone"] > 3 * np.sqrt(np.nanmean((view.after - view.measured) ** 2))
+
+
 def test_the_document_is_whole_and_is_json(dead_zone):
     keys = {
         "version",

@@ -82,6 +82,7 @@ def diagnose_and_tell(
             progress=progress,
             quick=arguments.quick,
         )
+        found.made_by = getattr(arguments, "told", "")
         files = found.save(folder, force=True, progress=progress) if folder is not None else []
     document = found.to_dict()
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from threadpoolctl import threadpool_limits
 
 from ers_mj.door.known import Known, known
 from ers_mj.door.model import Model
 from ers_mj.door.reading import Given, recordings_of
 from ers_mj.door.results import Progress, Result, Writers, parameter_rows, silent
-from ers_mj.door.saving import report_writers, write_text
+from ers_mj.door.saving import report_writers, today, write_text
 from ers_mj.door.together import refuse_mixed_inputs, refuse_twice
 from ers_mj.errors import InputError
 from ers_mj.selection.budget import QUICK, SEARCH
@@ -26,6 +29,8 @@ class Diagnosis(Result):
     `to_dict()` is diagnosis.json, `to_frame()` every parameter of the servo and of the named effects with its 95 %
     interval, `save(folder)` writes diagnosis.json, report.html, model.toml and plant.xml.
     """
+
+    made_by = ""  # the command, where one made it, for the page
 
     def __init__(self, found: Found):
         super().__init__(found.document)
@@ -72,24 +77,30 @@ class Diagnosis(Result):
 
         return summary_page(self._document, self._found.evidence)
 
-    @cached_property
-    def _report(self) -> str:
-        from ers_mj.report.diagnosis_report import report_page
-        from ers_mj.view.frames import frames_of
+    @property
+    def _beside(self) -> Writers:
+        """What is saved beside the document and the page."""
+        from ers_mj.report.diagnosis_report import NEXT_INPUT
 
         found = self._found
-        return report_page(self._document, found.evidence, frames_of(found.plant, found.evidence))
-
-    def _writers(self) -> Writers:
-        found, document = self._found, self._document
-        writers = report_writers("diagnosis.json", document, self._report) | {
+        writers: dict[str, Callable[[Path], None]] = {
             "model.toml": lambda path: write_model(path, found.model),
             "plant.xml": lambda path: write_text(path, found.plant.xml()),
         }
-        following = (document.get("next_recording") or {}).get("excitation")
+        following = (self._document.get("next_recording") or {}).get("excitation")
         if following:
-            writers["next_recording.csv"] = lambda path: write_text(path, input_table(following))
+            writers[NEXT_INPUT] = lambda path: write_text(path, input_table(following))
         return writers
+
+    def _report(self) -> str:
+        from ers_mj.report.diagnosis_report import Made, report_page
+        from ers_mj.view.frames import frames_of
+
+        found, made = self._found, Made(self.made_by, today(), ("diagnosis.json", *self._beside))
+        return report_page(self._document, found.evidence, frames_of(found.plant, found.evidence), made)
+
+    def _writers(self) -> Writers:
+        return report_writers("diagnosis.json", self._document, self._report()) | dict(self._beside)
 
 
 def diagnose(
@@ -131,15 +142,9 @@ def diagnose(
         raise InputError("no recording was given, at least one was expected")
     refuse_twice(trained, held)
     refuse_mixed_inputs([*trained, *held])
-    found = pipeline.diagnose(
-        trained,
-        known(datasheet),
-        held,
-        seed=seed,
-        jobs=jobs,
-        progress=progress,
-        search=QUICK if quick else SEARCH,
-    )
+    sheet, search = known(datasheet), QUICK if quick else SEARCH
+    with threadpool_limits(1):  # ours are for recordings and effects; small matrices are slower on many, and differ
+        found = pipeline.diagnose(trained, sheet, held, seed=seed, jobs=jobs, progress=progress, search=search)
     return Diagnosis(found)
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, TypedDict, Unpack
 
+from threadpoolctl import threadpool_limits
+
 from ers_mj.data.recording import Recording
 from ers_mj.door.known import Known, known
 from ers_mj.door.model import Model
@@ -131,7 +133,9 @@ def identify(
         raise InputError("no recording was given, at least one was expected")
     refuse_twice(given, [])
     refuse_mixed_inputs(given)
-    return Identification(estimate.identify(given, known(datasheet), settings, progress), given)
+    with threadpool_limits(1):
+        found = estimate.identify(given, known(datasheet), settings, progress)
+    return Identification(found, given)
 
 
 def _document(found: Identified, recordings: Sequence[Recording]) -> dict[str, Any]:

@@ -78,11 +78,11 @@ def _run_in(model: Model, trace: Trace, record: int, rate: float) -> tuple[np.nd
             channel.kind == "current" and model.dead_time > 0
         ):  # before it is over it follows a command that was not recorded
             row[trace.t < trace.t[0] + model.dead_time] = 0.0
-    left = left.ravel()
-    left[trace.unseen] = 0.0
-    left.flags.writeable = False
-    trace.runs.keep(key, (left, motion))
-    return left, motion
+    flat = left.ravel()
+    flat[trace.unseen] = 0.0
+    flat.flags.writeable = False
+    trace.runs.keep(key, (flat, motion))
+    return flat, motion
 
 
 def cost_of(model: Model, traces: Sequence[Trace], rate: float, tau: float) -> float:

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from ers_mj.report import page
 from ers_mj.report.display import figure as digits
-from ers_mj.report.drawing import both_widths, decimate, margins, restart_ids
+from ers_mj.report.drawing import both_widths, margins, restart_ids
 from ers_mj.report.style import STYLE
+from ers_mj.report.thinning import decimate
 
 
 def model_page(title: str, numbers: Iterable[tuple[str, str, float]]) -> str:
