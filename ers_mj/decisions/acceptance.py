@@ -121,6 +121,14 @@ def is_asked_for(offer: Offer, bar: Bar, policy: Policy = POLICY, least: float |
     return offer.gain >= least and (offer.z >= bar.z or offer.lost <= lost * offer.gain)
 
 
+def holds(gain: float, left: float, blocks: int, policy: Policy = POLICY) -> bool:
+    """Whether an effect that stands in a baseline's spring's place takes so much of the C that is ``left`` over so many
+    ``blocks`` that nothing else need be compared with it: a good part, or half of the squared error nearly everywhere.
+    """
+    much = min(policy.good_part * left, -math.log(1.0 - policy.half) * blocks)
+    return gain >= max(policy.least_gain, policy.support * blocks, much)
+
+
 def is_steady(offer: Offer, policy: Policy = POLICY) -> bool:
     """Whether a law of the servo buys little, but nearly everywhere."""
     return not offer.clocked and offer.gain >= policy.steady and offer.z >= policy.steady

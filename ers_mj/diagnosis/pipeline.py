@@ -67,6 +67,7 @@ def diagnose(
         start.fit,
         start.traces,
         anchors=start.anchors,
+        held=start.held,
         exclude=(*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,

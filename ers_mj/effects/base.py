@@ -85,6 +85,7 @@ class Effect:
         False
     )
     is_play: ClassVar[bool] = False  # a slack between motor and rudder, which a plant has once
+    holds_place: ClassVar[bool] = False  # it may stand in a baseline where others have a spring (see ``columns``)
     after_noise: ClassVar[bool] = False  # a sensor's converter or wire: it acts on what is read, noise and all
     holds: ClassVar[bool] = False  # a wire that brings an earlier reading again
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
@@ -132,6 +133,10 @@ class Effect:
         them (``sprung``), since it disturbs that search most; None where it does not.
         """
         return None
+
+    def columns(self, y: np.ndarray) -> np.ndarray:
+        """Torques (N, k) along the output y (N,) that one of each of its numbers makes, if it ``holds_place``."""
+        raise NotImplementedError
 
     def grown(self, name: str, p: np.ndarray, scales: Scales) -> list[np.ndarray]:
         """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of

@@ -16,6 +16,7 @@ from ers_mj.decisions import acceptance, explained
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.decisions.verdict import is_more_than_noise
 from ers_mj.effects import BY_NAME
+from ers_mj.estimation.baseline import Held
 from ers_mj.estimation.fit import hopped
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.objective import Fit, is_rough, tau_of
@@ -53,6 +54,7 @@ def select(
     traces: Sequence[Trace],
     *,
     anchors: Sequence[Mapping[str, float]] = (),
+    held: Held | None = None,
     exclude: Sequence[str] = (),
     jobs: int = 1,
     progress: Progress = lambda text, share: None,
@@ -61,13 +63,19 @@ def select(
 ) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
+    A baseline in which an effect is ``held`` for a spring is what it grows from where that explains far more, and a
+    candidate of the first round where not.
+
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle,
     is left out as the ``budget`` of simulation is spent, the selection's own unless one is handed in.
     """
     budget = Budget(traces) if budget is None else budget
     base = replace(base, model=replace(base.model, effort=budget.effort))
     bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget=budget)
-    return _Stepwise(bench, base, anchors, progress).run()
+    growing = _Stepwise(bench, base, anchors, progress)
+    if held is not None:
+        growing.begin_with(held)
+    return growing.run()
 
 
 class _Stepwise:
@@ -79,6 +87,23 @@ class _Stepwise:
         self.trail: list[Move] = []
         self.tried: set[str] = set()  # of what is tried once a case
         self.mended, self.took = 0, 0.0
+        self.held: Fit | None = None  # a baseline that holds the output otherwise, as a candidate
+        self.given: tuple[str, ...] = ()  # effects of the baseline
+
+    def begin_with(self, held: Held) -> None:
+        """Grow from a baseline that holds the output otherwise, where it explains far more; else keep it as a
+        candidate.
+        """
+        bench = replace(self.bench, tau=tau_of(held.fit.misfit), traces=held.traces)
+        base = bench.fit(self.base.model, 12)
+        found = replace(held.fit, model=replace(held.fit.model, effort=bench.budget.effort))
+        one = bench.judged(found.model.names[-1], found, base)
+        if not acceptance.holds(one.gain, bench.cost(base), base.misfit.size, bench.policy):
+            self.held = found
+            return
+        self._note("add", found, one.gain, True, "it holds the output in the place of a spring")
+        self.bench, self.base, self.current, self.given = bench, base, found, found.model.names
+        self.rounds.append((one,))
 
     def run(self) -> Selection:
         while self._may_go_on():
@@ -114,7 +139,11 @@ class _Stepwise:
         return self.bench.budget.spent < self.bench.budget.sweeps
 
     def _taken(self) -> int:
-        return rounds_that_count(len(self.rounds), self.current.model)
+        return rounds_that_count(len(self.rounds), self.current.model) - self._given()
+
+    def _given(self) -> int:
+        """How many of the effects are the baseline's own."""
+        return sum(name in self.given for name in self.current.model.names)
 
     def _is_in_order(self) -> bool:
         """Whether a further effect may be told that takes a small part only: of few, or near the noise, or after one
@@ -137,6 +166,8 @@ class _Stepwise:
         last = bench.budget.raced if is_dear(current) else math.inf
         anchors = self.anchors if not self.rounds else ()
         ranked = candidates(bench.without((*current.model.names, *slow)), current, anchors, bar.faint, last)
+        if self.held is not None and not self.rounds:
+            ranked = joined(ranked, [bench.judged(self.held.model.names[-1], self.held, current)])
         leader, may_mend = ranked[0] if ranked else None, self.mended < self._most_mended()
         if may_mend and (again := self._way_back(ranked, bar)) is not None:
             won = self._mend(again)
@@ -154,7 +185,7 @@ class _Stepwise:
     def _bar(self) -> acceptance.Bar:
         """What must be bought beside the model as it stands."""
         current, bench = self.current, self.bench
-        named, left = len(current.model.names), bench.cost(current)
+        named, left = len(current.model.names) - self._given(), bench.cost(current)
         return acceptance.bar(left, named, is_dear(current), self._is_in_order(), False, bench.policy)
 
     def _most_mended(self) -> int:
