@@ -1,4 +1,4 @@
-"""How servos of other families are told: `python analysis/score_foreign.py [--cases f1-1 f1-3] [--sheet none|own|full]`.
+"""How servos of other families are told: `python analysis/score_foreign.py --cases f1-1 --sheet none`.
 
 Diagnoses the cases of ../shared/foreign and the torque-driven joints of ../shared/menagerie, keeps what each answered
 under --out (a case that is there is not asked again), and prints a line a case and the sums: the class right at first

@@ -105,7 +105,7 @@ def test_a_shaft_beside_a_bristle_equals_an_independent_scheme(name, x_s_deg, de
 @pytest.mark.parametrize(
     "label, strength, shape, ours",
     [
-        ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08, np.inf]),
+        ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08, *4 * [np.inf]]),
         (
             "cogging",
             0.04,

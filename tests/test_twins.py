@@ -115,7 +115,7 @@ def plain_form(name, p):
         ("asymmetric_friction", [30.0, 0.0, 0.2, 0.5]),
         ("stribeck", [80.0, 0.6, 2.0, 0.5]),
         ("load_disturbance", [250.0, 0.6, 0.5, 0.0, 0.1]),
-        ("load_dependent_friction", [0.3, 60.0]),
+        ("load_dependent_friction", [0.3, 60.0, *3 * [np.inf]]),
         ("periodic_gust", [40.0, 1.3, 0.4, 0.3, 0.5, 0.4, 1.0]),
     ],
 )

@@ -79,6 +79,7 @@ class Effect:
     follows_current: ClassVar[bool] = (
         False  # its law changes as fast as the current, or within a small angle: half the segment length
     )
+    parts_damping: ClassVar[bool] = False  # it tells the back-EMF's share of the damping from the mechanical one
     at_motor: ClassVar[bool] = (
         # its torque and memory are the motor's, at whose angle and speed they are taken where a play or a shaft parts
         # it from the rudder
@@ -165,7 +166,7 @@ class Effect:
         return c
 
     def constants(self, p: np.ndarray, c: Coefficients) -> np.ndarray:
-        """What the compiled law receives as its ``p`` (at most 7 numbers)."""
+        """What the compiled law receives as its ``p`` (at most 11 numbers)."""
         return p
 
     def is_lawful(self, p: np.ndarray) -> bool:

@@ -36,6 +36,9 @@ class GravityImbalance(Load):
     def columns(self, y):
         return -np.column_stack([np.sin(y), np.cos(y)])
 
+    def coefficients(self, p, c):
+        return c._replace(g_s=c.g_s + p[0], g_c=c.g_c + p[1])
+
     @law
     def torque(p, theta, w, j, t):
         return -p[0] * math.sin(theta) - p[1] * math.cos(theta)

@@ -27,6 +27,9 @@ class Coefficients(NamedTuple):
     - force over level)^``dahl`` of the rudder's speed. Of one body (rho = 0 beside two_body) the bristle's foot is the
     second one; beside a motor's side the rudder's bristle has the share 1 - phi of level, stiffness and damping.
 
+    ``g_s`` and ``g_c`` say how gravity pulls at the rudder, -g_s sin theta - g_c cos theta: a law of its own makes that
+    torque (``gravity_imbalance``), here it tells others what the gear carries.
+
     Where the inductance falls with the current tau_e is divided by 1 + (``fall`` j)^2, until LEAST_IRON of it is left.
     """
 
@@ -59,6 +62,8 @@ class Coefficients(NamedTuple):
     dahl: float = 1.0
     harden: float = 0.0
     fall: float = 0.0
+    g_s: float = 0.0
+    g_c: float = 0.0
 
     @property
     def has_motor_side(self) -> bool:

@@ -45,6 +45,7 @@ class SupplySag(Drive):
     )
     needs = (("bridge", "whole", "measured"),)
     sized, tries = 3, 4
+    parts_damping = True
 
     def starts(self, scales):
         drawn = [

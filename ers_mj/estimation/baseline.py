@@ -23,6 +23,9 @@ from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
+# first share of the back-EMF in the damping where nothing tells it, how near to none or all it begins, and standard
+# deviations of its logarithm: where the letters of a datasheet tell the back-EMF, each within some 15 %, and where not
+SHARE, LEAST_SHARE, TOLD_PRIOR, UNTOLD_PRIOR = 0.5, 0.05, 0.3, 0.7
 OVER_INERTIA, INERTIAS = (
     ("a_1", "a_2", "b", "c_1", "c_2", "ampere"),
     (0.6, 0.7, 0.8, 1.2, 1.4, 1.8),
@@ -70,19 +73,32 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
             "no motion that the reduced model can make resembles these recordings: check units and signs of input and"
             " output"
         )
+    held = found.held and replace(found.held, fit=_sized(found.held.fit, found.held.traces, datasheet))
+    return replace(found, fit=_sized(found.fit, found.traces, datasheet), held=held)
+
+
+def _sized(found: Fit, traces: Sequence[Trace], datasheet: Datasheet | None) -> Fit:
+    """The fit with the scales that only a fitted model and a gear tell, and a back-EMF."""
+    model = _with_back_emf(found.model, traces, datasheet.emf_damping if datasheet is not None else None)
     gear = datasheet.parameters.get("n") if datasheet is not None else None
-    held = found.held and replace(found.held, fit=_sized(found.held.fit, found.held.traces, gear))
-    return replace(found, fit=_sized(found.fit, found.traces, gear), held=held)
-
-
-def _sized(found: Fit, traces: Sequence[Trace], gear: float | None) -> Fit:
-    """The fit with the scales that only a fitted model tells, and a gear."""
-    model = found.model
     # a turn of a motor: the least common multiple of its poles and slots, of which the smallest have two and three
     cogs = 3
     drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, traces, OBSERVER_RATE).motions)
     scales = replace(model.scales, drive=drive, cog=2 * np.pi / (cogs * gear) if gear else model.scales.cog)
     return replace(found, model=replace(model, scales=scales))
+
+
+def _with_back_emf(model: Model, traces: Sequence[Trace], damping: float | None) -> Model:
+    """The model with a first share of the back-EMF in the damping, and how well it is known, where neither a datasheet
+    nor the recordings tell it; ``damping`` [1/s] is the back-EMF's where a datasheet tells that. What is told a torque
+    or a current has none.
+    """
+    if model.values["emf_share"] > 0 or traces[0].input_kind in ("torque", "current"):
+        return model
+    share = min(max(damping / model.values["a_2"], LEAST_SHARE), 1.0 - LEAST_SHARE) if damping else SHARE
+    prior = math.log(share), TOLD_PRIOR if damping else UNTOLD_PRIOR
+    values = {**model.values, "emf_share": share}
+    return replace(model, values=values, priors={**(model.priors or {}), "emf_share": prior})
 
 
 def sharpened(start: Start, travel: float) -> Start:

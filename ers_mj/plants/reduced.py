@@ -105,8 +105,9 @@ class ReducedModel:
         c = self.coefficients
         given = {}
         for name, values in self.effects:
+            c = BY_NAME[name].coefficients(values, c)
+        for name, values in self.effects:
             effect = BY_NAME[name]
-            c = effect.coefficients(values, c)
             if (effect.torque or effect.friction or effect.inertia or effect.memory) and effect.is_lawful(values):
                 given[name] = effect.constants(values, c)
         on = acting(tuple(given), c.has_motor_side)

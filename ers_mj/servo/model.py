@@ -92,11 +92,18 @@ class Model:
         held = {name for effect, _ in self.effects for name in BY_NAME[effect].absorbs}
         local = self.local or {}
         return [
-            *of_base([n for n in self.free if n not in held], self.priors or {}, self.scales),
+            *of_base([n for n in (*self.free, *self._parted) if n not in held], self.priors or {}, self.scales),
             *of_effects(self.effects, self.frozen, local, self.scales),
             *of_recordings(local, self.frozen, self.scales),
             *of_states(self.states or {}, self.scales),
         ]
+
+    @property
+    def _parted(self) -> tuple[str, ...]:
+        """The back-EMF's share of the damping where it is known to be about its prior, and an effect tells it."""
+        asked = any(BY_NAME[name].parts_damping for name, _ in self.effects if name not in self.frozen)
+        unknown = "emf_share" in (self.priors or {}) and "emf_share" not in self.free
+        return ("emf_share",) if asked and unknown else ()
 
     def vector(self, layout: Sequence[Free]) -> np.ndarray:
         """The fitted numbers, transformed (logarithm of positive ones, others over their scale)."""
