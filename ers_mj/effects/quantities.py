@@ -30,6 +30,9 @@ class Coefficients(NamedTuple):
     ``g_s`` and ``g_c`` say how gravity pulls at the rudder, -g_s sin theta - g_c cos theta: a law of its own makes that
     torque (``gravity_imbalance``), here it tells others what the gear carries.
 
+    Where ``creep`` [1/s] is not 0 friction creeps below breakaway (effect ``presliding``): it grows with the speed at
+    that rate, up to the level; segments of a motion are as short as it asks for.
+
     Where the inductance falls with the current tau_e is divided by 1 + (``fall`` j)^2, until LEAST_IRON of it is left.
     """
 
@@ -64,6 +67,7 @@ class Coefficients(NamedTuple):
     fall: float = 0.0
     g_s: float = 0.0
     g_c: float = 0.0
+    creep: float = 0.0
 
     @property
     def has_motor_side(self) -> bool:
