@@ -121,11 +121,14 @@ def is_asked_for(offer: Offer, bar: Bar, policy: Policy = POLICY, least: float |
     return offer.gain >= least and (offer.z >= bar.z or offer.lost <= lost * offer.gain)
 
 
-def holds(gain: float, left: float, blocks: int, policy: Policy = POLICY) -> bool:
-    """Whether an effect that stands in a baseline's spring's place takes so much of the C that is ``left`` over so many
-    ``blocks`` that nothing else need be compared with it: a good part, or half of the squared error nearly everywhere.
+def holds(gain: float, left: float, blocks: int, is_sprung: bool, policy: Policy = POLICY) -> bool:
+    """Whether a baseline with an effect in the spring's place is the better one, by its gain over so many ``blocks``.
+
+    Over one with a spring, ``is_sprung``, a rival on equal terms, by what supports a spring. Over one without it must
+    take so much of the C that is ``left`` that nothing else need be compared with it: a good part, or half of the
+    squared error nearly everywhere.
     """
-    much = min(policy.good_part * left, -math.log(1.0 - policy.half) * blocks)
+    much = 0.0 if is_sprung else min(policy.good_part * left, -math.log(1.0 - policy.half) * blocks)
     return gain >= max(policy.least_gain, policy.support * blocks, much)
 
 

@@ -244,7 +244,7 @@ class Case:
     @cached_property
     def errors(self) -> dict[tuple[str, str], tuple[float, float]]:
         """95 % intervals of every fitted number, by (owner, name)."""
-        model = replace(self.model, states=None)
+        model = self.model.of_records(range(len(self.start.traces)))
         left_out = (
             self.confirmed.models
             if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2

@@ -110,6 +110,8 @@ class Presliding(Friction):
         return not np.isfinite(p[0]) and np.isfinite(p[4])
 
     def constants(self, p, c):
+        if c.creep <= 0.0:
+            return np.zeros(1)
         pull = c.bias + c.a_1 * c.theta_0, c.a_1, c.c_1, c.theta_0, c.g_s, c.g_c
         return np.array([c.creep, p[4] * c.creep, c.a_mech_plus, *pull])
 

@@ -89,7 +89,8 @@ class Scales:
     ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
     recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
     behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of
-    one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
+    one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most,
+    ``waves`` the (kind, period) of what it leaves along the travel: of a "torque", a "friction" or the "reading".
     """
 
     position: float
@@ -109,6 +110,11 @@ class Scales:
     duration: float = 10.0
     recordings: int = 1
     hot: tuple[tuple[int, float, float], ...] = ()
+    waves: tuple[tuple[str, float], ...] = ()
+
+    def finer_waves(self, kind: str, most: float) -> list[float]:
+        """The periods of the waves of a kind of which more than ``most`` lie within the travel."""
+        return [period for at, period in self.waves if at == kind and period * most < self.high - self.low]
 
 
 @dataclass(frozen=True)

@@ -178,8 +178,8 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[M
         found = along(begun, fold, _beside(slopes, begun, fold, whole)) if slopes else begun
         if np.array_equal(found.vector(begun.layout()), begun.vector(begun.layout())):
             found = along(begun, fold, columns_of(begun, fold.training, OBSERVER_RATE, by_tangents=False))
-        mine = {name: rows[[fold.record]] for name, rows in (model.local or {}).items()}
-        return settled(replace(found, local=mine or None), fold.held_out, tau)
+        mine = model.of_records([fold.record])
+        return settled(replace(found, local=mine.local, states=mine.states), fold.held_out, tau)
 
     with ThreadPoolExecutor(jobs) as pool:
         return list(pool.map(one, parts))
@@ -203,7 +203,7 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     held = (*model.names, *(f"{name}, local" for name in known))
     pair = (
         replace(model, states=None, local=known or None, free=(), frozen=held)
-        .with_state("gain", 2)
+        .with_state("load" if "load" in (model.states or {}) else "gain", 2)
         .with_state("friction_level", 2)
     )
     if model.values["a_1"] > 0 or model.values["c_1"] > 0:

@@ -25,6 +25,8 @@ from ers_mj.selection.budget import Budget
 from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import Candidate, bends_and_twists, is_dear, stands_alone
 from ers_mj.selection.drop import pruned, reconsidered
+from ers_mj.selection.foundation import held_beside, held_instead
+from ers_mj.selection.loads import under_loads
 from ers_mj.selection.moves import Grown, Move
 from ers_mj.selection.pair import beside_a_rival, paired, plants_beside
 from ers_mj.selection.swap import exchanged, in_its_place, other_way_round, reviewed, widened
@@ -75,6 +77,7 @@ def select(
     growing = _Stepwise(bench, base, anchors, progress)
     if held is not None:
         growing.begin_with(held)
+    growing.tell_loads()
     return growing.run()
 
 
@@ -90,68 +93,40 @@ class _Stepwise:
         self.held: Fit | None = None  # a baseline that holds the output otherwise, as a candidate
         self.given: tuple[str, ...] = ()  # effects of the baseline
 
+    # -- what it stands on --------------------------------------------------------------------------------------------
+
     def begin_with(self, held: Held) -> None:
-        """Grow from a baseline that holds the output otherwise, where it explains far more; else keep it as a
+        """Grow from a baseline that holds the output otherwise, where it is the better one; else keep it as a
         candidate.
         """
-        bench = replace(self.bench, tau=tau_of(held.fit.misfit), traces=held.traces)
-        base = bench.fit(self.base.model, 12)
-        found = replace(held.fit, model=replace(held.fit.model, effort=bench.budget.effort))
-        one = bench.judged(found.model.names[-1], found, base)
-        if not acceptance.holds(one.gain, bench.cost(base), base.misfit.size, bench.policy):
-            self.held = found
+        bench, base, one = held_instead(self.bench, self.base, held)
+        if one is None:
+            self.held = replace(held.fit, model=replace(held.fit.model, effort=self.bench.budget.effort))
             return
-        self._note("add", found, one.gain, True, "it holds the output in the place of a spring")
-        self.bench, self.base, self.current, self.given = bench, base, found, found.model.names
+        self._note("add", one.fit, one.gain, True, "it holds the output in the place of a spring")
+        self.bench, self.base, self.current, self.given = bench, base, one.fit, one.fit.model.names
         self.rounds.append((one,))
 
-    def run(self) -> Selection:
-        while self._may_go_on():
-            if self._taken() >= self.bench.policy.most_effects:
-                if not self._look_again(("pair", self._pair)):
-                    break
-                continue
-            comparison = self._compare()
-            if comparison is None:  # the model itself has been mended
-                continue
-            ranked, bar = comparison
-            asked, because = self._asked(ranked, bar)
-            self.rounds.append(tuple(sorted(ranked, key=lambda c: c is not asked)))
-            if asked is None:
-                self._note("add", self.current, 0.0, False, because)
-                if not self._look_again(("swap", self._review), ("pair", self._pair), ("pair", self._part)):
-                    break
-                self.tried.add("review")
-            else:
-                self._add(because)
-        bench = self.bench
-        return Selection(self.base, self.current, tuple(self.rounds), bench.tau, bench.traces, tuple(self.trail))
+    def tell_loads(self) -> None:
+        """Give each recording a load of its own, where that is what they differ by, before anything is missed."""
+        if (found := under_loads(self.bench, self.current)) is None:
+            return
+        one, is_bare = self.bench.judged("load", found, self.current), not self.current.model.names
+        self._note("add", found, one.gain, True, "recordings fitted one by one are of different loads")
+        states = found.model.states
+        self.base = found if is_bare else self.bench.fit(replace(self.base.model, states=states), 20)
+        self.current = found
+        self.rounds.append((one,))
 
-    # -- how far it goes -----------------------------------------------------------------------------------------------
-
-    def _may_go_on(self) -> bool:
-        """Whether another round may begin."""
-        budget, current = self.bench.budget, self.current
-        longer = not is_dear(current) and self.bench.leaves_more_than_forks(current)
-        return budget.spent < (budget.longest if longer else budget.last)
-
-    def _may_sweep(self) -> bool:
-        return self.bench.budget.spent < self.bench.budget.sweeps
-
-    def _taken(self) -> int:
-        return rounds_that_count(len(self.rounds), self.current.model) - self._given()
-
-    def _given(self) -> int:
-        """How many of the effects are the baseline's own."""
-        return sum(name in self.given for name in self.current.model.names)
-
-    def _is_in_order(self) -> bool:
-        """Whether a further effect may be told that takes a small part only: of few, or near the noise, or after one
-        that took a good part.
-        """
-        policy, few = self.bench.policy, self._taken() < self.bench.policy.fewer_effects
-        near = explained.is_near_noise(self.current.misfit, policy)
-        return self.bench.budget.spent < self.bench.budget.last and (few or near or self.took >= policy.good_part)
+    def _hold_otherwise(self) -> None:
+        """Stand on what holds the output otherwise, where what was found since shows it."""
+        if self.held is None or any(name in self.current.model.names for name in self.held.model.names):
+            return
+        if (found := held_beside(self.bench, self.current, self.held)) is None:
+            return
+        self._go_on("swap", found, self.current, "what was found since shows what holds the output")
+        self.given, self.held = self.held.model.names, None
+        self.rounds.insert(0, (self.bench.judged(self.given[-1], found, self.base),))
 
     # -- comparing -----------------------------------------------------------------------------------------------------
 
@@ -298,6 +273,7 @@ class _Stepwise:
             found = self.bench.fit(other[0].fit.model, 20)
             self._go_on("swap", found, self.current, "the refit made of it a form of another effect")
         self._refine(leader.name)
+        self._hold_otherwise()
 
     def _refine(self, newest: str) -> None:
         """Out of local minima, into wider forms, into the place of earlier rivals."""
