@@ -36,10 +36,12 @@ class LoadDependentFriction(Friction):
     )
     follows_current = True
     parts_damping = True
-    sized, needs, together = 1, (("mu",),), (("mu_s", "w_s"),)
+    sized, tries, needs, together = 1, 2, (("mu",),), (("mu_s", "w_s"),)
 
     def starts(self, scales):
-        return [np.array([0.05, *4 * [np.inf]])]
+        """By the motor's torque, and by both sides' where the load has a torque of its own."""
+        motor, both = np.array([0.05, *4 * [np.inf]]), np.array([0.1, np.inf, 0.5, np.inf, np.inf])
+        return [motor, both] if scales.is_held else [motor]
 
     def grown(self, name, p, scales):
         """From one share of the motor's torque: of what both sides make of it; half of the share under as much as

@@ -90,7 +90,8 @@ class Scales:
     recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
     behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of
     one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most,
-    ``waves`` the (kind, period) of what it leaves along the travel: of a "torque", a "friction" or the "reading".
+    ``waves`` the (kind, period) of what it leaves along the travel: of a "torque", a "friction" or the "reading", ``is_held`` whether an effect holds the
+    output where others have a spring.
     """
 
     position: float
@@ -111,6 +112,7 @@ class Scales:
     recordings: int = 1
     hot: tuple[tuple[int, float, float], ...] = ()
     waves: tuple[tuple[str, float], ...] = ()
+    is_held: bool = False
 
     def finer_waves(self, kind: str, most: float) -> list[float]:
         """The periods of the waves of a kind of which more than ``most`` lie within the travel."""

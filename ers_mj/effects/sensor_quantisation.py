@@ -25,7 +25,7 @@ class SensorQuantisation(Sensor):
         """
         ordinary = max(policy.ordinary_step, policy.fine_step * seen.travel)
         step = float(np.median(seen.quanta))
-        bits = np.log2(2.0 * np.pi / step) if step > 0.0 else np.inf
+        bits = np.log2(2.0 * np.pi / step) if step > 0.0 else 0.0
         is_encoder = bits > policy.ordinary_bits - WHOLE and abs(bits - np.round(bits)) < WHOLE
         is_unusual = seen.is_angle and step > ordinary and not is_encoder
         is_coarse = np.max(seen.quanta) > policy.coarse_step * seen.travel

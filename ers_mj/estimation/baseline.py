@@ -20,7 +20,7 @@ from ers_mj.estimation.objective import Fit, run_of, tau_of
 from ers_mj.estimation.scales import ampere_in, free_in, scales_of
 from ers_mj.estimation.search import HOLDING, SPRINGS, Kinds, simplest
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.model import OBSERVER_RATE, Model
+from ers_mj.servo.model import OBSERVER_RATE, SIGNED, Model
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
 # first share of the back-EMF in the damping where nothing tells it, how near to none or all it begins, and standard
@@ -84,7 +84,10 @@ def _sized(found: Fit, traces: Sequence[Trace], datasheet: Datasheet | None) -> 
     # a turn of a motor: the least common multiple of its poles and slots, of which the smallest have two and three
     cogs = 3
     drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, traces, OBSERVER_RATE).motions)
-    scales = replace(model.scales, drive=drive, cog=2 * np.pi / (cogs * gear) if gear else model.scales.cog)
+    is_held = bool(model.effects)
+    scales = replace(
+        model.scales, is_held=is_held, drive=drive, cog=2 * np.pi / (cogs * gear) if gear else model.scales.cog
+    )
     return replace(found, model=replace(model, scales=scales))
 
 
@@ -155,14 +158,27 @@ def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angl
     """The datasheet's values refitted; where it names no spring, others may have what holds the output."""
     sheet = _of_datasheet(traces, known, is_angle)
     refitted, started, others = _refined(sheet, traces, jobs)
+    if explained.is_model_error(refitted.misfit) and _acts_the_other_way(traces, sheet.values["b"]):
+        turned = replace(sheet, values={**sheet.values, **{name: -sheet.values[name] for name in SIGNED}})
+        other, *more = _refined(turned, traces, jobs)
+        if other.cost < refitted.cost:
+            sheet, refitted, (started, others) = turned, other, more
     anchors = ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others)
     found = Start(refitted, started, anchors)
     if sheet.values["a_1"] > 0 or sheet.values["c_1"] > 0 or _explains(refitted):
         return found
-    kinds = Kinds.of(traces, known, is_angle)
+    kinds = Kinds.of(traces, {**known, **{n: sheet.values[n] for n in SIGNED if n in known}}, is_angle)
     if "a_1" not in known:
         found = _supported(found, _refined_springs(kinds, traces, jobs), anchors)
     return replace(found, held=_held(kinds, traces, jobs))
+
+
+def _acts_the_other_way(traces: Sequence[Trace], b: float) -> bool:
+    """Whether a regression says that the input acts the other way than a datasheet says."""
+    from ers_mj.estimation.initial_guess import guesses  # brings scipy.signal, as in search
+
+    best = next(iter(guesses(traces)), None)
+    return best is not None and best.values["b"] * b < 0
 
 
 def _explains(found: Fit) -> bool:

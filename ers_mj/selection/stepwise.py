@@ -15,7 +15,6 @@ from ers_mj.data.prepared import Trace
 from ers_mj.decisions import acceptance, explained
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.decisions.verdict import is_more_than_noise
-from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Held
 from ers_mj.estimation.fit import hopped
 from ers_mj.estimation.initial_state import with_starts
@@ -27,7 +26,7 @@ from ers_mj.selection.comparison import Candidate, bends_and_twists, is_dear, st
 from ers_mj.selection.drop import pruned, reconsidered
 from ers_mj.selection.foundation import held_beside, held_instead
 from ers_mj.selection.loads import under_loads
-from ers_mj.selection.moves import Grown, Move
+from ers_mj.selection.moves import Grown, Move, less
 from ers_mj.selection.pair import beside_a_rival, paired, plants_beside
 from ers_mj.selection.swap import exchanged, in_its_place, other_way_round, reviewed, widened
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
@@ -92,6 +91,54 @@ class _Stepwise:
         self.mended, self.took = 0, 0.0
         self.held: Fit | None = None  # a baseline that holds the output otherwise, as a candidate
         self.given: tuple[str, ...] = ()  # effects of the baseline
+
+    def run(self) -> Selection:
+        while self._may_go_on():
+            if self._taken() >= self.bench.policy.most_effects:
+                if not self._look_again(("pair", self._pair)):
+                    break
+                continue
+            comparison = self._compare()
+            if comparison is None:  # the model itself has been mended
+                continue
+            ranked, bar = comparison
+            asked, because = self._asked(ranked, bar)
+            self.rounds.append(tuple(sorted(ranked, key=lambda c: c is not asked)))
+            if asked is None:
+                self._note("add", self.current, 0.0, False, because)
+                if not self._look_again(("swap", self._review), ("pair", self._pair), ("pair", self._part)):
+                    break
+                self.tried.add("review")
+            else:
+                self._add(because)
+        bench = self.bench
+        return Selection(self.base, self.current, tuple(self.rounds), bench.tau, bench.traces, tuple(self.trail))
+
+    # -- how far it goes -----------------------------------------------------------------------------------------------
+
+    def _may_go_on(self) -> bool:
+        """Whether another round may begin."""
+        budget, current = self.bench.budget, self.current
+        longer = not is_dear(current) and self.bench.leaves_more_than_forks(current)
+        return budget.spent < (budget.longest if longer else budget.last)
+
+    def _may_sweep(self) -> bool:
+        return self.bench.budget.spent < self.bench.budget.sweeps
+
+    def _taken(self) -> int:
+        return rounds_that_count(len(self.rounds), self.current.model) - self._given()
+
+    def _given(self) -> int:
+        """How many of the effects are the baseline's own."""
+        return sum(name in self.given for name in self.current.model.names)
+
+    def _is_in_order(self) -> bool:
+        """Whether a further effect may be told that takes a small part only: of few, or near the noise, or after one
+        that took a good part.
+        """
+        policy, few = self.bench.policy, self._taken() < self.bench.policy.fewer_effects
+        near = explained.is_near_noise(self.current.misfit, policy)
+        return self.bench.budget.spent < self.bench.budget.last and (few or near or self.took >= policy.good_part)
 
     # -- what it stands on --------------------------------------------------------------------------------------------
 
@@ -176,7 +223,7 @@ class _Stepwise:
         policy = self.bench.policy
         if not ranked or not bar.faint <= ranked[0].gain <= policy.modest:
             return None
-        again = self.bench.fit(_less(ranked[0].fit.model, ranked[0].name), 12)
+        again = self.bench.fit(less(ranked[0].fit.model, ranked[0].name), 12)
         return again if self.bench.cost(self.current) - self.bench.cost(again) > policy.local_minimum else None
 
     def _mend(self, again: Fit) -> float:
@@ -266,7 +313,10 @@ class _Stepwise:
         current, self.rounds = reconsidered(bench, self.current, self.rounds)
         self._go_on("drop", current, self.current, "it was found in a model that the newest had bent")
         tau = tau_of(self.current.misfit)
-        self.bench = replace(bench, tau=tau, traces=_restarted(self.current.model, bench.traces))
+        traces = bench.traces
+        if is_rough(traces):  # within a step a model tells where the rudder began, and a wrong one tells it wrongly
+            traces = with_starts(self.current.model, traces)
+        self.bench = replace(bench, tau=tau, traces=traces)
         self.current = self.bench.fit(self.current.model, 20)
         if (other := in_its_place(bench, self.current, before, self.rounds[-1])) is not None:
             self.rounds[-1] = other
@@ -340,20 +390,6 @@ def rounds_that_count(rounds: int, model: Model) -> int:
     """
     effects = rounds - len(model.states or {})
     return effects - (effects > len(model.names))
-
-
-def _less(model: Model, name: str) -> Model:
-    """A model without an effect, or without what differs between recordings."""
-    if name in BY_NAME:
-        return model.without_effect(name)
-    return replace(model, states={k: v for k, v in (model.states or {}).items() if k != name} or None)
-
-
-def _restarted(model: Model, traces: Sequence[Trace]) -> Sequence[Trace]:
-    """The traces with new starts where converters are coarse: within a step a model tells where the rudder began, and a
-    wrong one tells it wrongly.
-    """
-    return with_starts(model, traces) if is_rough(traces) else traces
 
 
 def bending_and_twisting(model: Model) -> list[str]:
