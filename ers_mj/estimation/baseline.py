@@ -161,7 +161,7 @@ def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angl
     if explained.is_model_error(refitted.misfit) and _acts_the_other_way(traces, sheet.values["b"]):
         turned = replace(sheet, values={**sheet.values, **{name: -sheet.values[name] for name in SIGNED}})
         other, *more = _refined(turned, traces, jobs)
-        if other.cost < refitted.cost:
+        if explained.cost(other.misfit, 1.0) < explained.cost(refitted.misfit, 1.0):
             sheet, refitted, (started, others) = turned, other, more
     anchors = ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others)
     found = Start(refitted, started, anchors)

@@ -27,11 +27,12 @@ class Sizes:
     samples: float = 4.0
     steps: float = 4.0
     longest: int = 16000
-    stands_out: float = 12.0
+    stands_out: float = 4.0
     peaks: int = 2
 
 
 SIZES = Sizes()
+LAGS = 8  # samples of memory that are taken from what is left
 KINDS = "torque", "friction", "reading"  # where a wave may act
 
 
@@ -40,7 +41,7 @@ def waves_of(run: Run, traces: Sequence[Trace], sizes: Sizes = SIZES) -> tuple[t
 
     A wave exp(2 pi i y / period) of a torque moves the output through the plant and the observer that follows it,
     1 / ((s + a_2) (s + rate)); one of friction does so either way; one of the reading shows as it is. Each is compared
-    with what is left, as a share of its own size.
+    with what is left, as a share of its own size, both whitened: what is left holds slow errors far larger than a wave.
     """
     scales = run.model.scales
     travel = scales.high - scales.low
@@ -83,12 +84,22 @@ def _compared(left: np.ndarray, trace: Trace, rates: np.ndarray, a_2: float) -> 
     def through(wave: np.ndarray) -> np.ndarray:
         return lfilter([h * h], [1.0, -slow - fast, slow * fast], wave)
 
+    white = _whitening(left)
+    left = lfilter(white, 1.0, left)
+    left = left / max(float(np.std(left)), 1e-300)
     out = [(np.empty(rates.size, complex), np.empty(rates.size)) for _ in KINDS]
     for k, rate in enumerate(rates):
         wave = np.exp(1j * rate * y)
-        for (hit, power), seen in zip(out, (through(wave), through(wave * way), wave - wave.mean()), strict=True):
+        for (hit, power), moved in zip(out, (through(wave), through(wave * way), wave), strict=True):
+            seen = lfilter(white, 1.0, moved)
             hit[k], power[k] = left @ seen.conj(), float(np.vdot(seen, seen).real)
     return out
+
+
+def _whitening(left: np.ndarray) -> np.ndarray:
+    """A filter (LAGS + 1,) after which what is left has no memory: each sample less what the ones before foretell."""
+    before = np.column_stack([left[LAGS - k - 1 : -k - 1] for k in range(LAGS)])
+    return np.append(1.0, -np.linalg.lstsq(before, left[LAGS:], rcond=1e-9)[0])
 
 
 def _peaks(share: np.ndarray, sizes: Sizes) -> list[int]:
