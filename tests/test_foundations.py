@@ -17,8 +17,10 @@ from ers_mj.estimation.initial_guess import guesses
 from ers_mj.estimation.objective import run_of, tau_of
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.bench import Bench
+from ers_mj.selection.cross_validation import scored
 from ers_mj.selection.foundation import held_instead
 from ers_mj.selection.loads import under_loads
+from ers_mj.selection.measure import FREE_RUN, measure_of
 from ers_mj.selection.spectrum import waves_of
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import OBSERVER_RATE
@@ -145,3 +147,26 @@ def test_a_spectrum_over_the_angle_finds_a_wave_finer_than_any_start(arm):
     traces = [swung(k, [("cogging", np.array([6.0, travel / 61, 0.3, np.inf, np.inf]))]) for k in range(3)]
     found = [period for kind, period in waves_of(run_of(arm.held.fit.model, traces, OBSERVER_RATE), traces)]
     assert any(travel / period == pytest.approx(61, abs=1.0) for period in found)
+
+
+def test_an_arm_that_hangs_is_run_freely_and_one_that_swings_over_in_windows(arm):
+    """What holds its place forgets its start; the error of what does not adds up, whatever its cause."""
+    held = arm.held.fit.model
+    low = replace(swung(0), y=0.3 * np.sin(T))
+    assert measure_of(held, [low]).name == "free_run"
+    over = replace(swung(0), y=4.0 * np.sin(T))
+    assert measure_of(held, [over]).name == "windows"
+    assert measure_of(held.without_effect("gravity_imbalance"), [low]).name == "windows"
+
+
+def test_windows_leave_the_noise_where_the_model_is_right():
+    """And what they leave of a wrong one does not hang on how long the recording is."""
+    free = {**ARM, "c_2": 1.0}
+    trace = swung(1, values=free, pull=np.array([1e-9, 0.0]))
+    model = baseline([trace], Datasheet(lumped={k: free[k] for k in ("a_1", "a_2", "b", "c_2")}), True).fit.model
+    measure = measure_of(model, [trace])
+    assert measure.window_s == 2.0
+    assert scored(model, trace, measure=measure).rmse == pytest.approx(NOISE, rel=0.15)
+    wrong = replace(model, values={**model.values, "b": 1.01 * model.values["b"]})
+    windows, run = (scored(wrong, trace, measure=one).rmse for one in (measure, FREE_RUN))
+    assert 2.0 * NOISE < windows < run

@@ -9,15 +9,15 @@ from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import RecordView, Rung
 from ers_mj.diagnosis.localisation import Samples, shaded
 from ers_mj.effects import BY_NAME
-from ers_mj.selection.cross_validation import free_run, pooled
+from ers_mj.selection.cross_validation import pooled
 
 
 def views(case: Case, samples: Samples) -> list[RecordView]:
     """Every recording, the held-out ones first, with where it is explained least."""
-    out = []
+    out, run = [], case.confirmed.measure.run
     for model, base, fold in zip(case.confirmed.models, case.confirmed.base_models, case.confirmed.parts):
         t = fold.held_out
-        out.append(RecordView(t.name, True, t.t, t.u, t.y, free_run(base, t), free_run(model, t), ()))
+        out.append(RecordView(t.name, True, t.t, t.u, t.y, run(base, t), run(model, t), ()))
     held_names = {v.name for v in out}
     for k, t in enumerate(case.start.traces):
         spans = shaded(t, k, samples) if case.verdict in ("missing_physics", "unexplained") else ()
@@ -32,8 +32,8 @@ def views(case: Case, samples: Samples) -> list[RecordView]:
                     t.t,
                     t.u,
                     t.y,
-                    free_run(case.start.fit.model, t, k),
-                    free_run(case.model, t, k),
+                    run(case.start.fit.model, t, k),
+                    run(case.model, t, k),
                     spans,
                 )
             )
