@@ -133,7 +133,7 @@ def kept(row: dict, folds: dict, name: str, policy: Policy) -> bool:
         log_ratio=number(judged["log_ratio"]),
     )
     excluded = any(row.get(key) for key in ("may_be_none", "a_converters", "any_wave"))
-    again = row.get("recalibrated") or {"after": 1.0, "before": 0.0}
+    again = {"after": 1.0, "before": 0.0} | (row.get("recalibrated") or {})  # without errors: nothing to recalibrate
     halved = again["after"] ** 2 < policy.half * again["before"] ** 2
     return confirmation.is_confirmed(held, lambda: halved, policy) and not excluded
 

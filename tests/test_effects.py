@@ -22,7 +22,9 @@ ids = {"ids": lambda e: e.name}
 
 @pytest.mark.parametrize("effect", EFFECTS, **ids)
 def test_a_member_declares_itself(effect):
-    assert effect.name and effect.sentence and effect.parameters and type(effect).__doc__
+    assert (
+        effect.name and effect.sentence and effect.parameters and type(effect).__doc__ and effect.mjcf and effect.apart
+    )
     assert effect.subsystem in ("drive", "transmission", "load", "sensor")
     text = effect.describe({p.name: "1" for p in effect.parameters})
     assert "{" not in text

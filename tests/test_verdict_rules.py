@@ -103,8 +103,8 @@ def test_what_memory_and_held_out_error_both_miss_is_left(explained, output, hel
     assert not rules.is_a_part(replace(case, names=()))
 
 
-def test_the_mimic_of_an_unknown_effect_takes_a_part_only():
-    """A mimic in the output is seldom one in the current, which no form of the right law leaves amiss."""
+def test_what_stands_for_an_unknown_effect_takes_a_part_only():
+    """What stands for it in the output seldom does in the current, which no form of the right law leaves amiss."""
     assert not rules.is_more_than_noise(left(0.08), None) and rules.is_more_than_noise(left(0.09), None)
     assert not rules.is_more_than_noise(left(0.14), left(0.5))
     assert rules.is_more_than_noise(left(0.16), left(0.5))

@@ -5,6 +5,7 @@ frequency), output (files, JSON, lines). What is slow to import is imported insi
 """
 
 from ers_mj.commands import (
+    cache,
     demo,
     diagnose,
     excite,
@@ -19,4 +20,4 @@ from ers_mj.commands import (
     watch,
 )
 
-COMMANDS = (demo, diagnose, identify, simulate, validate, view, prove, trial, gains, frequency, watch, excite)
+COMMANDS = (demo, diagnose, identify, simulate, validate, view, prove, trial, gains, frequency, watch, excite, cache)

@@ -19,7 +19,8 @@ from ers_mj.commands.options import (
     several,
     swing_deg,
 )
-from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
+from ers_mj.commands.output import Progress, bold, written
+from ers_mj.door.saving import as_json, plain, report_writers, versions, write_results
 
 if TYPE_CHECKING:
     from ers_mj.control.frequency.study import Study

@@ -14,15 +14,35 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from ers_mj.data.checks import FEWEST_SAMPLES as FEWEST_SAMPLES
 from ers_mj.data.checks import GAP as GAP
 from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_time
-from ers_mj.data.columns import COLUMNS, CONSTANT, OPTIONAL, choose_columns, input_name, kind_of, refuse_unknown_unit
+from ers_mj.data.columns import (
+    COLUMNS,
+    CONSTANT,
+    OPTIONAL,
+    Choice,
+    choose_columns,
+    input_name,
+    kind_of,
+    refuse_unknown_unit,
+)
 from ers_mj.data.consistency import consistent
 from ers_mj.data.consistency.sheet import Fault, Sheet
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.data.tables import cell_of, listed, numbers, parse_table, read_content, select_run, split_spec, write_whole
+from ers_mj.data.tables import (
+    cell_of,
+    listed,
+    numbers,
+    parse_table,
+    read_content,
+    reason,
+    select_run,
+    split_spec,
+    write_whole,
+)
 from ers_mj.errors import InputError
 
 
@@ -85,6 +105,12 @@ class Recording:
         """Lock the arrays again: a copy that has been to another process comes back writeable."""
         self.__dict__.update({key: locked(x) if isinstance(x, np.ndarray) else x for key, x in state.items()})
 
+    def __repr__(self) -> str:
+        return (
+            f"<Recording {self.name}: {self.t.size} samples over {self.duration:.4g} s, input in {self.input_unit},"
+            f" output in {self.output_unit}>"
+        )
+
     @property
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
@@ -139,6 +165,48 @@ def read_recording(
     content = read_content(path)
     table = select_run(parse_table(content, path.suffix.lower(), name), run, name)
     choice = choose_columns(table.column_names, dict(mapping or {}), name, input_column, second)
+    return _of_table(table, choice, name, str(path), hashlib.sha256(content).hexdigest())
+
+
+def from_columns(
+    columns: Mapping[str, Any],
+    mapping: Mapping[str, str] | None = None,
+    name: str = "array",
+    *,
+    input_column: str | None = None,
+    second: str | None = None,
+) -> Recording:
+    """A recording from columns (N,) under the names and units that a file's columns have; they are copied.
+
+    Args:
+        columns: name -> what makes an array (N,), or one number of the whole recording; those that mean nothing here
+            are ignored and told.
+        mapping, input_column, second: as `read_recording` takes them.
+        name: what the recording is called.
+
+    Raises:
+        InputError: as `read_recording` does.
+    """
+    arrays = {str(label): np.asarray(column) for label, column in columns.items()}
+    longest = max((x.size for x in arrays.values()), default=0)
+    arrays = {label: np.full(longest, x) if x.ndim == 0 else x for label, x in arrays.items()}
+    for label, x in arrays.items():
+        if x.ndim != 1:
+            raise InputError(f"{name}: {label} has shape {x.shape}, (N,) was expected")
+    count = {label: x.size for label, x in arrays.items()}
+    if len(set(count.values())) > 1:
+        raise InputError(f"{name}: columns of one length are expected, these have {count}")
+    try:
+        table = pa.table(arrays)
+    except pa.ArrowException as error:
+        raise InputError(f"{name}: holds what is no column of numbers ({reason(error)})") from None
+    content = b"".join(label.encode() + arrays[label].tobytes() for label in sorted(arrays))
+    choice = choose_columns(table.column_names, dict(mapping or {}), name, input_column, second)
+    return _of_table(table, choice, name, "", hashlib.sha256(content).hexdigest())
+
+
+def _of_table(table: pa.Table, choice: Choice, name: str, path: str, sha256: str) -> Recording:
+    """The recording in a table of named columns, these of them chosen."""
     roles = {field: COLUMNS[contract] for field, contract in choice.roles().items()}
     labels = {field: choice.columns[contract] for field, contract in choice.roles().items()}
     printed = {field: numbers(table[column], column, name) for field, column in labels.items()}
@@ -147,7 +215,7 @@ def read_recording(
     found = read.fields(printed, factors, ignored(table.column_names, labels.values()))
     if choice.second:
         found |= {"second_name": choice.second, "second_unit": roles["second"].unit}
-    return Recording(**found, path=str(path), sha256=hashlib.sha256(content).hexdigest())
+    return Recording(**found, path=path, sha256=sha256)
 
 
 def write_recording(path: str | os.PathLike[str], columns: Mapping[str, Sequence[float] | np.ndarray]) -> None:

@@ -81,11 +81,11 @@ def asked(
         and is_asked_for(offer, bar, policy, least_of(offer, stands_alone, bar, policy))
     ]
     if not wanted:
-        return None, f"no effect buys {bar.usual:.3g} of C beyond chance"
+        return None, f"no effect lowers the robust cost by {bar.usual:.3g} beyond chance"
     first = wanted[0]
     if first.once:
         return _beside_an_impulse(first, offers[0], wanted[1:], policy)
-    return first, f"it buys {first.gain:.3g} of C, {bar.usual:.3g} asked"
+    return first, f"it lowers the robust cost by {first.gain:.3g}, {bar.usual:.3g} is asked"
 
 
 def least_of(offer: Offer, stands_alone: bool, bar: Bar, policy: Policy = POLICY) -> float:

@@ -345,7 +345,7 @@ class Policy:
         0.75,
         "share of held-out C, or of memory",
         "the same",
-        "a mimic takes half: of 20 unknown effects of 4157 to 4168 with one 0.55 at most, by what was fitted",
+        "what stands for an unknown law takes half: of 20 of 4157 to 4168 with one 0.55 at most, by what was fitted",
     )
     fair: float = _threshold(
         0.4, "share of squared error", "the same, beside memory", "one free run weighs as much as another"

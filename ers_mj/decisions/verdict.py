@@ -71,9 +71,9 @@ def share(before: float, after: float, noise: float) -> float:
 
 def is_more_than_noise(left: Left, without: Left | None, policy: Policy = POLICY) -> bool:
     """Whether what a model leaves is more than noise, or, of one with effects that leaves so much ``without`` them,
-    more than another form of the same law would: the mimic of an unknown effect takes a part only.
+    more than another form of the same law would: what stands for an unknown effect takes a part only.
 
-    A mimic in the output is seldom one in the current, which no form of the right law leaves amiss.
+    What stands for it in the output seldom does in the current, which no form of the right law leaves amiss.
     """
     least = {"output": max(policy.mismatch, policy.other_form * without["output"])} if without else {}
     return any(power > least.get(kind, policy.mismatch) for kind, power in left.items())
@@ -138,8 +138,8 @@ def is_more_missing(f: Findings, policy: Policy = POLICY) -> bool:
 
 
 def is_a_part(f: Findings, policy: Policy = POLICY) -> bool:
-    """Whether memory and held-out error agree that the named effects are a part only, as the mimic of an unknown effect
-    is.
+    """Whether memory and held-out error agree that the named effects are a part only, as what stands for an unknown
+    effect is.
     """
     is_left = f.explained < policy.nearly_all and f.left["output"] > policy.part
     return bool(told_effects(f, policy)) and is_left and f.free_held < policy.fork_lost

@@ -22,6 +22,7 @@ from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.intervals import half_widths, slopes_of, unseen_widths
 from ers_mj.estimation.objective import Fit, residuals
+from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.comparison import Candidate
 from ers_mj.selection.confirmation import Confirmed
 from ers_mj.selection.cross_validation import Score, pooled, recalibrated, scored
@@ -49,6 +50,7 @@ class Case:
     rig: Rig
     multibody: tuple[float | None, float | None]
     policy: Policy = POLICY
+    search: Search = SEARCH
 
     @property
     def model(self) -> Model:
@@ -85,6 +87,7 @@ class Case:
     def fits(self) -> dict:
         """The errors before and after, as diagnosis.json has them."""
         c, base, model = self.confirmed, self.start.fit.model, self.model
+        ran = f"of what was held out the MuJoCo plant ran {self._run_in_mujoco if self.search.in_mujoco else 'nothing'}"
         traces = list(enumerate(self.start.traces))
         train = [pooled([scored(m, t, k, measure=c.measure) for k, t in traces]).rmse for m in (base, model)]
         before, after = pooled(c.before), pooled(c.after)
@@ -103,7 +106,7 @@ class Case:
             "mujoco_heldout_rmse_after_rad": self.multibody[1],
             "noise_floor_rad": self.noise,
             "heldout_from": c.sentence,
-            "mujoco_heldout_from": f"of what was held out the MuJoCo plant ran {self._run_in_mujoco}",
+            "mujoco_heldout_from": ran,
             "selection_cost_before": self.start.fit.cost,
             "selection_cost_after": self.selection.chosen.cost,
         }

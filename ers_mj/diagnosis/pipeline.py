@@ -22,9 +22,10 @@ from ers_mj.effects.quantities import Symptoms
 from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes
-from ers_mj.selection.confirmation import confirmed
+from ers_mj.selection.budget import SEARCH, Budget, Search
+from ers_mj.selection.confirmation import Confirmed, confirmed
 from ers_mj.selection.confounders import without_confounders
-from ers_mj.selection.stepwise import select
+from ers_mj.selection.stepwise import Selection, select
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import MOST_TAU, Model
 
@@ -40,6 +41,7 @@ def diagnose(
     jobs: int | None = None,
     progress: Progress = lambda text, share: None,
     policy: Policy = POLICY,
+    search: Search = SEARCH,
 ) -> Diagnosis:
     """Locate, name and model what a simulation of these recordings leaves out.
 
@@ -51,6 +53,7 @@ def diagnose(
         jobs: threads; all cores by default. The result does not depend on it.
         progress: called with a text and a share of the work done.
         policy: the thresholds that decide.
+        search: how far it is searched, and which parts are left out.
 
     Raises:
         InputError: no motion of the model resembles the recordings.
@@ -72,6 +75,7 @@ def diagnose(
         jobs=jobs,
         progress=progress,
         policy=policy,
+        budget=Budget(start.traces, search=search),
     )
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
     chosen = replace(
@@ -80,18 +84,24 @@ def diagnose(
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
-    named, suspects = without_confounders(selection, start.traces, jobs, policy)
+    named, suspects = without_confounders(selection, start.traces, jobs, policy, search)
     if named is not selection:
         selection, judged = confirmed(start, named, held, jobs, policy)
-    progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
-    before = rig.rmse(judged.base_models, judged.parts, jobs)
-    multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
+    multibody = _in_mujoco(rig, selection, judged, jobs, progress) if search.in_mujoco else (None, None)
     progress("locating", 0.92)
-    case = Case(
-        recordings, list(holdout), datasheet, start, selection, judged, sensors, suspects, seed, rig, multibody, policy
-    )
+    given = recordings, list(holdout), datasheet
+    case = Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search)
     return told(case, held)
+
+
+def _in_mujoco(
+    rig: Rig, selection: Selection, judged: Confirmed, jobs: int, progress: Progress
+) -> tuple[float | None, float | None]:
+    """The held-out errors of the MuJoCo plants before and after, the same where nothing is named."""
+    progress("running the MuJoCo plant", 0.84)
+    before = rig.rmse(judged.base_models, judged.parts, jobs)
+    return before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
 
 
 def _ordinary(model: Model, policy: Policy) -> list[str]:

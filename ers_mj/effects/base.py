@@ -42,6 +42,7 @@ class Effect:
     sentence: ClassVar[str] = ""
     subsystem: ClassVar[str] = ""
     mjcf: ClassVar[str] = ""
+    apart: ClassVar[str] = ""  # what tells it from its neighbours, for the catalogue of docs/effects.md
     named: ClassVar[bool] = (
         # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see confounders.py)
         True

@@ -20,6 +20,10 @@ class Cogging(Drive):
         "a passive dcmotor on the rudder's angle, or the motor's where that is a body of its own, its cogging of one"
         " pole behind a gear of 2 pi / period, and another for the second harmonic"
     )
+    apart = (
+        "returns with the angle with or without current, faster than a gear's ripple; a periodic_gust returns "
+        "with the clock"
+    )
     parameters = (
         Parameter("A", "torque", "amplitude, seen at the output", positive=False),
         Parameter("period", "position", "period, seen at the output"),

@@ -15,6 +15,10 @@ class GravityImbalance(Load):
     name = "gravity_imbalance"
     sentence = "gravity pulls at an off-centre mass: {g_s} sin(angle) + {g_c} cos(angle)"
     mjcf = "an off-axis point mass under gravity, every other part weightless; its inertia is taken from the rudder"
+    apart = (
+        "follows sine and cosine of the angle; over a narrow travel it is a bias_torque and a spring, and is told "
+        "as such"
+    )
     parameters = (
         Parameter("g_s", "torque", "m g l cos(phase)", positive=False),
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),

@@ -19,6 +19,9 @@ class LoadDependentFriction(Friction):
     name = "load_dependent_friction"
     sentence = "friction grows by {mu} of the torque that the gear transmits"
     mjcf = "none: frictionloss is set step by step from the current and the load"
+    apart = (
+        "grows with the motor's torque; position_dependent_friction changes with the place, stribeck with speed alone"
+    )
     parameters = (
         Parameter("mu", "ratio", "share of the transmitted torque lost to friction", upper=1.8),
         Parameter("half", "torque", "torque at the rudder under which the share is half of that", absent=np.inf),

@@ -40,6 +40,9 @@ class Presliding(Friction):
         "LuGre friction of a dcmotor without torque on the absolute angle (lugre), in place of frictionloss; one that"
         " creeps is set step by step from the speed"
     )
+    apart = (
+        "the rudder gives and springs back within the stuck phase, where stribeck and Coulomb friction hold it still"
+    )
     parameters = (
         Parameter("x_s", "position", "level of friction over its stiffness at rest"),
         Parameter(

@@ -90,8 +90,8 @@ class Scales:
     recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
     behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of
     one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most,
-    ``waves`` the (kind, period) of what it leaves along the travel: of a "torque", a "friction" or the "reading", ``is_held`` whether an effect holds the
-    output where others have a spring.
+    ``waves`` the (kind, period) of what it leaves along the travel: of a "torque", a "friction" or the "reading",
+    ``is_held`` whether an effect holds the output where others have a spring.
     """
 
     position: float

@@ -18,6 +18,9 @@ class SensorNonlinearity(Sensor):
     name = "sensor_nonlinearity"
     sentence = "the sensor errs along the travel (bend {bend}, twist {twist}, wave {A} every {period})"
     mjcf = "none: the reading is bent after the simulation"
+    apart = (
+        "errs at rest as in motion and in proportion to nothing but the place; a variable_ratio changes the dynamics"
+    )
     parameters = (
         Parameter("bend", "per_position", "error per angle squared", positive=False, absent=np.inf),
         Parameter("twist", "per_position_squared", "error per angle cubed", positive=False, absent=np.inf),

@@ -13,6 +13,7 @@ class SensorQuantisation(Sensor):
     name = "sensor_quantisation"
     sentence = "the sensor counts in steps of {step}"
     mjcf = "none: the reading is rounded after the simulation"
+    apart = "readings lie on a grid; seen in the data itself, before any fit"
     tangible, after_noise = False, True
     parameters = (Parameter("step", "position", "one count of the sensor"),)
 

@@ -22,6 +22,7 @@ class ShaftCompliance(Transmission):
         "stiffness (linear and cubic) and damping of the joint gap, without its limit; the shares of inertia, damping"
         " and friction on the rocker"
     )
+    apart = "a resonance, and a twist that grows with the torque from zero on; backlash has a slack of fixed width"
     parameters = (
         Parameter(
             "f_shaft", "frequency", "natural frequency of the shaft's spring", lower=2.0, upper=1000.0, absent=np.inf

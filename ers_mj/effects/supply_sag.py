@@ -22,6 +22,7 @@ class SupplySag(Drive):
         " {u_most}"
     )
     mjcf = "none: the torque is set step by step from speed and current"
+    apart = "loss grows with current and with the command; thermal_drift needs seconds, a current_limit has an edge"
     parameters = (
         Parameter(
             "bridge",

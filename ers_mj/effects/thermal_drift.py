@@ -26,6 +26,7 @@ class ThermalDrift(Drive):
         "none: the torque is set step by step (the thermal of a dcmotor knows heat in watts, which no recording of an"
         " angle tells)"
     )
+    apart = "changes over seconds of load and recovers; supply_sag follows the current at once"
     parameters = (
         Parameter(
             "rise",

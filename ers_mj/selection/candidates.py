@@ -31,10 +31,10 @@ def candidates(
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
 
     They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow
-    and a mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near
-    the ``least`` gain that matters they are left at that, and where no explanation could buy enough none is looked for.
-    Once so much has been simulated as ``last`` all but the best are left at their first refits, or where the last stage
-    brought them: beside a bristle that stays wrong a race may take minutes.
+    and a confounder's short; from each place on its own where the baseline is bent far from the noise. Where none comes
+    near the ``least`` gain that matters they are left at that, and where no explanation could buy enough none is looked
+    for. Once so much has been simulated as ``last`` all but the best are left at their first refits, or where the last
+    stage brought them: beside a bristle that stays wrong a race may take minutes.
     """
     if is_out_of_reach(bench, base, least):
         return []

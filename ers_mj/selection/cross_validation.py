@@ -86,8 +86,8 @@ def settled(model: Model, trace: Trace, tau: float) -> Model:
     """The model for one recording that it was not fitted to.
 
     What only that recording can tell of an effect is fitted in it, from the first values of ``local``: the phase of a
-    gust on its first 30 %, as a record state is, and the time of a knock on all of it. An effect whose values there are
-    NaN stays away.
+    gust on its first 30 %, as a record state is, and the time of an impulse on all of it. An effect whose values there
+    are NaN stays away.
     """
     if all(BY_NAME[name].wave for name in model.local or {}):
         trace = trace.part(0, int(RECALIBRATED * trace.t.size))

@@ -20,17 +20,22 @@ def held_instead(bench: Bench, base: Fit, held: Held) -> tuple[Bench, Fit, Candi
     again = there.fit(base.model, 12)
     found = replace(held.fit, model=replace(held.fit.model, effort=bench.budget.effort))
     one = there.judged(found.model.names[-1], found, again)
-    is_sprung = base.model.values["a_1"] > 0 or base.model.values["c_1"] > 0
-    if acceptance.holds(one.gain, there.cost(again), again.misfit.size, is_sprung, bench.policy):
+    if acceptance.holds(one.gain, there.cost(again), again.misfit.size, _is_sprung(base), bench.policy):
         return there, again, one
     return bench, base, None
 
 
 def held_beside(bench: Bench, current: Fit, held: Fit) -> Fit | None:
-    """A baseline that is held otherwise with all that is named beside it, less what it makes needless, where it is the
-    better one then; None where not.
+    """A baseline that no spring holds, with all that is named beside it, less what it makes needless,
+    where it is the better one then; None where not, and where there is no spring.
     """
+    if not _is_sprung(current):
+        return None
     values, effects = held.model.values, (*held.model.effects, *current.model.effects)
     model = replace(current.model, values=values, free=held.model.free, effects=effects)
     found = pruned(bench, bench.fit(model, 20), held.model.names[-1])
     return found if bench.priced(found) < bench.priced(current) else None
+
+
+def _is_sprung(found: Fit) -> bool:
+    return found.model.values["a_1"] > 0 or found.model.values["c_1"] > 0

@@ -32,7 +32,7 @@ class Move:
     def __str__(self) -> str:
         ways = {name: " + ".join(names) or "baseline" for name, names in (("b", self.before), ("a", self.after))}
         way = f"{ways['b']} -> {ways['a']}" if self.accepted else f"{ways['b']} stays"
-        return f"{self.kind}: {way}, {self.gain:+.2f} of C: {self.because}"
+        return f"{self.kind}: {way}, robust cost {-self.gain:+.2f}: {self.because}"
 
 
 def less(model: Model, name: str) -> Model:

@@ -68,11 +68,12 @@ def select(
     candidate of the first round where not.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle,
-    is left out as the ``budget`` of simulation is spent, the selection's own unless one is handed in.
+    is left out as the ``budget`` of simulation is spent, the selection's own unless one is handed in; its sizes are
+    those of the search.
     """
     budget = Budget(traces) if budget is None else budget
     base = replace(base, model=replace(base.model, effort=budget.effort))
-    bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget=budget)
+    bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget.search, budget)
     growing = _Stepwise(bench, base, anchors, progress)
     if held is not None:
         growing.begin_with(held)

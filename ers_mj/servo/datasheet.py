@@ -131,7 +131,16 @@ def read_datasheet(path: str | os.PathLike[str]) -> Datasheet:
     if os.fspath(path) == "table1":
         return Datasheet(parameters=TABLE_1, name="table1")
     path = Path(path)
-    document = _document(path)
+    return datasheet_of(_document(path), path)
+
+
+def datasheet_of(document: Mapping[str, Any], path: str | os.PathLike[str] = "datasheet") -> Datasheet:
+    """The datasheet in a document laid out as its TOML is, which comes from `path`.
+
+    Raises:
+        InputError: as `read_datasheet` does.
+    """
+    path = Path(path)
     _refuse_unknown(document, SECTIONS, "section", str(path))
     sheet = Datasheet(
         parameters=_section(document, "parameters", TABLE_1, path),
@@ -156,7 +165,7 @@ def _document(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is not valid TOML ({str(error)[:120]})") from None
 
 
-def _section(document: dict[str, Any], section: str, known: Iterable[str], path: Path) -> dict[str, float]:
+def _section(document: Mapping[str, Any], section: str, known: Iterable[str], path: Path) -> dict[str, float]:
     """One section's numbers: its keys known, no value negative or zero where that makes no sense."""
     where = f"{path}: [{section}]"
     numbers = _numbers(document.get(section, {}), where, known)
@@ -173,7 +182,7 @@ def refuse_impossible(key: str, x: float, where: str) -> None:
         raise InputError(f"{where} has {key} = 0, which no servo has")
 
 
-def _entries(document: dict[str, Any], path: Path) -> list[object]:
+def _entries(document: Mapping[str, Any], path: Path) -> list[object]:
     entries = document.get("effect", [])
     if not isinstance(entries, list):
         raise InputError(f"{path}: effect is {_kind(entries)}, a list of [[effect]] was expected")
@@ -193,7 +202,7 @@ def _effect(entry: object, path: Path) -> tuple[str, dict[str, float]]:
 
 def _numbers(table: object, where: str, known: Iterable[str] | None = None) -> dict[str, float]:
     """The finite numbers of a table, under known keys where any are given."""
-    if not isinstance(table, dict):
+    if not isinstance(table, Mapping):
         raise InputError(f"{where} is {_kind(table)}, a table was expected")
     if known is not None:
         _refuse_unknown(table, known, "key", where)
