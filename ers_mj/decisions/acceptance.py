@@ -120,6 +120,17 @@ def is_asked_for(offer: Offer, bar: Bar, policy: Policy = POLICY, least: float |
     return offer.gain >= least and (offer.z >= bar.z or offer.lost <= lost * offer.gain)
 
 
+def holds(gain: float, left: float, blocks: int, is_sprung: bool, policy: Policy = POLICY) -> bool:
+    """Whether a baseline with an effect in the spring's place is the better one, by its gain over so many ``blocks``.
+
+    Over one with a spring, ``is_sprung``, a rival on equal terms, by what supports a spring. Over one without it must
+    take so much of the C that is ``left`` that nothing else need be compared with it: a good part, or half of the
+    squared error nearly everywhere.
+    """
+    much = 0.0 if is_sprung else min(policy.good_part * left, -math.log(1.0 - policy.half) * blocks)
+    return gain >= max(policy.least_gain, policy.support * blocks, much)
+
+
 def is_steady(offer: Offer, policy: Policy = POLICY) -> bool:
     """Whether a law of the servo buys little, but nearly everywhere."""
     return not offer.clocked and offer.gain >= policy.steady and offer.z >= policy.steady

@@ -326,6 +326,9 @@ class Policy:
     ordinary_step: float = _threshold(
         math.radians(0.03), "rad", "an ordinary converter named", "12 bits over 120 degrees have 0.0293 degrees"
     )
+    ordinary_bits: int = _threshold(
+        12, "bits a turn", "an ordinary encoder named", "hobby servos and small joints have 12, whatever they travel"
+    )
     fewest_dropouts: int = _threshold(3, "dropouts", "a sensor blamed for one spike", "two may be chance")
 
 

@@ -88,12 +88,18 @@ class Case:
         """The errors before and after, as diagnosis.json has them."""
         c, base, model = self.confirmed, self.start.fit.model, self.model
         ran = f"of what was held out the MuJoCo plant ran {self._run_in_mujoco if self.search.in_mujoco else 'nothing'}"
-        train = [pooled([scored(m, t, k) for k, t in enumerate(self.start.traces)]).rmse for m in (base, model)]
+        traces = list(enumerate(self.start.traces))
+        train = [pooled([scored(m, t, k, measure=c.measure) for k, t in traces]).rmse for m in (base, model)]
+        before, after = pooled(c.before), pooled(c.after)
         return {
+            "measure": c.measure.name,
+            "window_s": c.measure.window_s,
             "train_rmse_before_rad": train[0],
             "train_rmse_after_rad": train[1],
-            "heldout_rmse_before_rad": pooled(c.before).rmse,
-            "heldout_rmse_after_rad": pooled(c.after).rmse,
+            "heldout_rmse_before_rad": before.rmse,
+            "heldout_rmse_after_rad": after.rmse,
+            "heldout_mae_before_rad": before.mae,
+            "heldout_mae_after_rad": after.mae,
             "recalibrated_rmse_before_rad": self._again[0].rmse,
             "recalibrated_rmse_after_rad": self._again[1].rmse,
             "mujoco_heldout_rmse_before_rad": self.multibody[0],
@@ -120,7 +126,7 @@ class Case:
         """The held-out scores before and after, recalibrated."""
         c = self.confirmed
         before, after = (
-            pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(models, c.parts)])
+            pooled([recalibrated(m, fold.held_out, c.measure)[0] for m, fold in zip(models, c.parts)])
             for models in (c.base_models, c.models)
         )
         return before, after
@@ -238,7 +244,7 @@ class Case:
     @cached_property
     def errors(self) -> dict[tuple[str, str], tuple[float, float]]:
         """95 % intervals of every fitted number, by (owner, name)."""
-        model = replace(self.model, states=None)
+        model = self.model.of_records(range(len(self.start.traces)))
         left_out = (
             self.confirmed.models
             if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2

@@ -74,6 +74,7 @@ def diagnose(
         start.fit,
         start.traces,
         anchors=start.anchors,
+        held=start.held,
         exclude=tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,

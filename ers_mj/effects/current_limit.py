@@ -30,6 +30,7 @@ class CurrentLimit(Drive):
         ),
     )
     needs, follows_current = (("tau_max",),), True
+    parts_damping = True
 
     def starts(self, scales):
         peak = scales.drive or 4.0 * scales.acceleration
