@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from ers_mj.data.inspection import Inspection
 from ers_mj.report import page
 from ers_mj.report.display import shown
-from ers_mj.report.drawing import both_widths, decimate, margins, restart_ids
+from ers_mj.report.drawing import both_widths, margins, restart_ids
 from ers_mj.report.style import STYLE
+from ers_mj.report.thinning import decimate
 
 POINTS = {True: 900, False: 450}
 HEADS = ("channel", ">refresh", ">lowest", ">highest", ">noise", ">quantum", ">at an end", ">blank")
