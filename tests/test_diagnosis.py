@@ -120,7 +120,7 @@ def test_a_coarse_sensor_is_told_from_the_data():
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
 
 
-def test_a_mimic_is_not_named_where_a_law_without_a_name_explains_more(dead_zone):
+def test_a_stand_in_is_not_named_where_a_law_without_a_name_explains_more(dead_zone):
     """A motor whose iron saturates is no sagging supply, which takes two thirds of it; a dead zone is no form of such a
     law. One round of the selection tells it.
     """
@@ -157,9 +157,9 @@ def test_a_gust_has_a_phase_of_its_own_in_every_recording():
     assert np.cos(phases - [0.4, 2.0]) * np.sign(amplitude) == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_knock_in_one_recording_is_found_there():
-    knock = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0, np.inf]))]
-    document = diagnose(acting([], knock), read_datasheet("table1")).document
+def test_an_impulse_in_one_recording_is_found_there():
+    impulse = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0, np.inf]))]
+    document = diagnose(acting([], impulse), read_datasheet("table1")).document
     first = document["missing"][0]
     assert first["effect"] == "load_disturbance" and first["parameters"]["record"]["value"] == 1
     assert first["parameters"]["t_0"]["value"] == pytest.approx(1.2, abs=0.02)

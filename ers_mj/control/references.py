@@ -95,7 +95,7 @@ def named(name: str, amplitude: float, start: float, rate_hz: float) -> Referenc
     """One of the cases, of this amplitude [rad] about this start [rad].
 
     Raises:
-        InputError: the rate makes too few or too many samples of it.
+        InputError: the rate does not make a usable number of samples of it.
     """
     shape, duration = CASES[name]
     n = round(duration * rate_hz)

@@ -27,7 +27,7 @@ class Stepper:
         theta, omega: where it starts; at rest at theta_0 by default.
 
     Raises:
-        InputError: the rate is not above zero, or a dead time is too many samples.
+        InputError: the rate is not above zero, or a dead time is beyond what a loop keeps.
     """
 
     def __init__(self, plant: ReducedModel, rate_hz: float, theta: float | None = None, omega: float = 0.0):

@@ -115,10 +115,11 @@ def _suspects(case: Case) -> list[dict]:
     first = case.selection.rounds[0] if case.selection.rounds else ()
     others = [c for c in first[:3] if c.name in BY_NAME] if case.verdict == "unexplained" else []
     return [
-        {"effect": c.name, "sentence": f"{BY_NAME[c.name].sentence}: buys {c.gain:.1f} of the misfit"}
+        {"effect": c.name, "sentence": f"{BY_NAME[c.name].sentence}: lowers the robust cost by {c.gain:.1f}"}
         for c in case.suspects
     ] + [
-        {"effect": c.name, "sentence": f"buys {c.gain:.1f} of {case.start.fit.cost:.1f} of the misfit"} for c in others
+        {"effect": c.name, "sentence": f"lowers the robust cost by {c.gain:.1f} of {case.start.fit.cost:.1f}"}
+        for c in others
     ]
 
 

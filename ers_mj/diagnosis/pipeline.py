@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ers_mj.data.informative import searched
 from ers_mj.data.prepared import Trace, counted, trace_of
 from ers_mj.data.recording import Recording
 from ers_mj.decisions.thresholds import POLICY, Policy
@@ -60,6 +61,7 @@ def diagnose(
         InputError: no motion of the model resembles the recordings.
     """
     jobs = jobs or _cores()
+    recordings, holdout = searched(recordings, holdout)
     first = recordings[0]
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
     traces = [trace_of(r, inertia) for r in recordings]
@@ -72,6 +74,7 @@ def diagnose(
         start.fit,
         start.traces,
         anchors=start.anchors,
+        held=start.held,
         exclude=tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,

@@ -49,7 +49,7 @@ class Model:
     Raises:
         InputError: the datasheet cannot be meant, or there is no such unit.
 
-    Example:
+    Examples:
         >>> import ers_mj as ers
         >>> model = ers.load_model("table1")
         >>> model.to_control().input_labels, model.to_control().output_labels
@@ -140,13 +140,14 @@ class Model:
 
         Args:
             rate_hz: of its samples [Hz].
-            theta, omega: where the servo starts [output unit], [output unit/s]; at rest at theta_0 by default.
+            theta: where the servo starts [output unit]; theta_0 by default.
+            omega: its speed there [output unit/s].
 
         Returns:
             The first reading [output unit].
 
         Raises:
-            InputError: a rate that cannot be, or a dead time of too many samples.
+            InputError: a rate that cannot be, or a dead time beyond what a loop keeps.
         """
         from ers_mj.control.stepping import Stepper
 
@@ -159,7 +160,7 @@ class Model:
         Returns:
             The reading at its end [output unit], which is what a controller has for its next u.
 
-        Example:
+        Examples:
             >>> import ers_mj as ers
             >>> model = ers.load_model("table1")
             >>> theta = model.reset(rate_hz=1000.0)
@@ -189,7 +190,8 @@ class Model:
         with their slopes (`losses("control")` says what does not).
 
         Args:
-            theta, omega: the point [output unit], [output unit/s]; theta_0 and 1 by default.
+            theta: the point [output unit]; theta_0 by default.
+            omega: its speed [output unit/s].
             rate_hz: of a loop: the plant from sample to sample, dead times exact. None: continuous.
             pade: order of the approximations that stand for dead times in continuous time.
 
@@ -223,7 +225,7 @@ class Model:
         Args:
             rate_hz: of its samples [Hz].
 
-        Example:
+        Examples:
             >>> import control, numpy as np, ers_mj as ers
             >>> servo = ers.load_model("table1").to_nonlinear(rate_hz=500.0)
             >>> t = np.arange(50) / 500.0
@@ -268,7 +270,7 @@ class Model:
         Raises:
             InputError: the inertia is not known, or what was given cannot be.
 
-        Example:
+        Examples:
             >>> import ers_mj as ers
             >>> lines = ers.load_model("table1").joint_lines("elbow")
             >>> lines.joint["armature"], lines.actuator["gear"]
@@ -372,12 +374,13 @@ def load_model(path: Known, output_unit: str = "rad", input_unit: str = "V") -> 
 
     Args:
         path: the file; "table1" is the paper's servo.
-        output_unit, input_unit: of the servo, which the file does not tell: rad, m or V; V or %.
+        output_unit: of the servo, which the file does not tell: rad, m or V.
+        input_unit: as well: V or %.
 
     Raises:
         InputError: the file cannot be meant, in one sentence.
 
-    Example:
+    Examples:
         >>> import ers_mj as ers
         >>> ers.load_model("table1")
         <Model table1: no effect, V to rad>

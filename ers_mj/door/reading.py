@@ -42,7 +42,7 @@ def read(
         InputError: the file cannot be read or used, in one sentence.
         MissingPackage: what reads such files is not installed.
 
-    Example:
+    Examples:
         >>> import tempfile, pathlib
         >>> import ers_mj as ers
         >>> file = pathlib.Path(tempfile.mkdtemp()) / "run.csv"
@@ -70,7 +70,8 @@ def from_arrays(
     Args:
         table: a data frame (pandas, polars) or a mapping of columns, if there is one.
         map: contract name -> column, where the table uses names of its own.
-        input, second: as `read` takes them.
+        input: as `read` takes it.
+        second: as `read` takes it.
         name: what the recording is called in results.
         columns: arrays (N,) under the names that a file's columns have, unit and all: `t` or `t_s` [s], `u_V`,
             `u_duty_pct`, `tau_cmd_Nm`, `i_cmd_A` or a reference, `theta_rad`, `theta_deg`, `x_m` or `y_sensor_V`, and
@@ -82,7 +83,7 @@ def from_arrays(
     Raises:
         InputError: the columns cannot be used, in one sentence.
 
-    Example:
+    Examples:
         >>> import numpy as np
         >>> import ers_mj as ers
         >>> t = np.arange(500) / 100.0

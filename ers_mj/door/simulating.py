@@ -127,14 +127,15 @@ def simulate(
         effects: further ones, (name, {parameter: value}) in SI, or as the command line has them: "stribeck:dF_s=0.1".
         noise: standard deviation of the sensor's noise [rad].
         seed: of the noise.
-        rate_hz, duration: of a named input [Hz], [s]; 1000 and 10 by default.
+        rate_hz: of a named input [Hz]; 1000 by default.
+        duration: of a named input [s]; 10 by default.
         options: plant="reduced", gap=0.0 [rad], linkage="constant", play="gap", inductance=False: the command's
             defaults. A model's own `simulate` runs it as it was identified.
 
     Raises:
         InputError: what was given cannot be simulated, in one sentence.
 
-    Example:
+    Examples:
         >>> import ers_mj as ers
         >>> ers.simulate("table1", "steps", duration=2.0, rate_hz=500.0, effects=["bias_torque:tau_0=0.1"])
         <Simulation steps: 1000 samples over 1.998 s, -3.0 to 74.7 deg, reduced plant>

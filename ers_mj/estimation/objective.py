@@ -103,7 +103,7 @@ def begun(model: Model, traces: Sequence[Trace], rate: float) -> Run:
 
 
 def is_rough(traces: Sequence[Trace]) -> bool:
-    """Whether a converter is so coarse that C has dents wherever a threshold is passed a sample sooner or later."""
+    """Whether a converter is so coarse that C has a local minimum wherever a threshold is passed."""
     return any(trace.converter is not None for trace in traces)
 
 

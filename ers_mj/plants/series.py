@@ -24,7 +24,7 @@ def _put(c, at, v):
 
 @unit(L(C, X, M, F, F, F, F))
 def expand(c, x, m, drive, tau, a_emf, span):
-    """Expand the flow from x over a span [s]; False where that takes too many pieces."""
+    """Expand the flow from x over a span [s]; False where that takes more pieces than it has."""
     b = balance(c, m, 0.0, 0.0)
     n = steps_of(c, b, tau, a_emf, span)
     if n > MOST_PIECES:

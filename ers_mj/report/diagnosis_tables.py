@@ -36,8 +36,9 @@ def candidates(evidence: Evidence, unit: Unit) -> str:
     if len(evidence.ladder) > MOST_RUNGS:
         table = f"<details><summary>All {len(evidence.ladder)} candidates as a table</summary>{table}</details>"
     lead = (
-        "Every candidate was fitted in simulation. The chart shows what it takes off the baseline’s cost; in the table"
-        " gain is what it takes off its round’s, z how surely, paired by blocks of time, numbers how many it adds."
+        "Every candidate was fitted in simulation. The chart shows by how much it lowers the baseline’s robust cost; in"
+        " the table gain is the same against its round’s, z how surely, paired by blocks of time, numbers how many it"
+        " adds."
     )
     return page.section("The candidates", lead, drawn + table)
 
@@ -59,7 +60,7 @@ def trail(document: Mapping) -> str:
     """The section of what the selection did, move by move."""
     rows = [(_move(move), "chosen" if move.get("accepted") else "") for move in document.get("trail") or ()]
     table = page.table(["move", "before", "after", ">gain", "because"], rows)
-    lead = "What was compared round by round, what was accepted and why; gain is what it takes off the training cost."
+    lead = "What was compared round by round, what was accepted and why; gain is how much it lowers the robust cost."
     return page.section("How it was decided", lead, table)
 
 

@@ -90,6 +90,12 @@ class Datasheet:
         lumped = {name: rule(known) for name, (needs, rule) in FOLLOWS.items() if known.keys() >= set(needs.split())}
         return {name: x for name, x in lumped.items() if math.isfinite(x)} | dict(self.lumped)
 
+    @property
+    def emf_damping(self) -> float | None:
+        """What the back-EMF damps [1/s], where the letters are given from which it follows."""
+        known = {"n": 1.0, **self.parameters}
+        return _emf_damping(known) if known.keys() >= {"K_t", "K_e", "J", "R"} else None
+
 
 def _emf_damping(p: Mapping[str, float]) -> float:
     """What the back-EMF damps, n^2 K_t K_e/(J R) [1/s]."""
