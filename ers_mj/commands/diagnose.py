@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_common, add_map, add_out, add_recordings, mapping, results_folder
+from ers_mj.commands.options import add_common, add_input, add_map, add_out, add_recordings, mapping, results_folder
 from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, write_results, write_text
-from ers_mj.commands.recordings import refuse_mixed_units, refuse_twice
+from ers_mj.commands.recordings import refuse_mixed_inputs, refuse_twice
 
 if TYPE_CHECKING:
     from ers_mj.data.recording import Recording
@@ -36,6 +37,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable"
     )
     add_map(parser)
+    add_input(parser)
+    parser.add_argument(
+        "--second", metavar="COLUMN", help="explain this column as well, as in u_V beside theta_ref_rad"
+    )
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -49,8 +54,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ers_mj.servo.datasheet import read_datasheet
 
     datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
-    recordings = [read_recording(spec, names) for spec in arguments.recordings]
-    holdout = [read_recording(spec, names) for spec in arguments.holdout]
+    read = partial(read_recording, mapping=names, input_column=arguments.input, second=arguments.second)
+    recordings = [read(spec) for spec in arguments.recordings]
+    holdout = [read(spec) for spec in arguments.holdout]
     return diagnose_and_tell(recordings, holdout, datasheet, folder, arguments)
 
 
@@ -63,7 +69,7 @@ def diagnose_and_tell(
 ) -> int:
     """The part that `diagnose` and `demo` share: from recordings to files and words."""
     refuse_twice(recordings, holdout)
-    refuse_mixed_units([*recordings, *holdout])
+    refuse_mixed_inputs([*recordings, *holdout])
     from ers_mj.diagnosis import pipeline as diagnosis
 
     with Progress() as progress:
@@ -97,9 +103,10 @@ def _write(folder: Path, document: dict, found: Diagnosis, progress: Progress) -
 
 def input_table(excitation: dict) -> str:
     """The input to record next, as `ers simulate --input` takes it."""
+    from ers_mj.data.columns import input_name
     from ers_mj.data.excitation import signal
 
-    column = {"%": "u_duty_pct"}.get(excitation["input_unit"], f"u_{excitation['input_unit']}")
+    column = input_name(excitation["input_unit"])
     return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation), strict=True))]) + "\n"
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import (
     add_common,
+    add_input,
     add_map,
     add_out,
     add_recordings,
@@ -20,7 +21,7 @@ from ers_mj.commands.options import (
     whole,
 )
 from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
-from ers_mj.commands.recordings import refuse_mixed_units, refuse_twice
+from ers_mj.commands.recordings import refuse_mixed_inputs, refuse_twice
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     _add_way(parser)
     _add_search(parser)
     add_map(parser)
+    add_input(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -136,9 +138,9 @@ def run(arguments: argparse.Namespace) -> int:
         **({"timestep": arguments.timestep} if arguments.timestep else {}),
     )
     datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
-    recordings = [read_recording(spec, names) for spec in arguments.recordings]
+    recordings = [read_recording(spec, names, input_column=arguments.input) for spec in arguments.recordings]
     refuse_twice(recordings, [])
-    refuse_mixed_units(recordings)
+    refuse_mixed_inputs(recordings)
     with Progress() as progress:
         found = identify(recordings, datasheet, settings, progress)
         document = plain(_document(found, recordings))
@@ -193,6 +195,7 @@ def _document(found: Identified, recordings: list[Recording]) -> dict:
             "sha256": [r.sha256 for r in recordings],
             "output_unit": recordings[0].output_unit,
             "input_unit": recordings[0].input_unit,
+            "input_kind": recordings[0].input_kind,
             "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems],
         },
         "seed": found.settings.seed,

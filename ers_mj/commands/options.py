@@ -105,6 +105,11 @@ def add_map(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_input(parser: argparse.ArgumentParser) -> None:
+    """--input."""
+    parser.add_argument("--input", metavar="COLUMN", help="what the servo is told, where several columns could be")
+
+
 def add_out(parser: argparse.ArgumentParser) -> None:
     """--out DIR and --force."""
     parser.add_argument("--out", metavar="DIR", help=f"folder for the results (default {DEFAULT_OUT}/)")

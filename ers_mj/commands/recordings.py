@@ -32,8 +32,17 @@ def _identity(recording: Recording) -> tuple[str, str]:
     return recording.sha256, recording.name.partition("#run=")[2]
 
 
-def refuse_mixed_units(recordings: list[Recording]) -> None:
-    """Raise InputError where outputs or inputs are not all of one unit."""
+def refuse_mixed_inputs(recordings: list[Recording]) -> None:
+    """Raise InputError where inputs are not all of one kind, or outputs or inputs of one unit."""
+    kinds = Counter(recording.input_kind for recording in recordings)
+    if len(kinds) > 1:
+        common = kinds.most_common(1)[0][0]
+        odd = next(r for r in recordings if r.input_kind != common)
+        other = next(r for r in recordings if r.input_kind == common)
+        raise InputError(
+            f"{odd.name}: its input is a {odd.input_kind} and that of {other.name} a {common}, recordings of one kind"
+            " of input were expected (choose with --input)"
+        )
     for noun, attribute in (("output", "output_unit"), ("input", "input_unit")):
         units = Counter(getattr(recording, attribute) for recording in recordings)
         if len(units) > 1:

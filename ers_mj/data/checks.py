@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.data.columns import MEASURED
+from ers_mj.data.columns import CONSTANT, MEASURED
 from ers_mj.data.sensor_faults import at_extreme, decimal_grain, frozen_spans, held_spans, varied
 from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
@@ -37,10 +37,27 @@ def checked(values: dict[str, np.ndarray], labels: dict[str, str], name: str) ->
         _refuse_missing(values[field], labels[field], name)
     if np.nanmin(values["y"]) == np.nanmax(values["y"]):
         raise InputError(f"{name}: the output {labels['y']} is constant at {np.nanmax(values['y']):.6g}")
-    fields = {field: x if field in MEASURED else _held(x) for field, x in values.items() if not _sparse(x)}
+    used = {field: x for field, x in values.items() if field not in CONSTANT and not _sparse(x)}
+    fields = {field: x if field in MEASURED else _held(x) for field, x in used.items()}
     if "enable" in fields:
         fields["enable"] = fields["enable"] > 0.5
     return {field: locked(x) for field, x in (fields | {"valid": np.isfinite(values["y"])}).items()}
+
+
+def constants(values: dict[str, np.ndarray], labels: dict[str, str], name: str) -> dict[str, float]:
+    """The fields that have one value a recording, blanks left out."""
+    found = {}
+    for field in CONSTANT:
+        known = values[field][np.isfinite(values[field])] if field in values else np.zeros(0)
+        if known.size and np.ptp(known) > 0:
+            row = 1 + int(np.argmax(values[field] != known[0]))
+            raise InputError(
+                f"{name}: {labels[field]} changes in data row {row}, one value a recording was expected (cut the file"
+                " there)"
+            )
+        if known.size:
+            found[field] = float(known[0])
+    return found
 
 
 def _refuse_length(x: np.ndarray, label: str, count: int, name: str) -> None:

@@ -9,10 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
+from ers_mj.data.channels import Channel, channels_of, supply_of
 from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import Recording
-from ers_mj.data.sensor_faults import at_extreme, converter_step, frozen_spans, leapt_spans, spikes, unmoved_spans
+from ers_mj.data.sensor_faults import at_extreme, frozen_spans, leapt_spans, noise_sigma, spikes, unmoved_spans
 from ers_mj.decisions.thresholds import POLICY
+from ers_mj.errors import InputError
 
 BLOCK = 0.25  # [s]
 START = 0.05  # [s] of a record that its initial state is taken from, or BEGINNING.samples, whichever is longer
@@ -29,28 +31,6 @@ class Beginning:
 
 
 BEGINNING = Beginning()
-
-
-@dataclass(frozen=True)
-class Beside:
-    """When a further column of a recording counts."""
-
-    known: float = 0.8  # share of its samples that must be there
-    least_sag: float = 0.005  # of the supply, from which it varies
-
-
-BESIDE = Beside()
-
-
-@dataclass(frozen=True)
-class Channel:
-    """What another sensor saw, (N,) on the output's side of the gear: "current" [A], "speed" or "motor" angle; NaN
-    where missing.
-    """
-
-    kind: str
-    values: np.ndarray
-    sigma: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +59,8 @@ class Trace:
 
     ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output.
     ``supply`` is the measured one [V] (N,), None where none was measured or it does not vary; ``converter`` the one
-    whose steps are coarse for the travel, where there is one.
+    whose steps are coarse for the travel, where there is one; ``input_kind`` the recording's (a torque and a current
+    are told, no back-EMF takes from them).
     """
 
     name: str
@@ -98,6 +79,7 @@ class Trace:
     channels: tuple[Channel, ...] = ()
     supply: np.ndarray | None = None
     converter: Converter | None = None
+    input_kind: str = "voltage"
 
     @property
     def is_coarse(self) -> bool:
@@ -125,6 +107,7 @@ class Trace:
             channels=tuple(replace(c, values=c.values[cut]) for c in self.channels),
             supply=pick(self.supply),
             converter=self.converter,
+            input_kind=self.input_kind,
         )
 
     def sparse(self, stride: int) -> Trace:
@@ -160,7 +143,12 @@ class Trace:
         signals = Signals(self.t, self.u, self.y, valid, self.enable, self.load)
         made = make_trace(self.name, signals, self.sigma, self.quantum, self.start)
         return replace(
-            made, channels=self.channels, supply=self.supply, converter=self.converter, lost=(*self.lost, *spans)
+            made,
+            channels=self.channels,
+            supply=self.supply,
+            converter=self.converter,
+            lost=(*self.lost, *spans),
+            input_kind=self.input_kind,
         )
 
     @cached_property
@@ -204,7 +192,15 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     nothing.
 
     Spans in which the sensor shows a spike, or hangs, are no measurement of the output.
+
+    Raises:
+        InputError: the input is a position command, for which there is no model.
     """
+    if recording.input_kind == "position":
+        raise InputError(
+            f"{recording.name}: is commanded by a position, which no model takes yet; record what the drive is told"
+            " (u_V, u_duty_pct, tau_cmd_Nm or i_cmd_A)"
+        )
     load = -recording.load / inertia if recording.load is not None and inertia else None
     y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
     stuck: list[slice] = []
@@ -215,7 +211,8 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     signals = Signals(recording.t, recording.u, y, recording.valid, recording.enable, load)
     trace = make_trace(recording.name, signals, sigma, recording.quantum)
     trace = trace.without(lost)
-    return replace(trace, start=_started(trace), channels=_channels(recording, trace.valid), supply=_supply(recording))
+    channels, supply = channels_of(recording, trace.valid), supply_of(recording)
+    return replace(trace, start=_started(trace), input_kind=recording.input_kind, channels=channels, supply=supply)
 
 
 def _meets(span: slice, others: Sequence[slice]) -> bool:
@@ -228,60 +225,6 @@ def counted(traces: Sequence[Trace], travel: float) -> list[Trace]:
         replace(t, converter=Converter(t.quantum, t.sigma)) if t.quantum > POLICY.coarse_step * travel else t
         for t in traces
     ]
-
-
-def _supply(recording: Recording) -> np.ndarray | None:
-    """The measured supply [V] (N,), a missing sample between its neighbours; None where hardly any is known or it does
-    not vary.
-    """
-    if recording.vin is None or (known := np.isfinite(recording.vin)).mean() < BESIDE.known:
-        return None
-    supply = np.interp(recording.t, recording.t[known], recording.vin[known])
-    low, level, high = np.quantile(supply, (0.02, 0.5, 0.98))
-    return supply if low > 0.0 and high - low > BESIDE.least_sag * level else None
-
-
-def _channels(recording: Recording, valid: np.ndarray) -> tuple[Channel, ...]:
-    """The current, the speed and the motor's angle where a recording holds them and they vary.
-
-    The motor's angle is brought to the output's side of the gear by a straight line through both, so that ratio and
-    zero are not judged.
-    """
-    found = []
-    for kind, values in (("current", recording.current), ("speed", recording.omega), ("motor", recording.theta_m)):
-        if values is None or recording.output_unit != "rad" and kind != "current":
-            continue
-        known = np.isfinite(values)
-        if known.mean() < BESIDE.known or np.ptp(values[known]) == 0:
-            continue
-        if kind == "speed" and not _integrates(recording, values):
-            continue
-        if kind == "motor":
-            both = known & valid
-            slope, zero = np.polyfit(recording.y[both], values[both], 1)
-            values = (values - zero) / slope
-        found.append(
-            Channel(kind, np.ascontiguousarray(values), noise_sigma(values[known], converter_step(values[known])))
-        )
-    return tuple(found)
-
-
-def _integrates(recording: Recording, omega: np.ndarray) -> bool:
-    """Whether a speed is that of the output at the same time: its integral over 0.1 s is the way made, within three
-    times the noise.
-
-    What a drive reports as speed is often an older, filtered difference of the angle, which tells nothing new and that
-    late.
-    """
-    t, n = recording.t, max(1, round(0.1 / recording.sample_time))
-    way = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
-    miss = (way[n:] - way[:-n] - recording.y[n:] + recording.y[:-n])[::n]
-    miss, known = miss[np.isfinite(miss)], np.isfinite(omega)
-    noise = math.hypot(
-        noise_sigma(recording.y[recording.valid], recording.quantum) * math.sqrt(2.0),
-        noise_sigma(omega[known], converter_step(omega[known])) * math.sqrt(n) * recording.sample_time,
-    )
-    return bool(miss.size) and float(np.sqrt(np.mean(miss**2))) < 3.0 * noise
 
 
 def make_trace(
@@ -340,20 +283,6 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
     along, seen = np.sign(low) * (y - y[0]), BEGINNING.sure * math.sqrt(2.0) * sigma
     thrown = -np.min(along[1 : 1 + BEGINNING.first]) > seen or -along[-1] > seen >= np.max(along)
     return (0.0, 0.0) if low <= 0.0 <= high or thrown else (float(low), float(high))
-
-
-def noise_sigma(y: np.ndarray, quantum: float) -> float:
-    """Noise of a record (N,): third differences over sqrt(20), their median (or trimmed rms on a lattice), at least q /
-    sqrt(12).
-    """
-    d = np.abs(np.diff(y, 3))
-    d = d[np.isfinite(d)]
-    if d.size == 0:
-        return 1e-9 * float(np.nanstd(y)) + 1e-300
-    spread = 1.4826 * float(np.median(d)) / math.sqrt(20.0)
-    if quantum > 0:  # the median of a few counts is itself a count
-        spread = max(spread, math.sqrt(float(np.mean(d[d <= 4 * (spread * math.sqrt(20.0) + quantum)] ** 2)) / 20.0))
-    return max(spread, quantum / math.sqrt(12.0), 1e-9 * float(np.nanstd(y)) + 1e-300)
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ import numpy as np
 
 from ers_mj.data.checks import FEWEST_SAMPLES as FEWEST_SAMPLES
 from ers_mj.data.checks import GAP as GAP
-from ers_mj.data.checks import checked, ignored, locked, problems_of, refuse_time
-from ers_mj.data.columns import COLUMNS, OPTIONAL, choose_columns, refuse_unknown_unit
+from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_time
+from ers_mj.data.columns import COLUMNS, CONSTANT, OPTIONAL, choose_columns, input_name, kind_of, refuse_unknown_unit
 from ers_mj.data.sensor_faults import converter_step
 from ers_mj.data.tables import cell_of, listed, numbers, parse_table, read_content, select_run, split_spec, write_whole
 from ers_mj.errors import InputError
@@ -36,8 +36,14 @@ class Recording:
         omega, current, theta_m, vin, load, reference, temperature: speed [rad/s], current [A], motor
             angle [rad], supply [V], known load [N m], reference [`output_unit`], temperature [degC]; or None.
         enable: whether the drive was on, or None.
-        input_unit: "V" or "pct".
+        direction: the sign of a duty that has none, or None.
+        second: a further signal to explain (`--second`) [`second_unit`], NaN where missing, or None.
+        kp, load_kg, arm_m: the firmware's gain register, load [kg] and its arm [m] of the whole recording; or None.
+        input_kind: "voltage", "duty", "torque", "current", or "position": `u` is then what the servo's own loop is
+            told [`output_unit`]. Torque and current commands know of no back-EMF.
+        input_unit: "V", "pct", "N m", "A", "rad" or "m".
         output_unit: "rad", "m" or "V".
+        second_name, second_unit: the contract's name of `second` and its unit, or "".
         quantum: the converter's step [`output_unit`] as `converter_step` finds it in the file's own unit.
         name, path, sha256: file name with its run, path, and hash of the bytes that were read.
         problems: what was worked around or ignored, a sentence each.
@@ -55,8 +61,16 @@ class Recording:
     reference: np.ndarray | None = None
     temperature: np.ndarray | None = None
     enable: np.ndarray | None = None
+    direction: np.ndarray | None = None
+    second: np.ndarray | None = None
+    kp: float | None = None
+    load_kg: float | None = None
+    arm_m: float | None = None
+    input_kind: str = "voltage"
     input_unit: str = "V"
     output_unit: str = "rad"
+    second_name: str = ""
+    second_unit: str = ""
     quantum: float = 0.0
     name: str = "array"
     path: str = ""
@@ -84,24 +98,34 @@ class Recording:
 
     def columns(self) -> dict[str, np.ndarray]:
         """The arrays under the names that a file gives them, ready for `write_recording`."""
-        units = {"u": self.input_unit, "y": self.output_unit, "reference": self.output_unit}
-        names = {
+        units = {"y": self.output_unit, "reference": self.output_unit}
+        names = {"t": "t_s", "u": input_name(self.input_unit)} | {
             role.field: name
             for name, role in COLUMNS.items()
-            if role.factor == 1.0 and role.unit == units.get(role.field, role.unit)
+            if role.field != "u" and role.factor == 1.0 and role.unit == units.get(role.field, role.unit)
         }
-        return {name: getattr(self, field) for field, name in names.items() if getattr(self, field) is not None}
+        names |= {"second": self.second_name} if self.second_name else {}
+        there = {name: getattr(self, field) for field, name in names.items() if getattr(self, field) is not None}
+        return {name: np.full(self.t.size, x) if isinstance(x, float) else x for name, x in there.items()}
 
 
 # -- the three ways in and out --------------------------------------------------------------------------
 
 
-def read_recording(path_or_spec: str | os.PathLike[str], mapping: Mapping[str, str] | None = None) -> Recording:
+def read_recording(
+    path_or_spec: str | os.PathLike[str],
+    mapping: Mapping[str, str] | None = None,
+    *,
+    input_column: str | None = None,
+    second: str | None = None,
+) -> Recording:
     """Read one recording from CSV or Parquet.
 
     Args:
         path_or_spec: a path, or "FILE#run=17" for one run of a file that holds several.
         mapping: contract name -> column of the file, for files that use other names.
+        input_column: the column that the servo is told, where several could be.
+        second: a column to explain beside the output, such as the duty beside a position command.
 
     Raises:
         InputError: whatever makes the file unusable, in one sentence that names it.
@@ -110,15 +134,17 @@ def read_recording(path_or_spec: str | os.PathLike[str], mapping: Mapping[str, s
     name = path.name if run is None else f"{path.name}#run={run}"
     content = read_content(path)
     table = select_run(parse_table(content, path.suffix.lower(), name), run, name)
-    chosen = choose_columns(table.column_names, dict(mapping or {}), name)
-    raw = {contract: numbers(table[column], column, name) for contract, column in chosen.items()}
-    roles = {COLUMNS[contract].field: COLUMNS[contract] for contract in chosen}
-    labels = {COLUMNS[contract].field: column for contract, column in chosen.items()}
-    printed = {COLUMNS[contract].field: x for contract, x in raw.items()}
-    fields: dict[str, Any] = checked({field: x * roles[field].factor for field, x in printed.items()}, labels, name)
-    units: dict[str, Any] = {"input_unit": roles["u"].unit, "output_unit": roles["y"].unit}
+    choice = choose_columns(table.column_names, dict(mapping or {}), name, input_column, second)
+    roles = {field: COLUMNS[contract] for field, contract in choice.roles().items()}
+    labels = {field: choice.columns[contract] for field, contract in choice.roles().items()}
+    printed = {field: numbers(table[column], column, name) for field, column in labels.items()}
+    values = {field: x * roles[field].factor for field, x in printed.items()}
     step = converter_step(printed["y"])
+    fields: dict[str, Any] = checked(values, labels, name) | constants(values, labels, name)
     problems = problems_of(fields, printed, labels, step) + ignored(table.column_names, labels)
+    units: dict[str, Any] = {"input_unit": roles["u"].unit, "output_unit": roles["y"].unit, "input_kind": choice.kind}
+    if choice.second:
+        units |= {"second_name": choice.second, "second_unit": roles["second"].unit}
     origin: dict[str, Any] = {"name": name, "path": str(path), "sha256": hashlib.sha256(content).hexdigest()}
     return Recording(**fields, **units, **origin, quantum=step * roles["y"].factor, problems=tuple(problems))
 
@@ -147,12 +173,13 @@ def from_arrays(
     name: str = "array",
     input_unit: str = "V",
     output_unit: str = "rad",
-    **optional: Sequence[float] | None,
+    **optional: Sequence[float] | float | None,
 ) -> Recording:
     """A recording from arrays (N,) in SI, under the checks that a file gets; the arrays are copied.
 
     Args:
-        t, u, y: time [s], input [`input_unit`], output [`output_unit`], NaN where missing.
+        t, u, y: time [s], input [`input_unit`], output [`output_unit`], NaN where missing. The unit tells the kind of
+            input: V a voltage, pct a duty, N m a torque, A a current, rad or m a position command.
         optional: further fields of `Recording` by name: omega, current, theta_m, vin, load, ...
 
     Raises:
@@ -162,11 +189,19 @@ def from_arrays(
         raise InputError(f"{name}: there is no field {listed(unknown)}; there are {listed(OPTIONAL)}")
     refuse_unknown_unit("input", input_unit, "u", name)
     refuse_unknown_unit("output", output_unit, "y", name)
+    kind = kind_of(input_unit)
+    if kind == "position" and input_unit != output_unit:
+        raise InputError(
+            f"{name}: the position command is in {input_unit} and the output in {output_unit}, one unit was expected"
+        )
     given = {"t": t, "u": u, "y": y, **{field: x for field, x in optional.items() if x is not None}}
-    values = {field: _array(x, field, name) for field, x in given.items()}
+    count = len(np.atleast_1d(t))
+    values = {
+        f: _array(np.full(count, x) if f in CONSTANT and np.isscalar(x) else x, f, name) for f, x in given.items()
+    }
     labels = {field: field for field in values}
-    fields: dict[str, Any] = checked(values, labels, name)
-    units: dict[str, Any] = {"input_unit": input_unit, "output_unit": output_unit}
+    fields: dict[str, Any] = checked(values, labels, name) | constants(values, labels, name)
+    units: dict[str, Any] = {"input_unit": input_unit, "output_unit": output_unit, "input_kind": kind}
     step = converter_step(values["y"])
     problems = problems_of(fields, values, labels, step)
     origin: dict[str, Any] = {
@@ -176,7 +211,7 @@ def from_arrays(
     return Recording(**fields, **units, **origin, quantum=step, problems=tuple(problems))
 
 
-def _array(x: Sequence[float], field: str, name: str) -> np.ndarray:
+def _array(x: Any, field: str, name: str) -> np.ndarray:
     """A copy of x as floats (N,)."""
     try:
         array = np.array(x, float)

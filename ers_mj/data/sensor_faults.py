@@ -161,6 +161,20 @@ def _noise(y: np.ndarray) -> float:
     return float(np.nanquantile(np.abs(np.diff(y, n=3)), 0.25) / (0.3186 * np.sqrt(20)))
 
 
+def noise_sigma(y: np.ndarray, quantum: float) -> float:
+    """Noise of a record (N,): third differences over sqrt(20), their median (or trimmed rms on a lattice), at least q /
+    sqrt(12).
+    """
+    d = np.abs(np.diff(y, 3))
+    d = d[np.isfinite(d)]
+    if d.size == 0:
+        return 1e-9 * float(np.nanstd(y)) + 1e-300
+    spread = 1.4826 * float(np.median(d)) / math.sqrt(20.0)
+    if quantum > 0:  # the median of a few counts is itself a count
+        spread = max(spread, math.sqrt(float(np.mean(d[d <= 4 * (spread * math.sqrt(20.0) + quantum)] ** 2)) / 20.0))
+    return max(spread, quantum / math.sqrt(12.0), 1e-9 * float(np.nanstd(y)) + 1e-300)
+
+
 # -- the converter's step ------------------------------------------------------------------------------------
 
 

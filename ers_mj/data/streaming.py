@@ -61,9 +61,10 @@ class Stream:
         columns = [column.strip(' \t"') for column in line.split(self._delimiter)]
         if twice := [c for c in columns if columns.count(c) > 1]:
             raise InputError(f"{self.name}: the column {twice[0]} stands there more than once")
+        choice = choose_columns(columns, self._mapping, self.name)
         chosen = {
-            COLUMNS[contract].field: (COLUMNS[contract], columns.index(column))
-            for contract, column in choose_columns(columns, self._mapping, self.name).items()
+            field: (COLUMNS[contract], columns.index(choice.columns[contract]))
+            for field, contract in choice.roles().items()
         }
         self._cells = [(chosen[field][1], chosen[field][0].factor, columns[chosen[field][1]]) for field in FIELDS]
         self.units, self._width = {field: chosen[field][0].unit for field in FIELDS}, len(columns)

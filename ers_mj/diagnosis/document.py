@@ -303,6 +303,7 @@ def _data(case: Case) -> dict:
         "sha256": [r.sha256 for r in every],
         "output_unit": case.output_unit,
         "input_unit": case.input_unit,
+        "input_kind": case.recordings[0].input_kind,
         "problems": problems,
     }
 

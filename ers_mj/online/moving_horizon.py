@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.checks import GAP
-from ers_mj.data.prepared import Signals, make_trace, noise_sigma
-from ers_mj.data.sensor_faults import converter_step
+from ers_mj.data.prepared import Signals, make_trace
+from ers_mj.data.sensor_faults import converter_step, noise_sigma
 from ers_mj.estimation.baseline import baseline
 from ers_mj.estimation.fit import fit
 from ers_mj.estimation.initial_state import fitted_start, with_starts
