@@ -87,6 +87,9 @@ class Effect:
     is_play: ClassVar[bool] = False  # a slack between motor and rudder, which a plant has once
     after_noise: ClassVar[bool] = False  # a sensor's converter or wire: it acts on what is read, noise and all
     holds: ClassVar[bool] = False  # a wire that brings an earlier reading again
+    # letters of a position loop (position_loop/model.py) that it is told by, where a firmware closes one
+    in_loop: ClassVar[tuple[str, ...]] = ()
+    is_weight: ClassVar[bool] = False  # its torques grow with a load's moment m l
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None

@@ -13,6 +13,7 @@ class BiasTorque(Load):
     mjcf = "an actuator of constant force on the rudder"
     parameters = (Parameter("tau_0", "torque", "constant torque, positive towards growing angle", positive=False),)
     sized = 1
+    in_loop = ("hold",)
 
     def starts(self, scales):
         return [np.array([0.1 * scales.acceleration])]

@@ -26,6 +26,7 @@ class CurrentLimit(Drive):
         ),
     )
     needs, follows_current = (("tau_max",),), True
+    in_loop = ("most",)
 
     def starts(self, scales):
         peak = scales.drive or 4.0 * scales.acceleration

@@ -20,6 +20,7 @@ class GravityImbalance(Load):
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),
     )
     sized, tries = 2, 3
+    is_weight = True
     redundant, curves = (
         1,
         "bias_torque",

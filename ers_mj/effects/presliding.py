@@ -46,6 +46,7 @@ class Presliding(Friction):
         ),
     )
     tries, dear, step, tangible = 2, True, 0.01, False
+    in_loop = ("creep",)
 
     def starts(self, scales):
         least, most = 2 * scales.noise, 0.05 * scales.position

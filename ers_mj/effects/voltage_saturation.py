@@ -27,6 +27,7 @@ class VoltageSaturation(Drive):
         ),
     )
     needs = (("u_max",),)
+    in_loop = ("L",)
     tries = 3
 
     def starts(self, scales):

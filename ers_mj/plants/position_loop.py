@@ -23,7 +23,7 @@ from ers_mj.plants.laws import friction_level, remember, total_torque
 from ers_mj.plants.state import READ, READ_BOOL, RUNAWAY, TABLE, VECTOR, C, F, N, plant_in, types
 
 LONGEST = 1e-3  # [s] of a step
-STIFF = 0.35  # frequency [rad/s] of the stiffest spring times the step
+STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
 PAST = 512  # steps of the drive that are kept: the longest dead time
 GIVES_WAY = 0.97  # share of the speed that a step's load-dependent friction may rest on
 

@@ -1,0 +1,213 @@
+"""Which effects does a position loop's recording ask for? The bare loop first, then one effect at a time.
+
+closed form -> base (gain, limit, latency, load) -> compare all candidates -> add the best -> ... -> leave out one by one
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from ers_mj.decisions.thresholds import POLICY, Policy
+from ers_mj.effects.bias_torque import BiasTorque
+from ers_mj.effects.gravity_imbalance import GravityImbalance
+from ers_mj.effects.rate_limit import RateLimit
+from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain
+from ers_mj.position_loop.model import LoopModel
+from ers_mj.position_loop.runs import Run, scales_of
+from ers_mj.position_loop.terms import DERIVATIVE, INTEGRAL, SPRING, Term, delayed_within, is_there, present, terms, top_speed, without
+from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
+
+Progress = Callable[[str, float], None]
+GRAVITY = GravityImbalance.name
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How far a search goes."""
+
+    rounds: int = 6
+    several: Halving = Halving(looked=6, first=10, kept=3)  # starts of the bare loop
+    tried: int = 10  # steps of a candidate's best starts
+    finalists: int = 3  # candidates that are refitted to the end
+    full: int = 40  # steps of a fit to the end
+
+
+EFFORT = Effort()
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A candidate of a round: its gain over the model at hand after everything was refitted."""
+
+    name: str
+    fit: Fit
+    gain: float
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a term of the answer buys: its gain over the best refit without it."""
+
+    name: str
+    gain: float
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The bare loop, the answer, each round's candidates (the best first), and what each term of the answer buys."""
+
+    base: Fit
+    chosen: Fit
+    rounds: tuple[tuple[Compared, ...], ...]
+    left: tuple[Left, ...] = ()
+    loads: tuple[tuple[str, Fit], ...] = field(default=(), repr=False)
+
+    @property
+    def named(self) -> tuple[Left, ...]:
+        """The named effects, the one that buys most first."""
+        names = present(self.chosen.model)
+        return tuple(sorted((x for x in self.left if x.name in names), key=lambda x: -x.gain))
+
+
+class Selector:
+    """A selection under way on some runs."""
+
+    def __init__(self, runs: Sequence[Run], is_angle: bool, jobs: int = 1, policy: Policy = POLICY):
+        self.data, self.is_angle, self.jobs, self.policy = Data.of(runs), is_angle, jobs, policy
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        return self.data.runs
+
+    def run(self, progress: Progress = lambda text, share: None) -> Selection:
+        """Base, rounds, and what can be left out again."""
+        progress("fitting the loop", 0.05)
+        current = base = self.base()
+        rounds: list[tuple[Compared, ...]] = []
+        while len(rounds) < EFFORT.rounds and self._may_gain(current):
+            progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
+            ranked = self.compared(current)
+            rounds.append(tuple(ranked))
+            if not ranked or ranked[0].gain < self.policy.loop_gain:
+                break
+            current = ranked[0].fit
+        progress("leaving out what is not needed", 0.65)
+        return self.pruned(Selection(base, current, tuple(rounds)))
+
+    # -- the bare loop -------------------------------------------------------------------------------------------------
+
+    def base(self) -> Fit:
+        """The loop with a limit and without, under gravity (or a spring where the output is no angle)."""
+        loads = ("hold", "sin", "cos") if self.is_angle else ("hold", "a_1")
+        roughs = [rough for width in SCAN.widths for rough in rough_starts(self.runs, loads, width)]
+        starts = [self.begun(rough) for rough in roughs]
+        first = min(roughs, key=lambda rough: rough.left)
+        if "L" in first.values:
+            values = {**first.values, "K": 1.5 * first.values["K"], "L": 1.3 * first.values["L"]}
+            starts.append(self.begun(Rough(values, first.left)))
+        found = best(starts, self.data, EFFORT.full, EFFORT.several)
+        within = best(delayed_within(found.model), self.data, EFFORT.full)
+        return self.unburdened(within if gain(found, within) > 0.0 else found)
+
+    def unburdened(self, fit: Fit) -> Fit:
+        """The fit without those loads that do not pay."""
+        for name in (BiasTorque.name, SPRING, GRAVITY):
+            if is_there(fit.model, name):
+                bare = fitted(without(fit.model, name), self.data, EFFORT.full)
+                fit = bare if gain(bare, fit) < self.policy.loop_gain else fit
+        return fit
+
+    def begun(self, rough: Rough, **more: float) -> LoopModel:
+        """A model as a regression has it; a derivative term is free where a limit tells it apart."""
+        values = {k: v for k, v in {**rough.values, **more}.items() if k not in ("sin", "cos")}
+        drive = values.get("L", values["K"] * 0.5 * float(np.nanmax(np.abs(self.runs[0].r - self.runs[0].y))))
+        model = LoopModel(values, tuple(values), scales=scales_of(self.runs, self.is_angle, values["c_2"], drive))
+        if "sin" in rough.values:
+            model = model.with_effect(GRAVITY, np.array([rough.values["sin"], rough.values["cos"]]))
+        return model.having(D=0.0) if "L" in values else model
+
+    # -- comparing -----------------------------------------------------------------------------------------------------
+
+    def _may_gain(self, fit: Fit) -> bool:
+        """Whether noise alone leaves so much less that an effect could be asked for."""
+        return 0.5 * fit.blocks * math.log(max(fit.misfit, 1e-9)) > self.policy.loop_gain
+
+    def _error(self, fit: Fit) -> float:
+        """What a fit leaves [output unit]."""
+        return math.sqrt(fit.misfit) * float(np.sqrt(np.mean([run.sigma**2 for run in self.runs])))
+
+    def compared(self, current: Fit) -> list[Compared]:
+        """The candidates beside a model, the one that buys most first."""
+        candidates = [self._with_closed_form(term, current.model) for term in terms(current.model, self.runs, self._error(current))]
+        quick = list(self._map(partial(self._tried, current), candidates))
+        quick.sort(key=lambda c: -c.gain)
+        ready = [c for c in quick[: EFFORT.finalists] if c.gain > 0.0]
+        full = list(self._map(partial(self._finished, current), ready))
+        return sorted(full, key=lambda c: -c.gain) + quick[len(ready) :]
+
+    def _tried(self, current: Fit, term: Term) -> Compared:
+        if term.is_far:
+            fit = best(term.starts, self.data, EFFORT.full, EFFORT.several)
+        else:
+            fit = best(term.starts, self.data, EFFORT.tried)
+        return Compared(term.name, fit, gain(current, fit))
+
+    def _finished(self, current: Fit, candidate: Compared) -> Compared:
+        fit = fitted(candidate.fit.model, self.data, EFFORT.full)
+        return replace(candidate, fit=fit, gain=gain(current, fit))
+
+    def _with_closed_form(self, term: Term, model: LoopModel) -> Term:
+        """The term with starts from a regression that has it in, for what bends the rest of the model most."""
+        if term.name not in (RateLimit.name, INTEGRAL):
+            return term
+        loads = ("hold", "sin", "cos") if GRAVITY in model.names else ("hold",)
+        speed = top_speed(self.runs) if term.name == RateLimit.name else np.inf
+        more = {"R": speed} if term.name == RateLimit.name else {}
+        roughs = rough_starts(self.runs, loads, SCAN.widths[0], speed, term.name == INTEGRAL)
+        begun = [self.begun(rough, **more) for rough in roughs]
+        effects = [e for e in model.effects if e[0] != GRAVITY]
+        for name, values in effects:
+            begun = [m.with_effect(name, values) for m in begun]
+        return replace(term, starts=(*term.starts, *(replace(m, side=model.side) for m in begun)))
+
+    def _map(self, call: Callable, items: Sequence):
+        if self.jobs == 1:
+            return map(call, items)
+        with ThreadPoolExecutor(self.jobs) as pool:
+            return list(pool.map(call, items))
+
+    # -- leaving out ---------------------------------------------------------------------------------------------------
+
+    def pruned(self, selection: Selection) -> Selection:
+        """The selection with what buys too little taken out again, and with what the rest buys."""
+        current = selection.chosen
+        while True:
+            left = [self._left_out(current, name) for name in self._parts(current.model)]
+            weakest = min(left, key=lambda x: x.gain - self._least(x, current.model), default=None)
+            if weakest is None or weakest.gain >= self._least(weakest, current.model):
+                return replace(selection, chosen=current, left=tuple(left))
+            current = weakest.fit
+
+    def _least(self, left: Left, model: LoopModel) -> float:
+        """What a term must buy; one whose size says that it is not there, everything."""
+        if left.name == INTEGRAL and model["I"] < self.policy.loop_integral * model["K"]:
+            return math.inf
+        if left.name == DERIVATIVE and abs(model["D"]) < self.policy.loop_damping * model["a_2"]:
+            return math.inf
+        return self.policy.loop_gain
+
+    def _parts(self, model: LoopModel) -> list[str]:
+        return [*present(model), *(name for name in (INTEGRAL, DERIVATIVE, SPRING) if is_there(model, name))]
+
+    def _left_out(self, current: Fit, name: str) -> Left:
+        """The best refit without a term, from where the answer stands and from its own closed form."""
+        bare = without(current.model, name)
+        fit = best([bare], self.data, EFFORT.full)
+        return Left(name, gain(fit, current), fit)
