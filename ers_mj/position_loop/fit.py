@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ers_mj.effects import BY_NAME
 from ers_mj.position_loop.model import Free, LoopModel
 from ers_mj.position_loop.runs import Run
 from ers_mj.solvers.levenberg_marquardt import Damping, Descent
@@ -21,7 +22,8 @@ class Search:
 
     tries: int = 5
     longest: float = 1.5  # of a step, in transformed numbers
-    step: float = 1e-3  # in transformed numbers, to take a slope
+    step: float = 1e-3  # in transformed numbers, to take a slope,
+    bouncing: float = 5e-3  # and that of two bodies that bounce
     enough: float = 1e-4  # share of the cost that a step must win
     soft: float = 0.03  # of the travel: errors beyond grow the cost by their size, not its square
 
@@ -94,6 +96,7 @@ class _Problem:
 
     def __init__(self, model: LoopModel, layout: Sequence[Free], data: Data):
         self.model, self.layout, self.data = model, layout, data
+        self.span = SEARCH.bouncing if any(BY_NAME[name].is_play for name in model.names) else SEARCH.step
 
     def reach(self, z: np.ndarray) -> _Point:
         model = self.model.at(self.layout, z)
@@ -115,10 +118,10 @@ class _Problem:
         """Of the errors by the transformed numbers (N, k), from one side or from ``both``."""
         out = np.zeros((point.e.size, point.z.size), order="F")
         for k in range(point.z.size):
-            ends = [self._beside(point, k, way * SEARCH.step) for way in (1.0, -1.0)[: 1 + both]]
+            ends = [self._beside(point, k, way * self.span) for way in (1.0, -1.0)[: 1 + both]]
             ends = [end for end in ends if end[0] != point.z[k] and np.isfinite(end[1]).all()]
             if not ends and not both:
-                ends = [self._beside(point, k, -SEARCH.step)]
+                ends = [self._beside(point, k, -self.span)]
             if len(ends) < 2:
                 ends.append((point.z[k], point.e))
             (z_1, e_1), (z_2, e_2) = ends

@@ -51,6 +51,7 @@ LETTERS: Mapping[str, Letter] = {
     "hold": Letter("{y}/s^2", positive=False, lower=-math.inf, size=5.0),
 }
 SCALED = ("K", "I", "D", "L", "least", "most", "a_1", "a_2", "c_2", "hold")  # by one over the inertia
+WIDER = {"rho": (0.05, 0.95), "phi": (0.0, 1.0)}  # a loop's motor may be light and bear all friction
 CONTACT = ("f_contact", "zeta")  # of a play: what no loop shows
 FASTEST, SEEN = 120.0, 0.4  # [Hz] of a contact that is told from a stiff one, and that as a share of the log's rate
 SIDES = ("load", "link", "motor")  # where loop and log sit: both on the load; loop on the motor; both on the motor
@@ -123,8 +124,8 @@ class LoopModel:
         elif p.kind in PER_INERTIA and self.scales is not None:
             size = max(self.scales.acceleration, 1e-6)
         lower, upper = p.lower if not p.positive else max(p.lower, 1e-9), p.upper
-        if p.name == "rho":  # a loop's motor may be light
-            lower, upper = 0.05, 0.95
+        if p.name in WIDER:
+            lower, upper = WIDER[p.name]
         if p.kind == "frequency" and self.scales is not None:  # what the samples can show of a contact or a shaft
             upper = max(min(upper, FASTEST, SEEN / self.scales.sample_time), 1.1 * lower)
         return Free(name, p.name, k, p.positive, size, lower, upper)

@@ -20,7 +20,7 @@ from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, scales_of
-from ers_mj.position_loop.terms import DERIVATIVE, INTEGRAL, SPRING, Term, delayed_within, is_there, present, terms, top_speed, without
+from ers_mj.position_loop.terms import DERIVATIVE, INTEGRAL, SPRING, Term, delayed_within, is_there, other_shares, present, terms, top_speed, without
 from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
 
 Progress = Callable[[str, float], None]
@@ -160,7 +160,7 @@ class Selector:
         return Compared(term.name, fit, gain(current, fit))
 
     def _finished(self, current: Fit, candidate: Compared) -> Compared:
-        fit = fitted(candidate.fit.model, self.data, EFFORT.full)
+        fit = best(other_shares(candidate.fit.model), self.data, EFFORT.full, EFFORT.several)
         return replace(candidate, fit=fit, gain=gain(current, fit))
 
     def _with_closed_form(self, term: Term, model: LoopModel) -> Term:

@@ -154,7 +154,7 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
     if any(BY_NAME[name].subsystem == "transmission" for name in model.names):
         return []
     contact = min(60.0, 0.35 / model.scales.sample_time)
-    play = [np.array([x * error, rho, 0.5, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]
+    play = [np.array([x * error, rho, 0.8, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]
     shaft = [np.array([f, 0.1, 0.6, 0.3, np.inf]) for f in (8.0, 25.0)]
     damping, found = max(model["a_2"] + model["D"], 1e-2), []
     for name, starts in ((Backlash.name, play), (ShaftCompliance.name, shaft)):
@@ -166,3 +166,13 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
             models += [replace(held.with_effect(name, start), side=side) for start in starts]
         found.append(Term(name, tuple(models), is_far=True))
     return found
+
+
+def other_shares(model: LoopModel) -> list[LoopModel]:
+    """A model with a play, and others whose bodies share inertia, friction and contact differently."""
+    play = next((e for e in model.effects if BY_NAME[e[0]].is_play), None)
+    if play is None:
+        return [model]
+    gap, rho, phi, f, zeta = play[1]
+    others = [(rho, phi, 1.0), (rho, 1.0, 1.0), (rho, 1.0, zeta), (0.2, 0.9, 1.0), (0.5, 0.9, 1.0), (0.8, 1.0, 1.0)]
+    return [model, *(model.with_effect(play[0], np.array([gap, r, p, f, z])) for r, p, z in others)]
