@@ -197,6 +197,7 @@ def _document(found: Identified, recordings: list[Recording]) -> dict:
             "input_unit": recordings[0].input_unit,
             "input_kind": recordings[0].input_kind,
             "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems],
+            "faults": [fault.as_document(r.name) for r in recordings for fault in r.faults],
         },
         "seed": found.settings.seed,
         "versions": versions(),

@@ -1,10 +1,12 @@
 """What of a recording is refused, and what is worked around and told: the checks that arrays and files get alike."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.data.columns import CONSTANT, MEASURED
+from ers_mj.data.columns import COLUMNS, CONSTANT, MEASURED
+from ers_mj.data.consistency.sheet import Fault
 from ers_mj.data.sensor_faults import at_extreme, decimal_grain, frozen_spans, held_spans, varied
 from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
@@ -113,58 +115,75 @@ def locked(x: np.ndarray) -> np.ndarray:
 
 def problems_of(
     fields: dict[str, np.ndarray], printed: dict[str, np.ndarray], labels: dict[str, str], step: float
-) -> list[str]:
-    """A sentence for each; `printed` are the columns as they stand in the file, `step` the converter's there."""
+) -> list[Fault]:
+    """What is told, a sentence each; `printed` are the columns as they stand in the file, `step` the converter's
+    there.
+    """
     t, u, y = fields["t"], fields["u"], printed["y"]
     frozen = frozen_spans(y, step or decimal_grain(y[np.isfinite(y)]))
     return [
-        *(_told_blanks(x, labels[field], field) for field, x in printed.items() if np.isnan(x).any()),
-        *_told_gaps(t),
-        *_told_jitter(t),
-        *_told_clipped(u, labels["u"], [s for s in held_spans(u) if at_extreme(u, s) and varied(u, s)]),
-        *_told_clipped(y, labels["y"], [s for s in frozen if at_extreme(y, s)]),
+        *(_told_blanks(t, x, labels[field], field) for field, x in printed.items() if np.isnan(x).any()),
+        *_told_gaps(t, labels["t"]),
+        *_told_jitter(t, labels["t"]),
+        *_told_clipped("limit", t, u, labels["u"], [s for s in held_spans(u) if at_extreme(u, s) and varied(u, s)]),
+        *_told_clipped("clipped", t, y, labels["y"], [s for s in frozen if at_extreme(y, s)]),
         *_told_stuck(t, labels["y"], [s for s in frozen if not at_extreme(y, s) and np.ptp(u[s]) > 0]),
-        *([f"the input {labels['u']} is constant at {u[0]:.6g}"] if np.ptp(u) == 0 else []),
-        *([f"the output {labels['y']} moves in steps of {step:.4g}, those of its converter"] if step else []),
+        *_told_constant(t, u, labels["u"]),
+        *_told_converter(labels["y"], step),
     ]
 
 
-def _told_blanks(x: np.ndarray, label: str, field: str) -> str:
-    count, share = int(np.isnan(x).sum()), np.mean(np.isnan(x))
+def _told_blanks(t: np.ndarray, x: np.ndarray, label: str, field: str) -> Fault:
+    blank, share = np.flatnonzero(np.isnan(x)), np.mean(np.isnan(x))
     if _sparse(x):
-        return f"{label} lacks {share:.0%} of its values and is not used"
-    remedy = "left out" if field in MEASURED else "taken as the last value before"
-    return f"{label} is missing in {count} samples ({share:.2%}), which are {remedy}"
+        sentence = f"{label} lacks {share:.0%} of its values and is not used"
+    else:
+        remedy = "left out" if field in MEASURED else "taken as the last value before"
+        sentence = f"{label} is missing in {blank.size} samples ({share:.2%}), which are {remedy}"
+    return Fault("blank", label, sentence, int(blank.size), _region(t, blank[0], blank[-1]))
 
 
-def _told_gaps(t: np.ndarray) -> list[str]:
+def _region(t: np.ndarray, first: int, last: int) -> tuple[float, float]:
+    return float(t[first]), float(t[last])
+
+
+def _told_gaps(t: np.ndarray, label: str) -> list[Fault]:
     dt = np.diff(t)
     gaps = np.flatnonzero(dt > GAP * np.median(dt))
     if not gaps.size:
         return []
     k = gaps[np.argmax(dt[gaps])]
-    return [f"time has {gaps.size} gap{'s'[: gaps.size > 1]}, the largest of {dt[k]:.4g} s after {t[k]:.4g} s"]
+    sentence = f"time has {gaps.size} gap{'s'[: gaps.size > 1]}, the largest of {dt[k]:.4g} s after {t[k]:.4g} s"
+    return [Fault("gap", label, sentence, int(gaps.size), _region(t, gaps[0], gaps[-1] + 1))]
 
 
-def _told_jitter(t: np.ndarray) -> list[str]:
+def _told_jitter(t: np.ndarray, label: str) -> list[Fault]:
     dt = np.diff(t) / np.median(np.diff(t))
     jitter = np.sqrt(np.mean((dt[dt <= GAP] - 1) ** 2))
-    return [f"the steps of time jitter by {jitter:.1%} rms"] if jitter > LIMITS.least_jitter else []
+    sentence = f"the steps of time jitter by {jitter:.1%} rms"
+    return [Fault("jitter", label, sentence)] if jitter > LIMITS.least_jitter else []
 
 
-def _told_clipped(x: np.ndarray, label: str, spans: list[slice]) -> list[str]:
+def _told_clipped(kind: str, t: np.ndarray, x: np.ndarray, label: str, spans: list[slice]) -> list[Fault]:
     if not spans:
         return []
     limits = listed(f"{limit:.6g}" for limit in sorted({float(x[span.start]) for span in spans}))
-    return [f"{label} looks clipped at {limits}: {_told_spans(spans, len(x))}"]
+    sentence = f"{label} looks clipped at {limits}: {_told_spans(spans, len(x))}"
+    return [_of_spans(kind, t, label, spans, sentence)]
 
 
-def _told_stuck(t: np.ndarray, label: str, spans: list[slice]) -> list[str]:
+def _told_stuck(t: np.ndarray, label: str, spans: list[slice]) -> list[Fault]:
     if not spans:
         return []
     longest = max(spans, key=lambda s: s.stop - s.start)
     lasts, start = t[longest.stop - 1] - t[longest.start], t[longest.start]
-    return [f"{label} looks stuck: {_told_spans(spans, len(t))}, the longest for {lasts:.4g} s from {start:.4g} s on"]
+    sentence = f"{label} looks stuck: {_told_spans(spans, len(t))}, the longest for {lasts:.4g} s from {start:.4g} s on"
+    return [_of_spans("stuck", t, label, spans, sentence)]
+
+
+def _of_spans(kind: str, t: np.ndarray, label: str, spans: list[slice], sentence: str) -> Fault:
+    count = sum(span.stop - span.start for span in spans)
+    return Fault(kind, label, sentence, count, _region(t, spans[0].start, spans[-1].stop - 1))
 
 
 def _told_spans(spans: list[slice], total: int) -> str:
@@ -172,7 +191,26 @@ def _told_spans(spans: list[slice], total: int) -> str:
     return f"{count} samples ({count / total:.2%}) in {len(spans)} span{'s'[: len(spans) > 1]}"
 
 
-def ignored(columns: list[str], labels: dict[str, str]) -> list[str]:
+def _told_constant(t: np.ndarray, u: np.ndarray, label: str) -> list[Fault]:
+    sentence = f"the input {label} is constant at {u[0]:.6g}"
+    return [Fault("constant_input", label, sentence, u.size, _region(t, 0, -1))] if np.ptp(u) == 0 else []
+
+
+def _told_converter(label: str, step: float) -> list[Fault]:
+    sentence = f"the output {label} moves in steps of {step:.4g}, those of its converter"
+    return [Fault("converter", label, sentence)] if step else []
+
+
+def ignored(columns: list[str], taken: Collection[str]) -> list[Fault]:
     """Tell the columns that were not taken in; `run` chose the rows."""
-    ignored = [column for column in columns if column not in labels.values() and column != "run"]
-    return [f"columns that mean nothing here are ignored: {listed(ignored)}"] if ignored else []
+    rest = [column for column in columns if column not in taken and column != "run"]
+    beside = [column for column in rest if COLUMNS.get(column, COLUMNS["t_s"]).field == "u"]
+    strange = [column for column in rest if column not in beside]
+    told = [
+        *(
+            f"{column} stands beside the input and is not used (--second {column} explains it, too)"
+            for column in beside
+        ),
+        *([f"columns that mean nothing here are ignored: {listed(strange)}"] if strange else []),
+    ]
+    return [Fault("ignored", "", sentence) for sentence in told]

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ers_mj.data.channels import Channel, channels_of, supply_of
+from ers_mj.data.kept import Kept
 from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import Recording
 from ers_mj.data.sensor_faults import at_extreme, frozen_spans, leapt_spans, noise_sigma, spikes, unmoved_spans
@@ -90,6 +91,11 @@ class Trace:
     def sample_time(self) -> float:
         """Median step [s]."""
         return float(np.median(np.diff(self.t)))
+
+    @cached_property
+    def runs(self) -> Kept:
+        """What models' runs along it left."""
+        return Kept()
 
     @cached_property
     def is_uniform(self) -> bool:

@@ -19,6 +19,8 @@ from ers_mj.data.checks import FEWEST_SAMPLES as FEWEST_SAMPLES
 from ers_mj.data.checks import GAP as GAP
 from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_time
 from ers_mj.data.columns import COLUMNS, CONSTANT, OPTIONAL, choose_columns, input_name, kind_of, refuse_unknown_unit
+from ers_mj.data.consistency import consistent
+from ers_mj.data.consistency.sheet import Fault, Sheet
 from ers_mj.data.sensor_faults import converter_step
 from ers_mj.data.tables import cell_of, listed, numbers, parse_table, read_content, select_run, split_spec, write_whole
 from ers_mj.errors import InputError
@@ -47,6 +49,7 @@ class Recording:
         quantum: the converter's step [`output_unit`] as `converter_step` finds it in the file's own unit.
         name, path, sha256: file name with its run, path, and hash of the bytes that were read.
         problems: what was worked around or ignored, a sentence each.
+        faults: of these what is wrong with the data, and where: masked, mended, or to be known.
     """
 
     t: np.ndarray
@@ -76,6 +79,7 @@ class Recording:
     path: str = ""
     sha256: str = ""
     problems: tuple[str, ...] = ()
+    faults: tuple[Fault, ...] = ()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Lock the arrays again: a copy that has been to another process comes back writeable."""
@@ -138,15 +142,12 @@ def read_recording(
     roles = {field: COLUMNS[contract] for field, contract in choice.roles().items()}
     labels = {field: choice.columns[contract] for field, contract in choice.roles().items()}
     printed = {field: numbers(table[column], column, name) for field, column in labels.items()}
-    values = {field: x * roles[field].factor for field, x in printed.items()}
-    step = converter_step(printed["y"])
-    fields: dict[str, Any] = checked(values, labels, name) | constants(values, labels, name)
-    problems = problems_of(fields, printed, labels, step) + ignored(table.column_names, labels)
-    units: dict[str, Any] = {"input_unit": roles["u"].unit, "output_unit": roles["y"].unit, "input_kind": choice.kind}
+    read = Read(name, choice.kind, labels, {field: role.unit for field, role in roles.items()})
+    factors = {field: role.factor for field, role in roles.items()}
+    found = read.fields(printed, factors, ignored(table.column_names, labels.values()))
     if choice.second:
-        units |= {"second_name": choice.second, "second_unit": roles["second"].unit}
-    origin: dict[str, Any] = {"name": name, "path": str(path), "sha256": hashlib.sha256(content).hexdigest()}
-    return Recording(**fields, **units, **origin, quantum=step * roles["y"].factor, problems=tuple(problems))
+        found |= {"second_name": choice.second, "second_unit": roles["second"].unit}
+    return Recording(**found, path=str(path), sha256=hashlib.sha256(content).hexdigest())
 
 
 def write_recording(path: str | os.PathLike[str], columns: Mapping[str, Sequence[float] | np.ndarray]) -> None:
@@ -200,15 +201,63 @@ def from_arrays(
         f: _array(np.full(count, x) if f in CONSTANT and np.isscalar(x) else x, f, name) for f, x in given.items()
     }
     labels = {field: field for field in values}
-    fields: dict[str, Any] = checked(values, labels, name) | constants(values, labels, name)
-    units: dict[str, Any] = {"input_unit": input_unit, "output_unit": output_unit, "input_kind": kind}
-    step = converter_step(values["y"])
-    problems = problems_of(fields, values, labels, step)
-    origin: dict[str, Any] = {
-        "name": name,
-        "sha256": hashlib.sha256(b"".join(x.tobytes() for x in values.values())).hexdigest(),
-    }
-    return Recording(**fields, **units, **origin, quantum=step, problems=tuple(problems))
+    units = {field: next(r.unit for r in COLUMNS.values() if r.field == field) for field in values}
+    units |= {"u": input_unit, "y": output_unit} | ({"reference": output_unit} if "reference" in units else {})
+    read = Read(name, kind, labels, units, frozenset(values))
+    digest = hashlib.sha256(b"".join(x.tobytes() for x in values.values())).hexdigest()
+    return Recording(**read.fields(values, dict.fromkeys(values, 1.0), []), sha256=digest)
+
+
+@dataclass(frozen=True)
+class Read:
+    """What is known of columns before they become a recording: names, the input's kind, and each field's column and
+    unit; ``sure`` are fields whose unit a person has given.
+    """
+
+    name: str
+    kind: str
+    labels: Mapping[str, str]
+    units: Mapping[str, str]
+    sure: frozenset[str] = frozenset()
+
+    def fields(
+        self, printed: Mapping[str, np.ndarray], factors: Mapping[str, float], notes: Sequence[Fault]
+    ) -> dict[str, Any]:
+        """The fields of `Recording`: checked, looked over, locked.
+
+        Args:
+            printed: field -> values (N,) in the file's unit, in which the converter's step is sought.
+            factors: field -> factor from that unit to the field's.
+            notes: what is already to be told.
+        """
+        name, labels = self.name, dict(self.labels)
+        values = {field: x * factors[field] for field, x in printed.items()}
+        fields = checked(values, labels, name)
+        step = converter_step(printed["y"])
+        rows = np.arange(fields["t"].size)
+        first = Sheet(name, self.kind, fields, labels, self.units, rows, step * factors["y"], self.sure)
+        sheet, faults = consistent(first)
+        seen = {field: _seen(x[sheet.rows], field, first, sheet, factors[field]) for field, x in printed.items()}
+        told = [*problems_of(dict(sheet.fields), seen, labels, step), *faults, *notes]
+        return {
+            **{field: locked(x) for field, x in sheet.fields.items()},
+            **constants(values, labels, name),
+            "input_kind": self.kind,
+            "input_unit": self.units["u"],
+            "output_unit": self.units["y"],
+            "quantum": step * factors["y"],
+            "name": name,
+            "problems": tuple(fault.sentence for fault in told),
+            "faults": tuple(fault for fault in told if not fault.is_note),
+        }
+
+
+def _seen(x: np.ndarray, field: str, first: Sheet, last: Sheet, factor: float) -> np.ndarray:
+    """A column in the file's unit as it is after all was mended; the file's own values where nothing was."""
+    if field not in last.fields or field not in ("y", "u", "theta_m", "omega"):
+        return x
+    same = np.array_equal(last.fields[field], first.fields[field][last.rows], equal_nan=True)
+    return x if same else np.where(np.isfinite(last.fields[field]), last.fields[field] / factor, x)
 
 
 def _array(x: Any, field: str, name: str) -> np.ndarray:

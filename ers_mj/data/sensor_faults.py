@@ -212,6 +212,8 @@ def _rounded_lattice(levels: np.ndarray, grain: float) -> float:
     finest = 8 * max(grain, FLOAT32 * np.abs(levels).max())
     gaps = np.diff(levels)
     gaps = gaps[gaps > finest / 8]
+    if not gaps.size:  # every level of the grain was visited
+        return 0.0
     usual = np.append(
         np.quantile(gaps, LATTICE.quantiles), np.max(gaps[gaps < LATTICE.within * np.min(gaps)])
     )  # the rarer kind, too, where there are two

@@ -305,6 +305,7 @@ def _data(case: Case) -> dict:
         "input_unit": case.input_unit,
         "input_kind": case.recordings[0].input_kind,
         "problems": problems,
+        "faults": [fault.as_document(r.name) for r in every for fault in r.faults],
     }
 
 

@@ -59,7 +59,16 @@ def residuals_in(model: Model, trace: Trace, record: int, rate: float) -> np.nda
     return _run_in(model, trace, record, rate)[0]
 
 
-def _run_in(model, trace, record, rate):
+def _run_in(model: Model, trace: Trace, record: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """What a run leaves (rows,), and its motion (n, 4): kept with the trace, since fits, comparisons and intervals ask
+    for the same places again. The effort is counted each time, so that it tells the same whatever is kept.
+    """
+    plant = model.plant(record, trace.supply)
+    key = (*plant.told, rate, model.offset(record), model.values.get("ampere"), model.dead_time)
+    kept = trace.runs.get(key)
+    if kept is not None:
+        plant.count_outputs(trace.t, rate > 0)
+        return kept
     (theta, *others), motion = model.observed(trace, record, rate)
     left = np.empty((1 + len(others), trace.t.size))
     left[0] = trace.weighed(theta)
@@ -71,6 +80,8 @@ def _run_in(model, trace, record, rate):
             row[trace.t < trace.t[0] + model.dead_time] = 0.0
     left = left.ravel()
     left[trace.unseen] = 0.0
+    left.flags.writeable = False
+    trace.runs.keep(key, (left, motion))
     return left, motion
 
 

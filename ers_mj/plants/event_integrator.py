@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ers_mj.effects.base import LEAST_IRON
+from ers_mj.plants.calm import is_plain, rests_on, slips_on, written
 from ers_mj.plants.checks import is_calm, is_clean, is_steady, is_still, turns
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import CUTS, corner_speed, cut, law_step, longest_step
@@ -228,6 +229,8 @@ def _of_two_bodies(e, step, c, t, x, m, drive, tau, a_emf, load, h):
 @inline
 def _leap(maps, c, now, h, x, m):
     """(whether two bodies go on in their mode over a whole sample of length h, the state then or as it begins)."""
+    if not (now.is_usual and now.closed and m.stop == 0 and is_calm(c, x, h)):
+        return False, x
     tau, a_emf, drive = c.tau_e, c.a_emf, now.now
     x = with_drive(c, x, drive, tau, a_emf)
     z = two_body_segment(maps.whole, h, c, now.t, x, m, drive, tau, a_emf, now.load, h)
@@ -303,34 +306,59 @@ def _event_budget(c, n, cuts):
     return EVENT_BUDGET * n * (cuts.ends.size if has_bristle(c) else 1) + 1000
 
 
+@inline
+def _is_followed(y, gain, every, k):
+    """Whether the observer corrects the state at sample k."""
+    return gain > 0.0 and k % every == 0 and y[k] == y[k]
+
+
+@inline
+def _until(k, n, gain, every):
+    """The sample up to which no observer corrects what begins at sample k."""
+    return min(n - 1, (k // every + 1) * every) if gain > 0.0 else n - 1
+
+
+@inline
+def _calm(t, u, enable, load, c, cuts, e, k, last, x, m, slips, out):
+    """(sample, state) up to which nothing happens from sample k on."""
+    if m.s == 0:
+        return rests_on(t, u, enable, load, c, cuts, k, last, x, m, out)
+    return slips_on(t, u, enable, load, c, cuts, e, k, last, x, m, slips, out)
+
+
 @unit(types.void(READ, READ, READ_BOOL, READ, READ, F, N, C, N, VECTOR, CUTS, OF_A_SAMPLE, L, TABLE))
 def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps, out):
     """See ``simulate``: through the samples, by maps over segments or, if it ``leaps``, over a whole sample."""
-    n, bristle, slips = t.size, has_bristle(c), never_sticks(c)
+    n, plain, slips = t.size, is_plain(c, cuts), never_sticks(c)
     h_max, corner = longest_step(c, cuts, refine), corner_speed(c, cuts, refine)
     budget = _event_budget(c, n, cuts)
     resting = -1  # the sample that begins in a rest which was checked already
     extra = np.nan  # what the laws add where a segment ended that holds no event
     x = start_state(c, x0[0], x0[1], x0[2], 0.5 * (c.c_2_plus + c.c_2_minus))
-    m = start_mode(c, x)
-    for k in range(n):
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x.theta, x.w, x.j, x.theta if bristle else x.theta_m
-        if k == n - 1:
-            break
+    m, k = start_mode(c, x), 0
+    written(out, 0, c, x)
+    while k < n - 1:
         remember(c, x.theta, x.w, x.j, x.theta_m, x.w_m, t[k + 1] - t[k])
-        if gain > 0.0 and k % every == 0 and y[k] == y[k]:
+        if _is_followed(y, gain, every, k):
             resting, extra = -1, np.nan
             x, m = corrected(c, t[k], x, m, gain * (y[k] - x.theta))
-        now = _sample(t, u, enable, load, c, cuts, k)
-        if leaps and now.is_usual and now.closed and m.stop == 0 and is_calm(c, x, cuts.h0):
-            done, x = _leap(maps, c, now, cuts.h0, x, m)
-            if done:
+        if plain and m.stop == 0:
+            calm, x = _calm(t, u, enable, load, c, cuts, maps.late, k, _until(k, n, gain, every), x, m, slips, out)
+            if calm > k:
+                resting, extra, k = -1, np.nan, calm
                 continue
-        x, m, extra, resting, events = _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, slips)
-        budget -= events
-        if not is_bounded(x) or budget < 0:
-            out[k + 1 :, :] = np.nan
-            return
+        now = _sample(t, u, enable, load, c, cuts, k)
+        done, x = _leap(maps, c, now, cuts.h0, x, m) if leaps else (False, x)
+        if not done:
+            x, m, extra, resting, events = _through_segments(
+                maps, c, now, cuts, x, m, h_max, corner, extra, resting, slips
+            )
+            budget -= events
+            if not is_bounded(x) or budget < 0:
+                out[k + 1 :, :] = np.nan
+                return
+        k += 1
+        written(out, k, c, x)
 
 
 @kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, N, VECTOR, N, VECTOR, TABLE))

@@ -98,6 +98,14 @@ def _make(e, n, c, m, tau, a_emf, step, driven):
         fill_map(e, n, c, Mode(m.s, 0, 0, m.s_m, m.twist), tau, a_emf, step, driven)
 
 
+@inline
+def map_of(e, c, m, step):
+    """Number of the map over a step of one body in the mode m, made where it was not before."""
+    n = _number(m)
+    _make(e, n, c, m, c.tau_e, c.a_emf, step, False)
+    return n
+
+
 @inline_as(F(MAPS, N, N, X, F, N, TRIPLE))
 def _row(e, n, i, x, drive, side, f):
     return (

@@ -152,10 +152,9 @@ class ReducedModel:
         out = np.empty((t.size, 4))
         enable, load, y = held.beside(t)
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
-        both = self.bends and self.has_motor_side
-        self._count(t, FIXED_STEPS if both else TWO_BODIES if self.coupled else LAW if on.pushes else PLAIN)
+        self._count(t, self._price)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        run = fixed_steps.simulate if both else event_integrator.simulate
+        run = fixed_steps.simulate if self.bends and self.has_motor_side else event_integrator.simulate
         plant = laid_out(c, on, p)
         run(t, self.terminal(u), enable, load, y, held.gain, held.every, plant, refine, x0, out)
         return out
@@ -259,6 +258,24 @@ class ReducedModel:
             change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
             out.append(change)
         return out
+
+    @property
+    def told(self) -> tuple:
+        """All that tells a motion of this plant from others under one input and one supply, to compare by."""
+        c, _, _ = self._lowered
+        return (c.tobytes(), *((name, values.tobytes()) for name, values in self.effects))
+
+    @property
+    def _price(self) -> int:
+        """[us] that a simulated second takes."""
+        if self.bends and self.has_motor_side:
+            return FIXED_STEPS
+        return TWO_BODIES if self.coupled else LAW if self._lowered[1].pushes else PLAIN
+
+    def count_outputs(self, t: np.ndarray, followed: bool) -> None:
+        """Count what ``outputs`` along t (N,) would have simulated, as an observer where ``followed``."""
+        for _ in range(2 if followed and not self._is_instant else 1):
+            self._count(t, self._price)
 
     def _count(self, t: np.ndarray, per_second: int) -> None:
         if self.effort is not None:

@@ -1,0 +1,83 @@
+"""What a clock tells of itself: another unit than seconds, jumps, and rows that lie alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ers_mj.data.consistency.sheet import Fault, Found, Sheet
+from ers_mj.errors import InputError
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How servos are logged."""
+
+    slowest: float = 0.5  # [s] a step of time, from which it is no log of a servo's motion
+    usual: tuple[float, float] = (1e-4, 0.2)  # [s] the steps of one, by which a unit is guessed
+    gap: float = 3.0  # median steps, above which a step is a gap
+    lone: int = 10  # samples: fewer at an end, beside a long gap, tell nothing
+    long_gap: float = 20.0  # median steps
+    fewest: int = 100  # samples that the longest part must have
+
+
+CLOCK = Clock()
+UNITS = {"ms": ("milliseconds", 1e-3), "us": ("microseconds", 1e-6), "ns": ("nanoseconds", 1e-9)}
+
+
+def scale(sheet: Sheet) -> Found:
+    """Refuse a time whose steps are those of another unit."""
+    step = float(np.median(np.diff(sheet.t)))
+    if "t" in sheet.sure or step < CLOCK.slowest:
+        return sheet, []
+    column = sheet.labels["t"]
+    for unit, (words, factor) in UNITS.items():
+        if CLOCK.usual[0] <= step * factor <= CLOCK.usual[1]:
+            raise InputError(
+                f"{sheet.name}: the time {column} steps by {step:.6g} s, which looks like {words}: give"
+                f' --map "t_s={column} [{unit}]", or insist with --map "t_s={column} [s]"'
+            )
+    raise InputError(
+        f"{sheet.name}: the time {column} steps by {step:.6g} s, which is no log of a servo: give its unit as in"
+        f' --map "t_s={column} [ms]", or insist with --map "t_s={column} [s]"'
+    )
+
+
+def jumps(sheet: Sheet) -> Found:
+    """Where one step of time is longer than all the others together, the longest part stays."""
+    faults: list[Fault] = []
+    while True:
+        dt = np.diff(sheet.t)
+        k = int(np.argmax(dt))
+        if dt[k] <= max(float(np.sum(np.delete(dt, k))), CLOCK.long_gap * float(np.median(dt))):
+            return sheet, faults
+        parts = np.arange(k + 1), np.arange(k + 1, sheet.t.size)
+        keep, drop = sorted(parts, key=len, reverse=True)
+        what = f"the time {sheet.labels['t']} jumps by {dt[k]:.4g} s behind data row {sheet.row(k)}"
+        if keep.size < CLOCK.fewest:
+            raise InputError(
+                f"{sheet.name}: {what}, which leaves {keep.size} samples in one piece, at least {CLOCK.fewest} are"
+                " needed"
+            )
+        sentence = f"{what}: the {drop.size} rows on its shorter side are left out"
+        faults.append(sheet.fault("time_jump", "t", drop, sentence))
+        sheet = sheet.only(keep)
+
+
+def lone_rows(sheet: Sheet) -> Found:
+    """A few rows at either end, beside a long gap, are left out."""
+    dt = np.diff(sheet.t)
+    long = np.flatnonzero(dt > CLOCK.long_gap * np.median(dt))
+    first = max((int(k) + 1 for k in long if k + 1 < CLOCK.lone), default=0)
+    last = min((int(k) + 1 for k in long if dt.size - k < CLOCK.lone), default=sheet.t.size)
+    lone = np.r_[:first, last : sheet.t.size]
+    if not lone.size:
+        return sheet, []
+    longest = max(float(dt[k - 1]) for k in (first, last) if 0 < k < sheet.t.size)
+    sentence = (
+        f"{lone.size} row{'s'[: lone.size > 1]} at the {'beginning' if first else 'end'} lie"
+        f"{'s'[: lone.size == 1]} alone beside a gap of {longest:.4g} s and {'are' if lone.size > 1 else 'is'} left out"
+    )
+    faults = [sheet.fault("gap", "t", lone, sentence)]
+    return sheet.only(np.arange(first, last)), faults

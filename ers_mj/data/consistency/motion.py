@@ -1,0 +1,34 @@
+"""How signals of a recording move, and how alike two of them are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ers_mj.data.consistency.sheet import Sheet
+
+OVER = 0.02  # [s] over which a speed is taken
+
+
+def speed(sheet: Sheet) -> np.ndarray:
+    """The output's (N,) [output unit / s], by differences over about OVER; 0 where nothing is known."""
+    known = np.isfinite(sheet.y)
+    y = np.interp(sheet.t, sheet.t[known], sheet.y[known])
+    k = min(max(1, round(0.5 * OVER / float(np.median(np.diff(sheet.t))))), y.size // 4)
+    late, early = np.minimum(np.arange(y.size) + k, y.size - 1), np.maximum(np.arange(y.size) - k, 0)
+    return (y[late] - y[early]) / (sheet.t[late] - sheet.t[early])
+
+
+def likeness(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Slope of y over x (N,), and their correlation, both 0 where one of them does not vary."""
+    known = np.isfinite(x) & np.isfinite(y)
+    if np.count_nonzero(known) < 3:
+        return 0.0, 0.0
+    x, y = x[known] - np.mean(x[known]), y[known] - np.mean(y[known])
+    xx, yy = float(x @ x), float(y @ y)
+    return (float(x @ y) / xx, float(x @ y) / np.sqrt(xx * yy)) if xx > 0.0 and yy > 0.0 else (0.0, 0.0)
+
+
+def lagged(x: np.ndarray, y: np.ndarray, lags: np.ndarray) -> tuple[float, float]:
+    """Slope and correlation of y over x (N,), of those lags of y (samples) at which they are most alike."""
+    found = [likeness(x[: x.size - k], y[k:]) for k in lags]
+    return max(found, key=lambda pair: abs(pair[1]))

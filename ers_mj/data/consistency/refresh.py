@@ -1,0 +1,122 @@
+"""Columns that are refreshed more slowly than they are logged: only a fresh value is a measurement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ers_mj.data.consistency.sheet import Found, Sheet
+from ers_mj.errors import InputError
+
+
+@dataclass(frozen=True)
+class Refresh:
+    """When the repeats of a column are those of its own, slower clock."""
+
+    fewest: int = 20  # changes that must be seen
+    sizes: int = 4  # different changes: a coarse converter at a steady speed has one
+    locked: float = 0.97  # share of the changes that come in step
+    beating: float = 0.8  # share of the intervals that are of one length, or one row longer
+    shortest_beat: int = 3  # rows of an interval, below which repeats by a coarse converter may look alike
+    longest: int = 500  # rows
+    least: int = 100  # values that must be left
+    edge: float = 0.05  # of its range, by which an input must change to be kept as an edge
+    most_edges: float = 0.2  # of the fresh rows; of more edges the mean between fresh rows is taken
+
+
+REFRESH = Refresh()
+
+
+def held(sheet: Sheet) -> Found:
+    """Keep the rows in which the output is fresh, under the mean of the input in between; a sensor beside it counts in
+    its own fresh rows.
+    """
+    faults = []
+    rows = fresh_rows(sheet.y)
+    if rows is not None:
+        period, step = float(np.median(np.diff(rows))), float(np.median(np.diff(sheet.t)))
+        column = sheet.labels["y"]
+        sentence = (
+            f"{column} is refreshed every {period:.4g} rows ({period * step:.4g} s): each value stands for"
+            f" {period:.4g} rows, of which the first counts"
+        )
+        if rows.size < REFRESH.least:
+            raise InputError(
+                f"{sheet.name}: {column} is refreshed every {period:.4g} rows, which leaves {rows.size} values, at"
+                f" least {REFRESH.least} are needed"
+            )
+        faults.append(sheet.fault("held", "y", np.setdiff1d(np.arange(sheet.t.size), rows), sentence))
+        sheet = _thinned(sheet, rows)
+    for field in ("omega", "current", "theta_m", "second"):
+        if field not in sheet.fields or (own := fresh_rows(sheet.fields[field])) is None:
+            continue
+        stale = np.ones(sheet.t.size, bool)
+        stale[own] = False
+        period = float(np.median(np.diff(own)))
+        sentence = f"{sheet.labels[field]} is refreshed every {period:.4g} rows: the repeats are left out"
+        faults.append(sheet.fault("held", field, stale, sentence))
+        sheet = sheet.masked(field, stale)
+    return sheet, faults
+
+
+def fresh_rows(x: np.ndarray) -> np.ndarray | None:
+    """The rows in which x (N,) is measured anew; None where it may be so in every row."""
+    known = np.flatnonzero(np.isfinite(x))
+    change = np.diff(x[known])
+    at = known[1:][change != 0.0]
+    if at.size < REFRESH.fewest or 2 * at.size > known.size:
+        return None
+    finest = 1e-6 * float(np.ptp(x[known]))
+    if np.unique(np.rint(np.abs(change[change != 0.0]) / finest)).size < REFRESH.sizes:
+        return None
+    return _beating(at) if (rows := _locked(at, x.size)) is None else rows
+
+
+def _locked(at: np.ndarray, count: int) -> np.ndarray | None:
+    """Every so many rows, where the changes keep step with the log."""
+    for n in range(min(REFRESH.longest, count // REFRESH.fewest), 1, -1):
+        phases = np.bincount(at % n)
+        if np.max(phases) >= REFRESH.locked * at.size:
+            return np.arange(int(np.argmax(phases)), count, n)
+    return None
+
+
+def _beating(at: np.ndarray) -> np.ndarray | None:
+    """The changes, and as many rows within longer holds as fit, where most intervals are alike to a row."""
+    apart = np.diff(at)
+    n = int(np.quantile(apart, 0.1))
+    alike = (apart == n) | (apart == n + 1)
+    if n < REFRESH.shortest_beat or n > REFRESH.longest or np.mean(alike) < REFRESH.beating:
+        return None
+    mean = float(np.mean(apart[alike]))
+    before = np.rint(np.arange(at[0] - mean, -0.5, -mean))[::-1]
+    parts = [np.rint(np.linspace(a, b, max(round((b - a) / mean), 1), endpoint=False)) for a, b in pairwise(at)]
+    return np.concatenate([before, *parts, at[-1:]]).astype(int)
+
+
+def _edges(u: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Rows beside the fresh ones in which an input (N,) changes: all where they are few, else the large ones, if few."""
+    for least in (0.0, REFRESH.edge * float(np.ptp(u))):
+        edges = 1 + np.flatnonzero(np.abs(np.diff(u)) > least)
+        edges = np.setdiff1d(edges[(edges > rows[0]) & (edges < rows[-1])], rows)
+        if edges.size <= REFRESH.most_edges * rows.size:
+            return edges
+    return edges[:0]
+
+
+def _thinned(sheet: Sheet, rows: np.ndarray) -> Sheet:
+    """The fresh rows, and those of a few edges of the input, under its mean up to the next row."""
+    kept = np.union1d(rows, _edges(sheet.u, rows))
+    width = np.diff(sheet.t, append=2 * sheet.t[-1] - sheet.t[-2])
+    last = rows[-1] + 1
+    total, time = (np.add.reduceat(a[:last], kept) for a in (sheet.u * width, width))
+    flat = np.maximum.reduceat(sheet.u[:last], kept) == np.minimum.reduceat(sheet.u[:last], kept)
+    mean = np.where(flat, sheet.u[kept], total / time)
+    thin = sheet.only(kept).changed(u=mean)
+    stale = ~np.isin(kept, rows)
+    for field in ("y", "omega", "current", "theta_m", "second"):
+        if field in thin.fields and stale.any():
+            thin = thin.masked(field, stale)
+    return thin
