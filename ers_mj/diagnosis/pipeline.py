@@ -16,6 +16,7 @@ from ers_mj.data.recording import Recording
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.document import Diagnosis, told
+from ers_mj.diagnosis.loop_pipeline import diagnose_loop
 from ers_mj.diagnosis.mujoco_check import Rig
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.effects.quantities import Symptoms
@@ -56,6 +57,8 @@ def diagnose(
         InputError: no motion of the model resembles the recordings.
     """
     jobs = jobs or _cores()
+    if recordings[0].input_kind == "position":
+        return diagnose_loop(recordings, holdout, seed=seed, jobs=jobs, progress=progress, policy=policy)
     first = recordings[0]
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
     traces = [trace_of(r, inertia) for r in recordings]

@@ -27,6 +27,7 @@ class CurrentLimit(Drive):
     )
     needs, follows_current = (("tau_max",),), True
     in_loop = ("most",)
+    loop_sentence = "the servo limits its current: its motor gives {value} at most"
 
     def starts(self, scales):
         peak = scales.drive or 4.0 * scales.acceleration

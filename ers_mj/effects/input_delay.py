@@ -15,6 +15,7 @@ class InputDelay(Drive):
     sized = 1
     tangible = False
     in_loop = ("tau_s", "dead_time_s")
+    loop_sentence = "the servo answers its command {value} late"
 
     def starts(self, scales):
         return [np.array([2 * scales.sample_time])]

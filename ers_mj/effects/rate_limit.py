@@ -13,6 +13,7 @@ class RateLimit(Drive):
     mjcf = "none: the reference is limited before it reaches ctrl"
     parameters = (Parameter("R", "speed", "largest speed of the reference", absent=np.inf),)
     in_loop = ("R",)
+    loop_sentence = "the servo's own reference moves no faster than {value}"
 
     def starts(self, scales):
         return []

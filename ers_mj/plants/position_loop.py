@@ -35,7 +35,7 @@ class LoopNumbers(NamedTuple):
     time [s] of the drive, R the limit of the reference's speed; ``band`` the error [output unit] within which the drive
     sleeps and ``lost`` what is still missing outside it; ``least`` the smallest drive outside the band; ``most`` the
     largest motor torque; ``creep`` [1/s] the speed's factor below breakaway (infinite: friction holds); ``share`` the
-    motor's of the inertia, behind which a gear rubs; ``at_motor`` 1 where the loop's sensor sits on the motor's side,
+    motor's of the inertia, behind which a gear rubs; ``grease`` [1/s] what drags the load along within a play; ``at_motor`` 1 where the loop's sensor sits on the motor's side,
     ``log_at_motor`` the recording's.
     """
 
@@ -52,6 +52,7 @@ class LoopNumbers(NamedTuple):
     most: float = np.inf
     creep: float = np.inf
     share: float = 0.5
+    grease: float = 0.0
     at_motor: float = 0.0
     log_at_motor: float = 0.0
 
@@ -200,9 +201,9 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
         push += total_torque(c, theta, x.w, x.drive, t)
     wall, d_wall = _wall(c, theta)
     twist = theta_m - theta
-    touch = d = 0.0
+    touch, d = 0.0, q.grease
     if abs(twist) > c.gap:
-        touch, d = c.k_twist * (twist - math.copysign(c.gap, twist)), c.d_twist
+        touch, d = c.k_twist * (twist - math.copysign(c.gap, twist)), c.d_twist + q.grease
         if (touch + d * (x.w_m - x.w)) * touch < 0.0:
             d = -touch / (x.w_m - x.w)
     a = (1.0 - c.beta) * (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall

@@ -44,13 +44,14 @@ LETTERS: Mapping[str, Letter] = {
     "most": Letter("{y}/s^2", math.inf, lower=1e-6),
     "creep": Letter("1/s", math.inf, lower=5.0, upper=1e5),
     "share": Letter("-", 0.5, positive=False, upper=0.97, size=0.3),
+    "grease": Letter("1/s", lower=1e-4),
     "rotor": Letter("-", lower=1e-6, upper=1e6),
     "a_1": Letter("1/s^2", positive=False, lower=-math.inf, size=20.0),
     "a_2": Letter("1/s", lower=1e-4),
     "c_2": Letter("{y}/s^2", lower=1e-9),
     "hold": Letter("{y}/s^2", positive=False, lower=-math.inf, size=5.0),
 }
-SCALED = ("K", "I", "D", "L", "least", "most", "a_1", "a_2", "c_2", "hold")  # by one over the inertia
+SCALED = ("K", "I", "D", "L", "least", "most", "grease", "a_1", "a_2", "c_2", "hold")  # by one over the inertia
 WIDER = {"rho": (0.05, 0.95), "phi": (0.0, 1.0)}  # a loop's motor may be light and bear all friction
 CONTACT = ("f_contact", "zeta")  # of a play: what no loop shows
 FASTEST, SEEN = 120.0, 0.4  # [Hz] of a contact that is told from a stiff one, and that as a share of the log's rate
@@ -201,19 +202,24 @@ class LoopModel:
             most=v["most"],
             creep=v["creep"],
             share=self.motor_share(run),
+            grease=v["grease"],
             at_motor=float(self.side != "load"),
             log_at_motor=float(self.side == "motor"),
         )
+        return loop, laid_out(*lowered(*self.plant_of(run)))
+
+    def plant_of(self, run: Run) -> tuple[Coefficients, list[tuple[str, np.ndarray]]]:
+        """The plant behind the loop in one run: coefficients of an input of 1 acceleration, and the effects in it."""
+        light = self.lightness(run)
         c = Coefficients(
-            a_1=v["a_1"],
-            a_mech_plus=v["a_2"],
-            a_mech_minus=v["a_2"],
-            c_2_plus=v["c_2"],
-            c_2_minus=v["c_2"],
-            bias=v["hold"],
+            a_1=self["a_1"] * light,
+            a_mech_plus=self["a_2"] * light,
+            a_mech_minus=self["a_2"] * light,
+            c_2_plus=self["c_2"] * light,
+            c_2_minus=self["c_2"] * light,
+            bias=self["hold"] * light,
         )
-        effects = [(name, self._scaled(name, values, light, run.pull)) for name, values in self.effects]
-        return loop, laid_out(*lowered(c, effects))
+        return c, [(name, self._scaled(name, values, light, run.pull)) for name, values in self.effects]
 
     @staticmethod
     def _scaled(name: str, values: np.ndarray, light: float, pull: float) -> np.ndarray:

@@ -87,7 +87,7 @@ def present(model: LoopModel) -> list[str]:
 def without(model: LoopModel, name: str) -> LoopModel:
     """The model without one term; a play takes the side of its sensors along, a limit what only it tells apart."""
     if name in model.names:
-        gone = model.without_effect(name)
+        gone = model.without_effect(name).lacking("grease")
         return replace(gone, side=SIDES[0]) if BY_NAME[name].subsystem == "transmission" else gone
     if name in (INTEGRAL, SPRING):
         return model.lacking(*OWN[name])
@@ -159,10 +159,11 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
     damping, found = max(model["a_2"] + model["D"], 1e-2), []
     for name, starts in ((Backlash.name, play), (ShaftCompliance.name, shaft)):
         models = []
+        slick = model.having(grease=0.1) if BY_NAME[name].is_play else model
         for side in SIDES:
-            held = model
+            held = slick
             if side != SIDES[0]:
-                held = model.having(D=0.9 * damping, a_2=0.1 * damping, c_2=0.5 * model["c_2"])
+                held = slick.having(D=0.9 * damping, a_2=0.1 * damping, c_2=0.5 * model["c_2"])
             models += [replace(held.with_effect(name, start), side=side) for start in starts]
         found.append(Term(name, tuple(models), is_far=True))
     return found
