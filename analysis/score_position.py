@@ -1,6 +1,6 @@
 """Position-commanded servos against their truths: the joints of ../shared/menagerie, the cases of ../shared/cases.
 
-    python analysis/score_position.py m01 m11 ... | cases | all [--jobs N]
+python analysis/score_position.py m01 m11 ... | cases | all [--jobs N]
 """
 
 from __future__ import annotations

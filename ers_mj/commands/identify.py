@@ -141,12 +141,69 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = [read_recording(spec, names, input_column=arguments.input) for spec in arguments.recordings]
     refuse_twice(recordings, [])
     refuse_mixed_inputs(recordings)
+    if recordings[0].input_kind == "position":
+        return _loop(arguments, recordings, folder)
     with Progress() as progress:
         found = identify(recordings, datasheet, settings, progress)
         document = plain(_document(found, recordings))
         files = _write(folder, document, found, progress) if folder is not None else []
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
     return 0
+
+
+def _loop(arguments: argparse.Namespace, recordings: list[Recording], folder: Path | None) -> int:
+    """Identify a servo that is told a position."""
+    from ers_mj.diagnosis.loop_rows import improved, parameters
+    from ers_mj.position_loop.identified import identify_loop
+    from ers_mj.servo.datasheet import write_model
+
+    asked = {"--method": arguments.method != "ls", "--plant": arguments.plant != "reduced", "--fix": arguments.fix}
+    asked |= {"--bounds": arguments.bounds, "--datasheet": arguments.datasheet}
+    for option, is_given in asked.items():
+        if is_given:
+            raise InputError(f"{option} does not go with a position command, which least squares fit without it")
+    with Progress() as progress:
+        found = identify_loop(recordings, arguments.jobs or 1, progress)
+    rows = parameters(found.intervals, recordings[0].output_unit)
+    words = "explains the recordings" if found.explains else "leaves more than noise: ask ers diagnose what is missing"
+    document = plain(
+        {
+            "method": "ls",
+            "plant": "reduced",
+            "sentence": f"A {found.fit.model.kind} position loop {words}.",
+            "parameters": {name: row | {"fixed": False} for name, row in rows.items()},
+            "fitness": found.fitness,
+            "evaluations": found.evaluations,
+            "wall_s": found.wall_s,
+            "explains": found.explains,
+            "misfit_sigma2": found.fit.misfit,
+            "warnings": [],
+            "data": _data(recordings),
+            "seed": arguments.seed,
+            "versions": versions(),
+        }
+    )
+    files = []
+    if folder is not None:
+        from ers_mj.report.identify_report import loop_page
+
+        writers = report_writers("identify.json", document, loop_page(document))
+        model = improved(found.fit.model)
+        files = write_results(folder, writers | {"model.toml": lambda path: write_model(path, model)})
+    print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
+    return 0
+
+
+def _data(recordings: list[Recording]) -> dict:
+    return {
+        "files": [r.name for r in recordings],
+        "sha256": [r.sha256 for r in recordings],
+        "output_unit": recordings[0].output_unit,
+        "input_unit": recordings[0].input_unit,
+        "input_kind": recordings[0].input_kind,
+        "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems],
+        "faults": [fault.as_document(r.name) for r in recordings for fault in r.faults],
+    }
 
 
 def _values(pairs: list[tuple[str, str]], option: str, read) -> dict:
@@ -190,15 +247,7 @@ def _document(found: Identified, recordings: list[Recording]) -> dict:
             "null_space": found.structure.null,
             "singular_values": found.structure.singular,
         },
-        "data": {
-            "files": [r.name for r in recordings],
-            "sha256": [r.sha256 for r in recordings],
-            "output_unit": recordings[0].output_unit,
-            "input_unit": recordings[0].input_unit,
-            "input_kind": recordings[0].input_kind,
-            "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems],
-            "faults": [fault.as_document(r.name) for r in recordings for fault in r.faults],
-        },
+        "data": _data(recordings),
         "seed": found.settings.seed,
         "versions": versions(),
     }

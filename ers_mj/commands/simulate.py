@@ -14,6 +14,8 @@ from ers_mj.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
+    from ers_mj.servo.datasheet import Datasheet
+
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
 
 
@@ -72,6 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ers_mj.servo.simulation import parse_effect, simulate_recording
 
     datasheet = read_datasheet(arguments.model)
+    if datasheet.loop:
+        return _loop(arguments, datasheet, out)
     effects = [parse_effect(text) for text in arguments.effect]
     t, u = _input(arguments)
     columns = simulate_recording(
@@ -90,6 +94,27 @@ def run(arguments: argparse.Namespace) -> int:
     make_room(out)
     write_recording(out, columns)
     summary = _summary(arguments, columns, [*datasheet.effects, *effects])
+    print(as_json(summary) if arguments.json else _told(summary))
+    return 0
+
+
+def _loop(arguments: argparse.Namespace, datasheet: Datasheet, out: Path) -> int:
+    """Simulate a servo that is told a position."""
+    from ers_mj.data.recording import read_input, write_recording
+    from ers_mj.plants.inputs import INPUTS
+    from ers_mj.position_loop.saved import simulate_loop
+
+    if arguments.input in INPUTS:
+        raise InputError(f"--input {arguments.input} is a voltage; a model with a [loop] takes a CSV t_s,theta_ref_rad")
+    for option, value in (("--effect", arguments.effect), ("--gap", arguments.gap)):
+        if value:
+            raise InputError(f"{option} is for models without a [loop], this one's effects stand in its file")
+    t, r = read_input(arguments.input, "theta_ref_rad")
+    noise = math.radians(arguments.noise_deg)
+    columns = simulate_loop(datasheet, t, r, plant=arguments.plant, noise=noise, seed=arguments.seed)
+    make_room(out)
+    write_recording(out, columns)
+    summary = _summary(arguments, columns, list(datasheet.effects))
     print(as_json(summary) if arguments.json else _told(summary))
     return 0
 

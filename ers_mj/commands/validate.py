@@ -61,10 +61,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate both, compare, write, tell; 0."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
     from ers_mj.report.validity import as_document
-    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.datasheet import read_plant
     from ers_mj.validation.cases import GRID, validate
 
-    datasheet = read_datasheet(arguments.datasheet)
+    datasheet = read_plant(arguments.datasheet)
     gaps, linkages, inductances, left_out = _asked(arguments, datasheet)
     with Progress() as progress:
         maps = None if arguments.no_maps else GRID

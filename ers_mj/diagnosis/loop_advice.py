@@ -28,8 +28,8 @@ def next_recording(case: LoopCase) -> dict:
         )
     if max(gains) < GAINS * min(gains):
         asked.append(
-            "the same steps at a second gain of the firmware, four times higher or lower (column kp): the low gain shows"
-            " friction, the high one inertia and latency"
+            "the same steps at a second gain of the firmware, four times higher or lower (column kp): the low gain"
+            " shows friction, the high one inertia and latency"
         )
     if case.more_is_left or not asked:
         asked.append(

@@ -131,7 +131,7 @@ class LoopCase:
         return False
 
     def _remembered(self, model: LoopModel) -> float:
-        """ln(1 + power), in the noise's, of what a model leaves from sample to sample; a converter's own not counted."""
+        """ln(1 + power), in the noise's, of what a model leaves from sample to sample, a converter's own apart."""
         told = []
         for run in self.runs:
             e = np.where(run.scored, run.y - model.predicted(run), np.nan)

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of
 from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
-from ers_mj.diagnosis.localisation import Place, Samples, places, residual_map, shaded
+from ers_mj.diagnosis.localisation import Place, Ranked, Samples, places, residual_map, shaded
 from ers_mj.diagnosis.loop_advice import next_recording
 from ers_mj.diagnosis.loop_case import LoopCase
+from ers_mj.diagnosis.loop_rows import improved, parameters
 from ers_mj.diagnosis.sentences import shown
 from ers_mj.effects import BY_NAME
-from ers_mj.position_loop.intervals import COMBINED, Told
+from ers_mj.position_loop.intervals import Told
 from ers_mj.position_loop.model import LETTERS, LoopModel
 from ers_mj.position_loop.runs import Run, speed_of
-from ers_mj.servo.datasheet import LOOP, Datasheet
 from ers_mj.servo.simulation import unit_of
-
-ROWS = ("K", "D", "I", "L", "tau_s", "dead_time_s", "R", "a_1", "a_2", "c_2")
-COMBINED_UNITS = {"a_2+D": "1/s", "c_2/K": "{y}", "(a_2+D)/K": "s", "L/K": "{y}", "I/K": "1/s"}
-UNKNOWN = {"value": None, "ci95": [None, None], "datasheet": None, "identifiable": False}
-NOTHING = Told(0.0, (0.0, 0.0), True)
 
 
 def told(case: LoopCase) -> Diagnosis:
@@ -40,7 +35,7 @@ def told(case: LoopCase) -> Diagnosis:
         "remainder": _remainder(case),
         "record_state": [],
         "fit": case.fits,
-        "parameters": parameters(case),
+        "parameters": parameters(case.intervals, case.output_unit),
         "next_recording": next_recording(case),
         "data": data_of(case.recordings, case.holdout),
         "seed": case.seed,
@@ -56,58 +51,8 @@ def told(case: LoopCase) -> Diagnosis:
         case.output_unit,
         case.recordings[0].input_unit,
     )
-    return Diagnosis(document, evidence, improved(case), case.plant())
-
-
-# -- the rows of parameters -----------------------------------------------------------------------------------------
-
-
-def parameters(case: LoopCase) -> dict:
-    """Every letter of the loop and the plant, null where the recordings cannot tell it, and what combinations they
-    tell.
-    """
-    y, rows = case.output_unit, {}
-    for letter in ROWS:
-        rows[letter] = _row(_letter(case, letter), LETTERS[letter].unit.format(y=y))
-    if case.model["dead_time_s"] > 0.0:  # the latency is the whole loop's, not the command's
-        rows["tau_s"] = dict(rows["dead_time_s"])
-    rows |= {"b": UNKNOWN | {"unit": f"{y}/s^2/{y}"}, "c_1": UNKNOWN | {"unit": f"{y}/s^2"}}
-    rows["theta_0"] = UNKNOWN | {"unit": y}
-    for name in COMBINED:
-        rows[name] = _row(_combination(case, name), COMBINED_UNITS[name].format(y=y))
-    return rows
-
-
-def _letter(case: LoopCase, letter: str) -> Told | None:
-    """A letter as the recordings tell it; a sum that stands in for its parts tells none of them."""
-    model = case.intervals.model
-    if letter in ("a_2", "D") and not _is_parted(model):
-        return None
-    if letter in model.free:
-        return case.intervals.told("", letter)
-    return None if letter in ("L", "R") else NOTHING
-
-
-def _is_parted(model: LoopModel) -> bool:
-    """Whether anything tells the loop's damping from the plant's: a limit that acts, a dead time, a play."""
-    return "L" in model.free or "dead_time_s" in model.free or "most" in model.free or model.side != "load"
-
-
-def _combination(case: LoopCase, name: str) -> Told | None:
-    return case.intervals.combined(name)
-
-
-def _row(found: Told | None, unit: str) -> dict:
-    if found is None or not found.identifiable:
-        ends = [None, None] if found is None else [float(x) for x in found.ci95]
-        return UNKNOWN | {"unit": unit, "ci95": ends}
-    return {
-        "value": float(found.value),
-        "unit": unit,
-        "ci95": [float(x) for x in found.ci95],
-        "datasheet": None,
-        "identifiable": True,
-    }
+    model = case.model if case.told_effects or not case.names else case.base
+    return Diagnosis(document, evidence, improved(model), case.plant())
 
 
 # -- the effects ----------------------------------------------------------------------------------------------------
@@ -224,7 +169,7 @@ def gather(case: LoopCase) -> Samples:
 
 def _places(case: LoopCase, samples: Samples) -> list[Place]:
     total = sum(x.gain for x in case.selection.named) or 1.0
-    rounds = [case.selection.named, *case.selection.rounds]
+    rounds: list[Sequence[Ranked]] = [case.selection.named, *case.selection.rounds]
     return places(samples, case.runs, rounds, total, case.told_effects, case.output_unit, case.output_unit)
 
 
@@ -257,22 +202,3 @@ def _ladder(case: LoopCase) -> Iterator[Rung]:
     for ranked in case.selection.rounds:
         for c in ranked[:6]:
             yield Rung((c.name,), c.gain, 0.0, None, False, "compared", c.fit.size)
-
-
-def improved(case: LoopCase) -> Datasheet:
-    """The improved model: [lumped], [loop] and the effects with laws of their own."""
-    model = case.model if case.told_effects or not case.names else case.base
-    loop = {k: float(model[k]) for k in LOOP if k in model.values and math.isfinite(model[k])}
-    lumped = {k: float(model[k]) for k in ("a_1", "a_2", "c_2")}
-    effects = tuple(
-        (name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values, strict=True) if np.isfinite(v)})
-        for name, values in model.effects
-    )
-    return Datasheet(
-        lumped={k: max(v, 0.0) for k, v in lumped.items()},
-        effects=effects,
-        loop={k: v for k, v in loop.items() if v != LETTERS[k].absent},
-        loop_kind=model.kind,
-        loop_sensor=model.side,
-        name="model.toml",
-    )

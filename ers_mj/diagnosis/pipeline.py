@@ -46,8 +46,8 @@ def diagnose(
 
     Args:
         recordings: training recordings of one rig, all of one output and input unit.
-        datasheet: what is known of the servo, or None: everything is identified.
-        holdout: recordings that are looked at only after the selection has ended.
+        datasheet: what is known of the servo, or None; a position command goes without.
+        holdout: looked at only after the selection has ended.
         seed: kept in the document; nothing here draws random numbers.
         jobs: threads; all cores by default. The result does not depend on it.
         progress: called with a text and a share of the work done.
@@ -56,10 +56,9 @@ def diagnose(
     Raises:
         InputError: no motion of the model resembles the recordings.
     """
-    jobs = jobs or _cores()
-    if recordings[0].input_kind == "position":
+    jobs, first = jobs or _cores(), recordings[0]
+    if first.input_kind == "position":
         return diagnose_loop(recordings, holdout, seed=seed, jobs=jobs, progress=progress, policy=policy)
-    first = recordings[0]
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
     traces = [trace_of(r, inertia) for r in recordings]
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))

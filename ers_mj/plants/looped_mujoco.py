@@ -1,4 +1,4 @@
-"""The firmware's loop around a MuJoCo plant: a position actuator where MuJoCo can carry it, a stepped controller else."""
+"""A firmware's loop around a MuJoCo plant: a position actuator where MuJoCo can carry it, else a stepped controller."""
 
 from __future__ import annotations
 

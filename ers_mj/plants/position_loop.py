@@ -35,13 +35,13 @@ class LoopNumbers(NamedTuple):
     time [s] of the drive, R the limit of the reference's speed; ``band`` the error [output unit] within which the drive
     sleeps and ``lost`` what is still missing outside it; ``least`` the smallest drive outside the band; ``most`` the
     largest motor torque; ``creep`` [1/s] the speed's factor below breakaway (infinite: friction holds); ``share`` the
-    motor's of the inertia, behind which a gear rubs; ``grease`` [1/s] what drags the load along within a play; ``at_motor`` 1 where the loop's sensor sits on the motor's side,
-    ``log_at_motor`` the recording's.
+    motor's of the inertia, behind which a gear rubs; ``grease`` [1/s] what drags the load along within a play;
+    ``at_motor`` 1 where the loop's sensor sits on the motor's side, ``log_at_motor`` the recording's.
     """
 
     K: float
     D: float = 0.0
-    I: float = 0.0  # noqa: E741
+    I: float = 0.0
     L: float = np.inf
     tau: float = 0.0
     dead_time: float = 0.0
@@ -225,9 +225,7 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
         else:
             v = ahead - 0.5 * q.D * (x.w + w)
         if q.at_motor == 0.0 or abs(v) > q.L:
-            w_m = _slipped(
-                c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, x.w_m, h
-            )
+            w_m = _slipped(c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, x.w_m, h)
     xi = x.xi
     if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
         xi = _limited(q, xi + h * q.I * e)

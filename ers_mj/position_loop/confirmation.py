@@ -122,9 +122,7 @@ def _judged(
     after = scored(models, folds)
     lesser = {x.name: scored(_refitted(x.fit.model, folds), folds) for x in selection.named}
     p = {name: _p_value(after, less, policy) for name, less in lesser.items()}
-    return Confirmed(
-        tuple(folds), scored(bare, folds), after, lesser, p, tuple(bare), tuple(models), base, sentence
-    )
+    return Confirmed(tuple(folds), scored(bare, folds), after, lesser, p, tuple(bare), tuple(models), base, sentence)
 
 
 def _refitted(model: LoopModel, folds: Sequence[Fold]) -> list[LoopModel]:

@@ -24,7 +24,8 @@ class Search:
     longest: float = 1.5  # of a step, in transformed numbers
     step: float = 1e-3  # in transformed numbers, to take a slope,
     bouncing: float = 5e-3  # and that of two bodies that bounce
-    enough: float = 1e-4  # share of the cost that a step must win
+    enough: float = 1e-4  # share of the cost that a step must win,
+    last: float = 1e-7  # and where a fit is brought to its minimum
     soft: float = 0.03  # of the travel: errors beyond grow the cost by their size, not its square
 
 
@@ -58,11 +59,15 @@ class _Point:
 
 @dataclass(frozen=True)
 class Data:
-    """Runs, how their errors count, and the blocks (N,) of all scored samples."""
+    """Runs, how their errors count, and the blocks (N,) of all scored samples; simulations take ``refine`` times finer
+    steps.
+    """
 
     runs: tuple[Run, ...]
     soft: float
     block: np.ndarray
+    refine: int = 1
+    simulated: list[int] = field(default_factory=lambda: [0], repr=False)  # how often these runs were
 
     @staticmethod
     def of(runs: Sequence[Run]) -> Data:
@@ -80,10 +85,11 @@ class Data:
 
     def residuals(self, model: LoopModel) -> np.ndarray:
         """Errors (N,) of the scored samples in noise sigmas, large ones softened."""
+        self.simulated[0] += 1
         return np.concatenate([self._softened(run, model) for run in self.runs])
 
     def _softened(self, run: Run, model: LoopModel) -> np.ndarray:
-        e = (run.y - model.predicted(run))[run.scored]
+        e = (run.y - model.predicted(run, self.refine))[run.scored]
         x = e / self.soft
         with np.errstate(invalid="ignore", over="ignore"):
             small = np.sqrt(2.0 * (np.sqrt(1.0 + x * x) - 1.0))
@@ -112,7 +118,7 @@ class _Problem:
         way = np.linalg.lstsq(raised, -slope, rcond=None)[0]
         way *= min(1.0, SEARCH.longest / max(float(np.max(np.abs(way))), 1e-12))
         promised = -(slope @ way + 0.5 * way @ curvature @ way)
-        return way if promised > 0.1 * SEARCH.enough * point.cost else None
+        return way if promised > SEARCH.last * point.cost else None
 
     def slopes(self, point: _Point, both: bool = False) -> np.ndarray:
         """Of the errors by the transformed numbers (N, k), from one side or from ``both``."""
@@ -135,6 +141,19 @@ class _Problem:
         z[k] += way
         model = self.model.at(self.layout, z)
         return float(model.vector(self.layout)[k]), self.data.residuals(model)
+
+
+def polished(fit: Fit, data: Data, steps: int = 12) -> Fit:
+    """A fit brought to its minimum along slopes from both sides, anew at every step."""
+    layout = fit.model.layout()
+    problem = _Problem(fit.model, layout, data)
+    descent = Descent(problem, problem.reach(fit.model.vector(layout)), RULE)
+    for _ in range(steps):
+        descent.renew(problem.slopes(descent.point, both=True))
+        step = descent.advance(SEARCH.tries)
+        if step is None or step.gain < SEARCH.last * descent.point.cost:
+            break
+    return _told(problem, descent.point)
 
 
 def fitted(model: LoopModel, data: Data, steps: int = 30) -> Fit:

@@ -15,6 +15,7 @@ from ers_mj.position_loop.model import Free, LoopModel
 RUN = 5  # neighbouring blocks that are taken as one
 FEWEST = 3  # left-out refits from which they count
 TOLD = 0.7  # half width of a logarithm up to which a number is told
+INEXACT, CLOCK = 0.0025, 0.00025  # standard deviations of what firmware and simulation do in steps: relative, and [s]
 COMBINED = ("a_2+D", "c_2/K", "(a_2+D)/K", "L/K", "I/K")
 
 
@@ -57,6 +58,7 @@ class Intervals:
         spread += inverse * float(np.mean(e * e))
         if len(left_out) >= FEWEST and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
+        spread += np.diag([_inexact(f, q) ** 2 for f, q in zip(layout, model.vector(layout), strict=True)])
         return Intervals(model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
 
     def told(self, owner: str, name: str) -> Told | None:
@@ -93,6 +95,13 @@ class Intervals:
         half = self.factor * math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
         half = min(half, 50.0)
         return Told(value, (value * math.exp(-half), value * math.exp(half)), half < TOLD)
+
+
+def _inexact(f: Free, z: float) -> float:
+    """Standard deviation of a transformed number by what steps leave untold."""
+    if f.name in ("tau_s", "dead_time_s"):
+        return CLOCK / f.size
+    return INEXACT * (1.0 if f.positive else abs(z))
 
 
 def _jackknife(model: LoopModel, layout: Sequence[Free], left_out: Sequence[LoopModel]) -> np.ndarray:

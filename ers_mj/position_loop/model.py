@@ -89,7 +89,7 @@ class LoopModel:
     free: tuple[str, ...]
     effects: tuple[tuple[str, np.ndarray], ...] = ()
     side: str = "load"
-    scales: Scales | None = field(default=None, repr=False)
+    scales: Scales = field(default=None, repr=False)  # type: ignore[assignment]  # one that is only simulated has none
 
     def __getitem__(self, letter: str) -> float:
         """A letter's value."""

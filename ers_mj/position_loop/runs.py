@@ -85,31 +85,42 @@ def _run(recording: Recording, first: Recording) -> Run:
     y = np.where(recording.valid, recording.y, np.nan)
     for span in spikes(y, sigma):
         y[span] = np.nan
-    scored = np.isfinite(y)
     enable = np.ones(t.size, bool) if recording.enable is None else np.asarray(recording.enable, bool)
-    if not enable.all():
-        off = int(np.argmin(enable)) if enable[0] else 0
-        scored = scored & (np.arange(t.size) < off if enable[0] else enable)
     start, travel = started(t, y, sigma), float(np.nanmax(y) - np.nanmin(y))
     is_settled = stood(t, recording.u, y, sigma, travel)
-    masses = [(r.load_kg or 0.0, r.arm_m or 1.0) for r in (recording, first)]
-    (m, length), (m_1, length_1) = masses
+    inertia, pull = _load(recording, first)
     return Run(
         recording.name,
         t,
         np.ascontiguousarray(recording.u, float),
         y,
-        scored,
+        np.isfinite(y) & _driven(enable),
         enable,
         sigma,
         recording.quantum,
         start if is_settled else (start[0], 0.0),
         float(recording.u[0]) if is_settled else start[0],
         gain=recording.kp / first.kp if recording.kp and first.kp else 1.0,
-        inertia=m * length**2 / (m_1 * length_1**2) if m and m_1 else 1.0,
-        pull=m * length / (m_1 * length_1) if m and m_1 else 1.0,
+        inertia=inertia,
+        pull=pull,
         second=recording.second,
     )
+
+
+def _driven(enable: np.ndarray) -> np.ndarray:
+    """Samples (N,) before the drive is first switched off, of a recording that begins with it on."""
+    if not enable[0]:
+        return enable
+    return np.cumsum(~enable) == 0
+
+
+def _load(recording: Recording, first: Recording) -> tuple[float, float]:
+    """(m l^2, m l) of a recording's load over those of the first one; 1 where either is not known."""
+    m, m_1 = recording.load_kg or 0.0, first.load_kg or 0.0
+    length, length_1 = recording.arm_m or 1.0, first.arm_m or 1.0
+    if not (m and m_1):
+        return 1.0, 1.0
+    return m * length**2 / (m_1 * length_1**2), m * length / (m_1 * length_1)
 
 
 def noise_of(y: np.ndarray, quantum: float) -> float:

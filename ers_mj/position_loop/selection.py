@@ -1,6 +1,6 @@
 """Which effects does a position loop's recording ask for? The bare loop first, then one effect at a time.
 
-closed form -> base (gain, limit, latency, load) -> compare all candidates -> add the best -> ... -> leave out one by one
+closed form -> base (gain, limit, latency, load) -> compare all candidates -> add the best -> ... -> leave out
 """
 
 from __future__ import annotations
@@ -20,7 +20,19 @@ from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, scales_of
-from ers_mj.position_loop.terms import DERIVATIVE, INTEGRAL, SPRING, Term, delayed_within, is_there, other_shares, present, terms, top_speed, without
+from ers_mj.position_loop.terms import (
+    DERIVATIVE,
+    INTEGRAL,
+    SPRING,
+    Term,
+    delayed_within,
+    is_there,
+    other_shares,
+    present,
+    terms,
+    top_speed,
+    without,
+)
 from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
 
 Progress = Callable[[str, float], None]
@@ -145,7 +157,10 @@ class Selector:
 
     def compared(self, current: Fit) -> list[Compared]:
         """The candidates beside a model, the one that buys most first."""
-        candidates = [self._with_closed_form(term, current.model) for term in terms(current.model, self.runs, self._error(current))]
+        candidates = [
+            self._with_closed_form(term, current.model)
+            for term in terms(current.model, self.runs, self._error(current))
+        ]
         quick = list(self._map(partial(self._tried, current), candidates))
         quick.sort(key=lambda c: -c.gain)
         ready = [c for c in quick[: EFFORT.finalists] if c.gain > 0.0]

@@ -103,7 +103,7 @@ def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
     """The candidates beside a model that leaves so large an error [output unit], each from its own starts; what needs a
     closed form is in selection.py.
     """
-    scales = model.scales
+    drive = model.scales.drive or 4.0 * model.scales.acceleration
     found = [
         Term(INTEGRAL, tuple(model.having(I=x * model["K"]) for x in SIZES.integrals)),
         Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds)),
@@ -111,7 +111,7 @@ def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
         Term(WITHIN, delayed_within(model)),
         Term(Presliding.name, tuple(model.having(creep=x) for x in SIZES.creeps)),
         Term(DriveDeadZone.name, tuple(model.having(band=x * model["c_2"] / model["K"]) for x in SIZES.bands)),
-        Term(CurrentLimit.name, tuple(model.having(most=x * scales.drive) for x in SIZES.currents)),
+        Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
         Term(BiasTorque.name, (model.having(hold=0.0),)),
         Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
         *_transmissions(model, error),

@@ -102,8 +102,8 @@ def _fold(run: Run, loads: Sequence[str], width: float, integral: bool) -> _Fold
     centred = theta - theta.mean()
     still = 0.01 * float(np.quantile(np.abs(speed), 0.95))
     columns = [-fold(centred, first), -fold(np.sign(speed) * (np.abs(speed) > still), phi)]
-    shape = {"hold": np.ones_like, "a_1": lambda x: -x, "sin": lambda x: -np.sin(x), "cos": lambda x: -np.cos(x)}
-    columns += [fold(shape[load](theta), phi) for load in loads]
+    shape = {"hold": np.ones(theta.size), "a_1": -theta, "sin": -np.sin(theta), "cos": -np.cos(theta)}
+    columns += [fold(shape[load], phi) for load in loads]
     n = phi.size // 2
     seen = np.interp(t, run.t, run.scored.astype(float)) > 0.5
     return _Folded(run, fold(centred, second), np.column_stack(columns), theta, t, phi, seen[n : t.size - n])

@@ -45,7 +45,23 @@ SIGNED = ("theta_0", "b")  # may be negative: where the spring rests, and the se
 NEVER_ZERO = ("J", "R", "n", "K_t", "b", "sample_rate_hz")
 SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect")
 KINDS, SENSORS = ("P", "PD", "PI", "PID"), ("load", "link", "motor")  # of a firmware's loop, and where its sensor sits
-LOOP = ("K", "D", "I", "L", "tau_s", "dead_time_s", "R", "band", "least", "most", "creep", "share", "grease", "rotor", "hold")
+LOOP = (
+    "K",
+    "D",
+    "I",
+    "L",
+    "tau_s",
+    "dead_time_s",
+    "R",
+    "band",
+    "least",
+    "most",
+    "creep",
+    "share",
+    "grease",
+    "rotor",
+    "hold",
+)
 
 
 @dataclass(frozen=True)
@@ -59,8 +75,8 @@ class Datasheet:
         effects: the physics that a diagnosis added, each a name and its parameters.
         baseline: what a diagnosis refitted, by free names.
         loop: the firmware's loop under a position command, by LOOP's letters; empty where there is none.
-        loop_kind, loop_sensor: one of KINDS, and one of SENSORS: loop and log on the load, the loop on the motor and the
-            log on the load (link), both on the motor.
+        loop_kind, loop_sensor: one of KINDS, and one of SENSORS: loop and log on the load, the loop on the motor and
+            the log on the load (link), both on the motor.
         name: where it comes from.
     """
 
@@ -145,6 +161,18 @@ def read_datasheet(path: str | os.PathLike[str]) -> Datasheet:
         name=path.name,
     )
     _refuse_none_or_both(sheet, "baseline" in document, path)
+    return sheet
+
+
+def read_plant(path: str | os.PathLike[str]) -> Datasheet:
+    """As read_datasheet, of a servo that is told a voltage.
+
+    Raises:
+        InputError: the model closes a position loop of its own.
+    """
+    sheet = read_datasheet(path)
+    if sheet.loop:
+        raise InputError(f"{path}: closes a position loop of its own ([loop]), which only diagnose and simulate take")
     return sheet
 
 
