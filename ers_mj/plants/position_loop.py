@@ -25,7 +25,6 @@ from ers_mj.plants.state import READ, READ_BOOL, RUNAWAY, TABLE, VECTOR, C, F, N
 LONGEST = 1e-3  # [s] of a step
 STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
 PAST = 512  # steps of the drive that are kept: the longest dead time
-GIVES_WAY = 0.97  # share of the speed that a step's load-dependent friction may rest on
 
 
 class LoopNumbers(NamedTuple):
@@ -34,7 +33,8 @@ class LoopNumbers(NamedTuple):
     K [1/s^2], D [1/s] and I [1/s^3] of the loop, its limit L [output unit/s^2], latency tau [s] of the reference, dead
     time [s] of the drive, R the limit of the reference's speed; ``band`` the error [output unit] within which the drive
     sleeps and ``lost`` what is still missing outside it; ``least`` the smallest drive outside the band; ``most`` the
-    largest motor torque; ``creep`` [1/s] the speed's factor below breakaway (infinite: friction holds); ``share`` the
+    largest motor torque; ``creep`` [1/s] the speed's factor below breakaway (infinite: friction holds) and ``heavy``
+    how much slower the body answers there (MuJoCo's constraint: 10), as ``buried`` within a stop (20); ``share`` the
     motor's of the inertia, behind which a gear rubs; ``grease`` [1/s] what drags the load along within a play;
     ``at_motor`` 1 where the loop's sensor sits on the motor's side, ``log_at_motor`` the recording's.
     """
@@ -51,6 +51,8 @@ class LoopNumbers(NamedTuple):
     least: float = 0.0
     most: float = np.inf
     creep: float = np.inf
+    heavy: float = 1.0
+    buried: float = 1.0
     share: float = 0.5
     grease: float = 0.0
     at_motor: float = 0.0
@@ -116,14 +118,18 @@ def _pushed(q, e):
 
 
 @inline
-def _slipped(gain, push, a, level, creep, w, h):
-    """Speed after h of w' = push - a w - friction, dampers by the trapezium; ``gain`` of what is left of w there."""
+def _slipped(gain, push, a, level, creep, heavy, w, h):
+    """Speed after h of gain w' = push - a w - friction, dampers by the trapezium.
+
+    Friction that creeps is creep w below its level, and (heavy - 1) gain w' of a body that it slows.
+    """
     if creep < np.inf:
-        soft = 0.5 * h * (a + creep)
-        end = ((1.0 * gain - soft) * w + h * push) / (gain + soft)
-        if abs(0.5 * creep * (end + w)) <= level:
+        soft, mass = 0.5 * h * (a + creep), heavy * gain
+        end = ((mass - soft) * w + h * push) / (mass + soft)
+        holds = push - 0.5 * a * (end + w) - gain * (end - w) / h
+        if abs(holds) <= level:
             return end
-        way = math.copysign(1.0, end + w)
+        way = math.copysign(1.0, holds)
         return ((gain - 0.5 * h * a) * w + h * (push - way * level)) / (gain + 0.5 * h * a)
     reach = (gain - 0.5 * h * a) * w + h * push
     if abs(reach) <= h * level:
@@ -170,18 +176,20 @@ def _one_body(c, q, t, x, r, fresh, late, h):
     a = (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     level = _level(c, theta, x.w, x.carried)
     push, ahead = hold + wall, q.K * _pushed(q, e) + x.xi
-    w = _slipped(1.0, push + fresh * ahead + late, a + fresh * q.D + c.a_emf, level, q.creep, x.w, h)
+    mass = q.buried if wall != 0.0 else 1.0
+    w = _slipped(mass, push + fresh * ahead + late, a + fresh * q.D + c.a_emf, level, q.creep, q.heavy, x.w, h)
     v = ahead - 0.5 * q.D * (x.w + w)
     if abs(v) > q.L:
         drive = fresh * math.copysign(q.L, v) + late
-        w = _slipped(1.0, push + drive, a + c.a_emf, level, q.creep, x.w, h)
+        w = _slipped(mass, push + drive, a + c.a_emf, level, q.creep, q.heavy, x.w, h)
     else:
         drive = fresh * v + late
     current = drive - 0.5 * c.a_emf * (x.w + w)
     if abs(current) > q.most:
-        w = _slipped(1.0, push + math.copysign(q.most, current), a, level, q.creep, x.w, h)
-    if d_wall > 0.0 and (wall - 0.5 * d_wall * (x.w + w)) * wall < 0.0:
-        w = _slipped(1.0, hold + drive, a - d_wall + c.a_emf, level, q.creep, x.w, h)
+        w = _slipped(mass, push + math.copysign(q.most, current), a, level, q.creep, q.heavy, x.w, h)
+    held = wall - 0.5 * d_wall * (x.w + w) - (mass - 1.0) * (w - x.w) / h
+    if wall != 0.0 and held * wall < 0.0:
+        w = _slipped(1.0, hold + drive, a - d_wall + c.a_emf, level, q.creep, q.heavy, x.w, h)
     xi = x.xi
     if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
         xi = _limited(q, xi + h * q.I * e)
@@ -214,18 +222,34 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
     v = ahead - q.D * seen
     for _ in range(3):
         w = _slipped(
-            1.0 - c.rho, push + wall + touch + 0.5 * d * (x.w_m + w_m), a + d, (1.0 - c.phi) * level, q.creep, x.w, h
+            1.0 - c.rho,
+            push + wall + touch + 0.5 * d * (x.w_m + w_m),
+            a + d,
+            (1.0 - c.phi) * level,
+            q.creep,
+            q.heavy,
+            x.w,
+            h,
         )
         between = -touch + 0.5 * d * (x.w + w)
         if q.at_motor > 0.0:
             w_m = _slipped(
-                c.rho, fresh * ahead + late + between, a_m + fresh * q.D + d, c.phi * level_m, q.creep, x.w_m, h
+                c.rho,
+                fresh * ahead + late + between,
+                a_m + fresh * q.D + d,
+                c.phi * level_m,
+                q.creep,
+                q.heavy,
+                x.w_m,
+                h,
             )
             v = ahead - 0.5 * q.D * (x.w_m + w_m)
         else:
             v = ahead - 0.5 * q.D * (x.w + w)
         if q.at_motor == 0.0 or abs(v) > q.L:
-            w_m = _slipped(c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, x.w_m, h)
+            w_m = _slipped(
+                c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, q.heavy, x.w_m, h
+            )
     xi = x.xi
     if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
         xi = _limited(q, xi + h * q.I * e)

@@ -43,6 +43,8 @@ LETTERS: Mapping[str, Letter] = {
     "least": Letter("{y}/s^2", lower=1e-9),
     "most": Letter("{y}/s^2", math.inf, lower=1e-6),
     "creep": Letter("1/s", math.inf, lower=5.0, upper=1e5),
+    "heavy": Letter("-", 1.0, lower=1.0, upper=10.0),
+    "buried": Letter("-", 1.0, lower=1.0, upper=30.0),
     "share": Letter("-", 0.5, positive=False, upper=0.97, size=0.3),
     "grease": Letter("1/s", lower=1e-4),
     "rotor": Letter("-", lower=1e-6, upper=1e6),
@@ -52,7 +54,11 @@ LETTERS: Mapping[str, Letter] = {
     "hold": Letter("{y}/s^2", positive=False, lower=-math.inf, size=5.0),
 }
 SCALED = ("K", "I", "D", "L", "least", "most", "grease", "a_1", "a_2", "c_2", "hold")  # by one over the inertia
-WIDER = {"rho": (0.05, 0.95), "phi": (0.0, 1.0)}  # a loop's motor may be light and bear all friction
+WIDER = {
+    "rho": (0.05, 0.95),
+    "phi": (0.0, 1.0),
+    "zeta": (0.02, 10.0),
+}  # a loop's motor may be light and bear all friction
 CONTACT = ("f_contact", "zeta")  # of a play: what no loop shows
 FASTEST, SEEN = 120.0, 0.4  # [Hz] of a contact that is told from a stiff one, and that as a share of the log's rate
 SIDES = ("load", "link", "motor")  # where loop and log sit: both on the load; loop on the motor; both on the motor
@@ -125,7 +131,7 @@ class LoopModel:
         elif p.kind in PER_INERTIA and self.scales is not None:
             size = max(self.scales.acceleration, 1e-6)
         lower, upper = p.lower if not p.positive else max(p.lower, 1e-9), p.upper
-        if p.name in WIDER:
+        if p.name in WIDER and (p.name != "zeta" or p.kind == "ratio" and self["buried"] > 1.0):
             lower, upper = WIDER[p.name]
         if p.kind == "frequency" and self.scales is not None:  # what the samples can show of a contact or a shaft
             upper = max(min(upper, FASTEST, SEEN / self.scales.sample_time), 1.1 * lower)
@@ -201,6 +207,8 @@ class LoopModel:
             least=v["least"],
             most=v["most"],
             creep=v["creep"],
+            heavy=v["heavy"],
+            buried=v["buried"],
             share=self.motor_share(run),
             grease=v["grease"],
             at_motor=float(self.side != "load"),

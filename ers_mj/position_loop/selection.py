@@ -17,7 +17,7 @@ from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects.bias_torque import BiasTorque
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.rate_limit import RateLimit
-from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain
+from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain, jacobian
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, scales_of
 from ers_mj.position_loop.terms import (
@@ -45,7 +45,10 @@ class Effort:
 
     rounds: int = 6
     several: Halving = Halving(looked=6, first=10, kept=3)  # starts of the bare loop
+    parted: Halving = Halving(looked=5, first=6, kept=2)  # starts of two bodies
+    far: int = 25  # steps of their best ones
     tried: int = 10  # steps of a candidate's best starts
+    promise: float = 0.3  # of what is asked for, from which a law is refitted
     finalists: int = 3  # candidates that are refitted to the end
     full: int = 40  # steps of a fit to the end
 
@@ -161,15 +164,33 @@ class Selector:
             self._with_closed_form(term, current.model)
             for term in terms(current.model, self.runs, self._error(current))
         ]
+        candidates = self._promising(current, candidates)
         quick = list(self._map(partial(self._tried, current), candidates))
         quick.sort(key=lambda c: -c.gain)
         ready = [c for c in quick[: EFFORT.finalists] if c.gain > 0.0]
         full = list(self._map(partial(self._finished, current), ready))
         return sorted(full, key=lambda c: -c.gain) + quick[len(ready) :]
 
+    def _promising(self, current: Fit, candidates: Sequence[Term]) -> list[Term]:
+        """The candidates without those laws of which no start, in any size and beside any other numbers of the model,
+        takes away what could be asked for.
+        """
+        slopes = jacobian(current.model, self.data)
+        basis = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((current.errors.size, 0))
+        e = current.errors - basis @ (basis.T @ current.errors)
+
+        def promise(model: LoopModel) -> float:
+            d = self.data.residuals(model) - current.errors
+            d = d - basis @ (basis.T @ d)
+            took = float(e @ d) ** 2 / max(float(d @ d), 1e-300) if np.isfinite(d).all() else 0.0
+            return -0.5 * current.blocks * math.log(max(1.0 - took / float(e @ e), 1e-9))
+
+        least = EFFORT.promise * self.policy.loop_gain
+        return [term for term in candidates if not term.is_law or max(map(promise, term.starts)) > least]
+
     def _tried(self, current: Fit, term: Term) -> Compared:
         if term.is_far:
-            fit = best(term.starts, self.data, EFFORT.full, EFFORT.several)
+            fit = best(term.starts, self.data, EFFORT.far, EFFORT.parted)
         else:
             fit = best(term.starts, self.data, EFFORT.tried)
         return Compared(term.name, fit, gain(current, fit))

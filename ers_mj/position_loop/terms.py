@@ -33,6 +33,7 @@ from ers_mj.position_loop.runs import Run, speed_of
 
 INTEGRAL, DERIVATIVE, WITHIN = "integral action", "derivative action", "dead time within the loop"
 SPRING = "spring"
+BURIED = 20.0  # of MuJoCo's default constraint, that of a limit
 LAWS = (GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, EndStop, Cogging)
 
 
@@ -44,13 +45,15 @@ class Sizes:
     """From where candidates are begun."""
 
     integrals: tuple[float, ...] = (0.5, 3.0)  # [1/s] of K
-    creeps: tuple[float, ...] = (947.0, 150.0)  # [1/s]; the first is MuJoCo's own
+    creeps: tuple[tuple[float, float], ...] = ((947.0, 10.0), (947.0, 1.0), (150.0, 1.0))  # [1/s], and how heavy:
+    # MuJoCo's own constraint first
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
     bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
     speeds: tuple[float, ...] = (1.0, 0.8)  # of the largest speed that is seen
     gaps: tuple[float, ...] = (0.4, 1.2)  # of the error that is left
     shares: tuple[float, ...] = (0.3,)  # of the inertia that the motor's side bears
+    parted: float = 1.3  # noise levels of error from which a second body is tried
     periods: tuple[int, ...] = (2, 4, 8, 16)  # of cogging within the travel
 
 
@@ -64,6 +67,7 @@ class Term:
     name: str
     starts: tuple[LoopModel, ...]
     is_far: bool = False  # whether the way from its starts is long
+    is_law: bool = False  # whether it adds to the forces in proportion to its size, so that a secant shows it
 
 
 def top_speed(runs: Sequence[Run]) -> float:
@@ -86,6 +90,8 @@ def present(model: LoopModel) -> list[str]:
 
 def without(model: LoopModel, name: str) -> LoopModel:
     """The model without one term; a play takes the side of its sensors along, a limit what only it tells apart."""
+    if name == EndStop.name:
+        return model.without_effect(name).lacking("buried")
     if name in model.names:
         gone = model.without_effect(name).lacking("grease")
         return replace(gone, side=SIDES[0]) if BY_NAME[name].subsystem == "transmission" else gone
@@ -109,17 +115,19 @@ def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
         Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds)),
         Term(InputDelay.name, (model.having(tau_s=0.01),)),
         Term(WITHIN, delayed_within(model)),
-        Term(Presliding.name, tuple(model.having(creep=x) for x in SIZES.creeps)),
+        Term(Presliding.name, tuple(model.fixed(heavy=y).having(creep=x) for x, y in SIZES.creeps)),
         Term(DriveDeadZone.name, tuple(model.having(band=x * model["c_2"] / model["K"]) for x in SIZES.bands)),
         Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
         Term(BiasTorque.name, (model.having(hold=0.0),)),
         Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
         *_transmissions(model, error),
-        *(Term(law.name, tuple(_begun(model, law.name))) for law in LAWS),
+        *(Term(law.name, tuple(_begun(model, law.name)), is_law=law is not EndStop) for law in LAWS),
     ]
     if "L" in model.free:
         found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
-    return [term for term in found if term.starts and not is_there(model, term.name)]
+    plain = error < SIZES.parted * max(run.sigma for run in runs)
+    found = [term for term in found if term.starts and not (term.is_far and plain)]
+    return [term for term in found if not is_there(model, term.name)]
 
 
 def delayed_within(model: LoopModel) -> tuple[LoopModel, ...]:
@@ -142,6 +150,10 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
         starts = [np.array([0.3 * scales.acceleration, travel / n, 0.0, np.inf, np.inf]) for n in SIZES.periods]
     else:
         starts = BY_NAME[name].starts(scales)
+    if name == EndStop.name:  # of springs, and of MuJoCo's constraint
+        sunk = [np.array([low, high, 36.0, 4.0]) for low, high, _, _ in starts]
+        springs = [model.with_effect(name, start) for start in starts]
+        return springs + [model.fixed(buried=BURIED).with_effect(name, start) for start in sunk]
     if name == LoadDependentFriction.name:
         return [model.with_effect(name, np.array([mu, np.inf])) for mu in (0.05, 0.3)]
     return [model.with_effect(name, start) for start in starts]
@@ -155,7 +167,7 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
         return []
     contact = min(60.0, 0.35 / model.scales.sample_time)
     play = [np.array([x * error, rho, 0.8, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]
-    shaft = [np.array([f, 0.1, 0.6, 0.3, np.inf]) for f in (8.0, 25.0)]
+    shaft = [np.array([15.0, 0.1, 0.6, 0.3, np.inf])]
     damping, found = max(model["a_2"] + model["D"], 1e-2), []
     for name, starts in ((Backlash.name, play), (ShaftCompliance.name, shaft)):
         models = []

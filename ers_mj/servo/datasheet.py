@@ -46,22 +46,9 @@ NEVER_ZERO = ("J", "R", "n", "K_t", "b", "sample_rate_hz")
 SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect")
 KINDS, SENSORS = ("P", "PD", "PI", "PID"), ("load", "link", "motor")  # of a firmware's loop, and where its sensor sits
 LOOP = (
-    "K",
-    "D",
-    "I",
-    "L",
-    "tau_s",
-    "dead_time_s",
-    "R",
-    "band",
-    "least",
-    "most",
-    "creep",
-    "share",
-    "grease",
-    "rotor",
-    "hold",
-)
+    "K", "D", "I", "L", "tau_s", "dead_time_s", "R", "band", "least", "most", "creep", "heavy", "buried", "share",
+    "grease", "rotor", "hold",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
