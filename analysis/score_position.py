@@ -34,7 +34,7 @@ def truth_of(case: str) -> tuple[dict[str, float], set[str], set[str], dict]:
         must.add("gravity_imbalance")
     if truth["class"] == "saturated":
         numbers["L"] = truth["force_limit"][1] / inertia
-    may = {"presliding"} if expected.get("creep_distinguishable_from_dry_friction") else set()
+    may = {"presliding"} if expected.get("friction_visible") else set()  # MuJoCo's dry friction creeps
     return numbers, must, may, truth
 
 

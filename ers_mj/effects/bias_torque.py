@@ -13,8 +13,6 @@ class BiasTorque(Load):
     mjcf = "an actuator of constant force on the rudder"
     parameters = (Parameter("tau_0", "torque", "constant torque, positive towards growing angle", positive=False),)
     sized = 1
-    in_loop = ("hold",)
-    loop_sentence = "a constant acceleration of {value} pushes to one side"
 
     def starts(self, scales):
         return [np.array([0.1 * scales.acceleration])]

@@ -14,13 +14,14 @@ from functools import partial
 import numpy as np
 
 from ers_mj.decisions.thresholds import POLICY, Policy
-from ers_mj.effects.bias_torque import BiasTorque
+from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain, jacobian
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, scales_of
 from ers_mj.position_loop.terms import (
+    CONSTANT,
     DERIVATIVE,
     INTEGRAL,
     SPRING,
@@ -29,6 +30,7 @@ from ers_mj.position_loop.terms import (
     is_there,
     other_shares,
     present,
+    stops,
     terms,
     top_speed,
     without,
@@ -50,6 +52,7 @@ class Effort:
     tried: int = 10  # steps of a candidate's best starts
     promise: float = 0.3  # of what is asked for, from which a law is refitted
     finalists: int = 3  # candidates that are refitted to the end
+    inset: float = 0.06  # of the travel, beyond which a stop may act
     full: int = 40  # steps of a fit to the end
 
 
@@ -133,7 +136,7 @@ class Selector:
 
     def unburdened(self, fit: Fit) -> Fit:
         """The fit without those loads that do not pay."""
-        for name in (BiasTorque.name, SPRING, GRAVITY):
+        for name in (CONSTANT, SPRING, GRAVITY):
             if is_there(fit.model, name):
                 bare = fitted(without(fit.model, name), self.data, EFFORT.full)
                 fit = bare if gain(bare, fit) < self.policy.loop_gain else fit
@@ -201,6 +204,8 @@ class Selector:
 
     def _with_closed_form(self, term: Term, model: LoopModel) -> Term:
         """The term with starts from a regression that has it in, for what bends the rest of the model most."""
+        if term.name == EndStop.name:
+            return replace(term, starts=(*term.starts, *self._stopped(model)))
         if term.name not in (RateLimit.name, INTEGRAL):
             return term
         loads = ("hold", "sin", "cos") if GRAVITY in model.names else ("hold",)
@@ -212,6 +217,18 @@ class Selector:
         for name, values in effects:
             begun = [m.with_effect(name, values) for m in begun]
         return replace(term, starts=(*term.starts, *(replace(m, side=model.side) for m in begun)))
+
+    def _stopped(self, model: LoopModel) -> list[LoopModel]:
+        """Stops at the ends of the travel, beside what a regression makes of the rest of it."""
+        loads = ("hold", "sin", "cos") if self.is_angle else ("hold",)
+        low, high = model.scales.low, model.scales.high
+        inset = EFFORT.inset * (high - low)
+        found = []
+        for lower, upper in ((-np.inf, high), (low, np.inf), (low, high)):
+            within = (lower + inset, upper - inset)
+            for rough in rough_starts(self.runs, loads, SCAN.widths[0], within=within):
+                found += stops(self.begun(rough), lower + 0.3 * inset, upper - 0.3 * inset)
+        return found
 
     def _map(self, call: Callable, items: Sequence):
         if self.jobs == 1:
@@ -240,7 +257,7 @@ class Selector:
         return self.policy.loop_gain
 
     def _parts(self, model: LoopModel) -> list[str]:
-        return [*present(model), *(name for name in (INTEGRAL, DERIVATIVE, SPRING) if is_there(model, name))]
+        return [*present(model), *(name for name in (INTEGRAL, DERIVATIVE, SPRING, CONSTANT) if is_there(model, name))]
 
     def _left_out(self, current: Fit, name: str) -> Left:
         """The best refit without a term, from where the answer stands and from its own closed form."""

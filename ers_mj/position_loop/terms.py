@@ -14,7 +14,6 @@ import numpy as np
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.asymmetric_friction import AsymmetricFriction
 from ers_mj.effects.backlash import Backlash
-from ers_mj.effects.bias_torque import BiasTorque
 from ers_mj.effects.cogging import Cogging
 from ers_mj.effects.current_limit import CurrentLimit
 from ers_mj.effects.drive_dead_zone import DriveDeadZone
@@ -32,12 +31,18 @@ from ers_mj.position_loop.model import SIDES, LoopModel
 from ers_mj.position_loop.runs import Run, speed_of
 
 INTEGRAL, DERIVATIVE, WITHIN = "integral action", "derivative action", "dead time within the loop"
-SPRING = "spring"
+SPRING, CONSTANT = "spring", "constant load"  # the second may as well be an offset of the sensor: it has no name
 BURIED = 20.0  # of MuJoCo's default constraint, that of a limit
 LAWS = (GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, EndStop, Cogging)
 
 
-OWN = {INTEGRAL: ("I",), DERIVATIVE: ("D",), WITHIN: ("dead_time_s",), SPRING: ("a_1",)}  # letters without an effect
+OWN = {
+    INTEGRAL: ("I",),
+    DERIVATIVE: ("D",),
+    WITHIN: ("dead_time_s",),
+    SPRING: ("a_1",),
+    CONSTANT: ("hold",),
+}  # letters without an effect
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,7 @@ def without(model: LoopModel, name: str) -> LoopModel:
     if name in model.names:
         gone = model.without_effect(name).lacking("grease")
         return replace(gone, side=SIDES[0]) if BY_NAME[name].subsystem == "transmission" else gone
-    if name in (INTEGRAL, SPRING):
+    if name in (INTEGRAL, SPRING, CONSTANT):
         return model.lacking(*OWN[name])
     if name == DERIVATIVE:
         return model.having(a_2=model["a_2"] + max(model["D"], 0.0)).lacking("D")
@@ -118,7 +123,7 @@ def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
         Term(Presliding.name, tuple(model.fixed(heavy=y).having(creep=x) for x, y in SIZES.creeps)),
         Term(DriveDeadZone.name, tuple(model.having(band=x * model["c_2"] / model["K"]) for x in SIZES.bands)),
         Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
-        Term(BiasTorque.name, (model.having(hold=0.0),)),
+        Term(CONSTANT, (model.having(hold=0.0),)),
         Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
         *_transmissions(model, error),
         *(Term(law.name, tuple(_begun(model, law.name)), is_law=law is not EndStop) for law in LAWS),
@@ -150,13 +155,17 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
         starts = [np.array([0.3 * scales.acceleration, travel / n, 0.0, np.inf, np.inf]) for n in SIZES.periods]
     else:
         starts = BY_NAME[name].starts(scales)
-    if name == EndStop.name:  # of springs, and of MuJoCo's constraint
-        sunk = [np.array([low, high, 36.0, 4.0]) for low, high, _, _ in starts]
-        springs = [model.with_effect(name, start) for start in starts]
-        return springs + [model.fixed(buried=BURIED).with_effect(name, start) for start in sunk]
+    if name == EndStop.name:
+        return [stop for low, high, _, _ in starts for stop in stops(model, low, high)]
     if name == LoadDependentFriction.name:
         return [model.with_effect(name, np.array([mu, np.inf])) for mu in (0.05, 0.3)]
     return [model.with_effect(name, start) for start in starts]
+
+
+def stops(model: LoopModel, low: float, high: float) -> list[LoopModel]:
+    """A model with stops there: springs, and MuJoCo's constraint."""
+    spring, sunk = np.array([low, high, 40.0, 0.3]), np.array([low, high, 36.0, 4.0])
+    return [model.with_effect(EndStop.name, spring), model.fixed(buried=BURIED).with_effect(EndStop.name, sunk)]
 
 
 def _transmissions(model: LoopModel, error: float) -> list[Term]:

@@ -71,12 +71,14 @@ def rough_starts(
     width: float,
     speed_limit: float = np.inf,
     integral: bool = False,
+    within: tuple[float, float] = (-np.inf, np.inf),
 ) -> list[Rough]:
     """The best regressions, one for each kind of limit (finite, none), the least left first.
 
-    ``loads`` are of "hold", "a_1", "sin", "cos"; the reference is passed through ``speed_limit`` first.
+    ``loads`` are of "hold", "a_1", "sin", "cos"; the reference is passed through ``speed_limit`` first; outputs beyond
+    ``within`` are left out.
     """
-    folded = [_fold(run, loads, width, integral) for run in runs]
+    folded = [_fold(run, loads, width, within) for run in runs]
     largest = max(float(np.nanmax(np.abs(run.r - run.y))) for run in runs)
     rotors = SCAN.rotors if any(run.inertia != runs[0].inertia for run in runs) else (0.0,)
     found: dict[bool, Rough] = {}
@@ -91,7 +93,7 @@ def rough_starts(
     return sorted(found.values(), key=lambda rough: rough.left)
 
 
-def _fold(run: Run, loads: Sequence[str], width: float, integral: bool) -> _Folded:
+def _fold(run: Run, loads: Sequence[str], width: float, within: tuple[float, float]) -> _Folded:
     step = max(run.sample_time, 1e-3)
     t = np.arange(0.0, run.t[-1], step)
     known = np.isfinite(run.y)
@@ -104,9 +106,9 @@ def _fold(run: Run, loads: Sequence[str], width: float, integral: bool) -> _Fold
     columns = [-fold(centred, first), -fold(np.sign(speed) * (np.abs(speed) > still), phi)]
     shape = {"hold": np.ones(theta.size), "a_1": -theta, "sin": -np.sin(theta), "cos": -np.cos(theta)}
     columns += [fold(shape[load], phi) for load in loads]
-    n = phi.size // 2
-    seen = np.interp(t, run.t, run.scored.astype(float)) > 0.5
-    return _Folded(run, fold(centred, second), np.column_stack(columns), theta, t, phi, seen[n : t.size - n])
+    seen = (np.interp(t, run.t, run.scored.astype(float)) > 0.5) & (theta > within[0]) & (theta < within[1])
+    kept = fold((~seen).astype(float), np.ones(phi.size)) < 0.5
+    return _Folded(run, fold(centred, second), np.column_stack(columns), theta, t, phi, kept)
 
 
 def _late(f: _Folded, tau: float, speed_limit: float) -> np.ndarray:
