@@ -1,6 +1,6 @@
 """STS3215 from the commanded position alone: selection on the training runs, errors on the held-out and brutal ones.
 
-    python analysis/sts3215_loop.py [--jobs N]
+python analysis/sts3215_loop.py [--jobs N]
 """
 
 from __future__ import annotations

@@ -39,6 +39,7 @@ from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
 
 Progress = Callable[[str, float], None]
 GRAVITY = GravityImbalance.name
+FIRST = (RateLimit.name, INTEGRAL)
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class Effort:
     tried: int = 10  # steps of a candidate's best starts
     promise: float = 0.3  # of what is asked for, from which a law is refitted
     finalists: int = 3  # candidates that are refitted to the end
+    enough: float = 1.15  # noise levels of error that one body may leave before two are tried
+    speeds: tuple[float, ...] = (0.9, 1.0, 1.15)  # of the largest seen, to which the reference is limited
     inset: float = 0.06  # of the travel, beyond which a stop may act
     full: int = 40  # steps of a fit to the end
 
@@ -109,6 +112,11 @@ class Selector:
         progress("fitting the loop", 0.05)
         current = base = self.base()
         rounds: list[tuple[Compared, ...]] = []
+        for name in FIRST:  # what bends all the rest, before anything that could stand for it
+            if self._may_gain(current):
+                tried = [self._finished(current, self._tried(current, t)) for t in self._terms(current, (name,))]
+                rounds += [(c,) for c in tried if c.gain >= self.policy.loop_gain]
+                current = rounds[-1][0].fit if rounds else current
         while len(rounds) < EFFORT.rounds and self._may_gain(current):
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
             ranked = self.compared(current)
@@ -162,17 +170,23 @@ class Selector:
         return math.sqrt(fit.misfit) * float(np.sqrt(np.mean([run.sigma**2 for run in self.runs])))
 
     def compared(self, current: Fit) -> list[Compared]:
-        """The candidates beside a model, the one that buys most first."""
-        candidates = [
-            self._with_closed_form(term, current.model)
-            for term in terms(current.model, self.runs, self._error(current))
-        ]
-        candidates = self._promising(current, candidates)
-        quick = list(self._map(partial(self._tried, current), candidates))
-        quick.sort(key=lambda c: -c.gain)
+        """The candidates beside a model, the one that buys most first: two bodies only where one leaves too much."""
+        every = self._terms(current)
+        ranked = self._ranked(current, self._promising(current, [t for t in every if not t.is_far]))
+        if ranked and ranked[0].fit.misfit < EFFORT.enough**2:
+            return ranked
+        return sorted([*self._ranked(current, [t for t in every if t.is_far]), *ranked], key=lambda c: -c.gain)
+
+    def _terms(self, current: Fit, names: Sequence[str] = ()) -> list[Term]:
+        """The candidates beside a model, or those of these names."""
+        found = terms(current.model, self.runs, self._error(current))
+        return [self._with_closed_form(term, current.model) for term in found if not names or term.name in names]
+
+    def _ranked(self, current: Fit, candidates: Sequence[Term]) -> list[Compared]:
+        quick = sorted(self._map(partial(self._tried, current), candidates), key=lambda c: -c.gain)
         ready = [c for c in quick[: EFFORT.finalists] if c.gain > 0.0]
         full = list(self._map(partial(self._finished, current), ready))
-        return sorted(full, key=lambda c: -c.gain) + quick[len(ready) :]
+        return sorted([*full, *quick[len(ready) :]], key=lambda c: -c.gain)
 
     def _promising(self, current: Fit, candidates: Sequence[Term]) -> list[Term]:
         """The candidates without those laws of which no start, in any size and beside any other numbers of the model,
@@ -192,7 +206,9 @@ class Selector:
         return [term for term in candidates if not term.is_law or max(map(promise, term.starts)) > least]
 
     def _tried(self, current: Fit, term: Term) -> Compared:
-        if term.is_far:
+        if term.is_bent:
+            fit = best(term.starts, self.data, EFFORT.far, EFFORT.several)
+        elif term.is_far:
             fit = best(term.starts, self.data, EFFORT.far, EFFORT.parted)
         else:
             fit = best(term.starts, self.data, EFFORT.tried)
@@ -209,14 +225,17 @@ class Selector:
         if term.name not in (RateLimit.name, INTEGRAL):
             return term
         loads = ("hold", "sin", "cos") if GRAVITY in model.names else ("hold",)
-        speed = top_speed(self.runs) if term.name == RateLimit.name else np.inf
-        more = {"R": speed} if term.name == RateLimit.name else {}
-        roughs = rough_starts(self.runs, loads, SCAN.widths[0], speed, term.name == INTEGRAL)
-        begun = [self.begun(rough, **more) for rough in roughs]
-        effects = [e for e in model.effects if e[0] != GRAVITY]
-        for name, values in effects:
-            begun = [m.with_effect(name, values) for m in begun]
-        return replace(term, starts=(*term.starts, *(replace(m, side=model.side) for m in begun)))
+        is_rate = term.name == RateLimit.name
+        speeds = [x * top_speed(self.runs) for x in EFFORT.speeds] if is_rate else [np.inf]
+        begun = []
+        for speed in speeds:
+            for width in SCAN.widths:
+                roughs = rough_starts(self.runs, loads, width, speed, not is_rate)
+                begun += [self.begun(rough, **({"R": speed} if is_rate else {})) for rough in roughs]
+        for name, values in model.effects:
+            if name != GRAVITY:
+                begun = [m.with_effect(name, values) for m in begun]
+        return replace(term, starts=(*term.starts, *(replace(m, side=model.side) for m in begun)), is_bent=True)
 
     def _stopped(self, model: LoopModel) -> list[LoopModel]:
         """Stops at the ends of the travel, beside what a regression makes of the rest of it."""

@@ -72,6 +72,7 @@ class Term:
     name: str
     starts: tuple[LoopModel, ...]
     is_far: bool = False  # whether the way from its starts is long
+    is_bent: bool = False  # whether the rest of the model is another with it
     is_law: bool = False  # whether it adds to the forces in proportion to its size, so that a secant shows it
 
 
