@@ -46,8 +46,8 @@ def _letter(found: Intervals, letter: str) -> Told | None:
 
 
 def _is_parted(model: LoopModel) -> bool:
-    """Whether anything tells the loop's damping from the plant's: a limit that acts, a dead time, a play."""
-    return "L" in model.free or "dead_time_s" in model.free or "most" in model.free or model.side != "load"
+    """Whether anything tells the loop's damping from the plant's: a limit that acts, a dead time."""
+    return "L" in model.free or "dead_time_s" in model.free or "most" in model.free
 
 
 def _row(found: Told | None, unit: str) -> dict:

@@ -219,10 +219,12 @@ class LoopModel:
     def plant_of(self, run: Run) -> tuple[Coefficients, list[tuple[str, np.ndarray]]]:
         """The plant behind the loop in one run: coefficients of an input of 1 acceleration, and the effects in it."""
         light = self.lightness(run)
-        c = Coefficients(
+        damping, parted = self["a_2"] * light, any(BY_NAME[n].subsystem == "transmission" for n in self.names)
+        c = Coefficients(  # of two bodies the motor is damped
             a_1=self["a_1"] * light,
-            a_mech_plus=self["a_2"] * light,
-            a_mech_minus=self["a_2"] * light,
+            a_mech_plus=0.0 if parted else damping,
+            a_mech_minus=0.0 if parted else damping,
+            a_emf=damping if parted else 0.0,
             c_2_plus=self["c_2"] * light,
             c_2_minus=self["c_2"] * light,
             bias=self["hold"] * light,

@@ -115,7 +115,7 @@ class Selector:
         for name in FIRST:  # what bends all the rest, before anything that could stand for it
             if self._may_gain(current):
                 tried = [self._finished(current, self._tried(current, t)) for t in self._terms(current, (name,))]
-                rounds += [(c,) for c in tried if c.gain >= self.policy.loop_gain]
+                rounds += [(c,) for c in tried if self._takes_most(current, c)]
                 current = rounds[-1][0].fit if rounds else current
         while len(rounds) < EFFORT.rounds and self._may_gain(current):
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
@@ -126,6 +126,10 @@ class Selector:
             current = ranked[0].fit
         progress("leaving out what is not needed", 0.65)
         return self.pruned(Selection(base, current, tuple(rounds)))
+
+    def _takes_most(self, current: Fit, candidate: Compared) -> bool:
+        """Whether a candidate may be taken before others are looked at."""
+        return candidate.gain >= self.policy.loop_gain and candidate.fit.misfit < 0.5 * current.misfit
 
     # -- the bare loop -------------------------------------------------------------------------------------------------
 

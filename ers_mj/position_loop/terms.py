@@ -56,7 +56,7 @@ class Sizes:
     bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
     speeds: tuple[float, ...] = (1.0, 0.8)  # of the largest speed that is seen
-    gaps: tuple[float, ...] = (0.4, 1.2)  # of the error that is left
+    gaps: tuple[float, ...] = (0.4, 1.5)  # of the error that is left
     shares: tuple[float, ...] = (0.3,)  # of the inertia that the motor's side bears
     parted: float = 1.3  # noise levels of error from which a second body is tried
     periods: tuple[int, ...] = (2, 4, 8, 16)  # of cogging within the travel
@@ -106,7 +106,7 @@ def without(model: LoopModel, name: str) -> LoopModel:
     if name == DERIVATIVE:
         return model.having(a_2=model["a_2"] + max(model["D"], 0.0)).lacking("D")
     gone = model.lacking(*BY_NAME[name].in_loop)
-    if name == VoltageSaturation.name and gone["dead_time_s"] == 0.0 and gone.side == SIDES[0]:
+    if name == VoltageSaturation.name and gone["dead_time_s"] == 0.0:
         gone = gone.having(a_2=max(model["a_2"] + model["D"], 1e-3)).lacking("D")
     return gone
 
@@ -170,22 +170,20 @@ def stops(model: LoopModel, low: float, high: float) -> list[LoopModel]:
 
 
 def _transmissions(model: LoopModel, error: float) -> list[Term]:
-    """A play or a shaft, with the loop's sensor and the log's on either side; of a loop on the motor's side the damping
-    is the motor's.
+    """A play or a shaft, with the loop's sensor and the log's on either side; of a loop on the motor's side friction is
+    partly the load's.
     """
     if any(BY_NAME[name].subsystem == "transmission" for name in model.names):
         return []
     contact = min(60.0, 0.35 / model.scales.sample_time)
     play = [np.array([x * error, rho, 0.8, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]
     shaft = [np.array([15.0, 0.1, 0.6, 0.3, np.inf])]
-    damping, found = max(model["a_2"] + model["D"], 1e-2), []
+    found = []
     for name, starts in ((Backlash.name, play), (ShaftCompliance.name, shaft)):
         models = []
         slick = model.having(grease=0.1) if BY_NAME[name].is_play else model
         for side in SIDES:
-            held = slick
-            if side != SIDES[0]:
-                held = slick.having(D=0.9 * damping, a_2=0.1 * damping, c_2=0.5 * model["c_2"])
+            held = slick if side == SIDES[0] else slick.having(c_2=0.7 * model["c_2"])
             models += [replace(held.with_effect(name, start), side=side) for start in starts]
         found.append(Term(name, tuple(models), is_far=True))
     return found
