@@ -1,9 +1,9 @@
 """Random servos with a position loop: how often the right effect is named, and how near the numbers are.
 
-    python analysis/random_position_servos.py --seed 1 --servos 20 [--effects none,latency,rate,limit,play] [--rate-hz 200]
+    python analysis/random_position_servos.py --seed 1 --servos 20 [--effects none,latency,rate,limit,play]
 
-Truth is of its own: explicit steps of 25 us, set-valued friction, sampled firmware (P, or PD on a filtered difference of
-the quantised angle), a 4096 encoder in loop and log, noise of 0.3 mrad, play as two bodies with a stiff stop.
+Truth is of its own: explicit steps of 25 us, set-valued friction, sampled firmware (P, or PD on a filtered difference
+of the quantised angle), a 4096 encoder in loop and log, noise of 0.3 mrad, play as two bodies with a stiff stop.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ INHERENT = {"gravity_imbalance", "input_delay", "voltage_saturation"}
 
 @dataclass(frozen=True)
 class Servo:
-    """Accelerations of one servo: loop K [1/s^2], D [1/s], limit L, damping a_2, friction c_2, gravity g, latency tau [s],
-    reference speed R, play [rad], firmware [Hz].
+    """Accelerations of one servo: loop K [1/s^2], D [1/s], limit L, damping a_2, friction c_2, gravity g, latency tau
+    [s], reference speed R, play [rad], firmware [Hz].
     """
 
     K: float

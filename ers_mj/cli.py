@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -14,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from ers_mj import __version__
 from ers_mj.commands import COMMANDS
-from ers_mj.errors import InputError
+from ers_mj.errors import ErsError, InputError
 
 
 class Parser(argparse.ArgumentParser):
@@ -75,9 +76,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     try:
-        arguments = parse(list(sys.argv[1:] if argv is None else argv))
+        given = list(sys.argv[1:] if argv is None else argv)
+        arguments = parse(given)
+        arguments.told = shlex.join(["ers", *given])  # on the page that this call makes
         return arguments.run(arguments)
-    except InputError as error:
+    except ErsError as error:
         print(f"ers: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

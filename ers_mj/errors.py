@@ -1,11 +1,27 @@
-"""What the package says when it is given something that it cannot use."""
+"""What the package says when it is given something that it cannot use: one family of exceptions, one sentence each."""
+
+from collections.abc import Iterable
 
 
-class InputError(ValueError):
+class ErsError(Exception):
+    """Whatever the package raises on purpose. Its text is the sentence that the command line prints."""
+
+    def __init__(self, message: str):
+        super().__init__(" ".join(message.split()))
+
+
+class InputError(ErsError, ValueError):
     """Bad input, in one sentence: what was given, what was expected, what exists.
 
     The message is kept on one line, whatever the text that is quoted in it.
     """
 
-    def __init__(self, message: str):
-        super().__init__(" ".join(message.split()))
+
+class MissingPackage(ErsError, ImportError):
+    """An optional package is needed for what was asked, and is not installed."""
+
+
+def refuse_other(what: str, value: object, known: Iterable[str]) -> None:
+    """Raise InputError where a value is none of those known."""
+    if value not in (known := list(known)):
+        raise InputError(f"there is no {what} {str(value)[:40]!r}; there are {', '.join(known)}")

@@ -15,7 +15,7 @@ def law(name="stribeck", gain=5.0, z=3.0, lost=0.0, best=3.0, **kind):
     return Offer(name, gain, z, lost, best, size=7, **kind)
 
 
-def knock(gain=5.0, best=4.0, **kind):
+def impulse(gain=5.0, best=4.0, **kind):
     return Offer("load_disturbance", gain, 1.0, 0.1, best, size=7, once=True, clocked=True, **kind)
 
 
@@ -54,24 +54,22 @@ def test_what_acts_in_few_blocks_may_lose_more_where_it_wins_much(gain, z, lost,
 )
 def test_an_impulse_gains_much_or_what_no_fork_makes(gain, best, outstanding, left, wanted):
     at = replace(FIRST, usual=left, faint=left, outstanding=outstanding)
-    assert is_asked_for(knock(gain, best), at) is wanted
+    assert is_asked_for(impulse(gain, best), at) is wanted
 
 
 @pytest.mark.parametrize("gain, first", [(9.9, "drive_dead_zone"), (4.9, "load_disturbance")])
-def test_a_knock_gives_way_to_a_law_that_explains_more(gain, first):
-    """The law loses too much elsewhere to be asked for by itself; that something is missing the knock has shown."""
+def test_an_impulse_gives_way_to_a_law_that_explains_more(gain, first):
+    """The law loses too much elsewhere to be asked for by itself; that something is missing the impulse has shown."""
     dead = law("drive_dead_zone", gain, z=1.7, lost=0.4 * gain)
-    assert named([dead, knock(4.4)], LATER) == first
+    assert named([dead, impulse(4.4)], LATER) == first
     assert named([dead], LATER) is None
-    assert named([dead, knock(4.4)], replace(LATER, beside=False)) is None  # the first round names its leader or none
+    assert named([dead, impulse(4.4)], replace(LATER, beside=False)) is None  # the first round names its leader or none
 
 
-@pytest.mark.parametrize("gain, first", [(8.1, "voltage_saturation"), (8.3, "load_disturbance")])
-def test_a_knock_gives_way_to_a_law_that_is_asked_for_as_well(gain, first):
-    """It chooses its moment, so that it must be well ahead; not where nothing is named yet, since what has no law may
-    look like both.
-    """
-    offers = [knock(gain), law("end_stop", 5.3, 1.0, 4.0), law("voltage_saturation", 5.2, 2.1, 0.1)]
+@pytest.mark.parametrize("gain, first", [(8.1, "voltage_saturation"), (8.7, "load_disturbance")])
+def test_an_impulse_gives_way_to_a_law_that_is_asked_for_as_well(gain, first):
+    """Not where nothing is named yet, since what has no law may look like both."""
+    offers = [impulse(gain), law("end_stop", 5.3, 1.0, 4.0), law("voltage_saturation", 8.4, 2.1, 0.1)]
     assert named(offers, LATER) == first
     assert named(offers, FIRST) == "load_disturbance"
 

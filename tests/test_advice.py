@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ers_mj.commands.diagnose import input_table
 from ers_mj.data.excitation import SHARES, WAVES, Limits, excitations, signal
 from ers_mj.data.prepared import Signals, make_trace, trace_of
 from ers_mj.data.recording import from_arrays
+from ers_mj.door.diagnosing import input_table
 from ers_mj.estimation.baseline import baseline
 from ers_mj.estimation.fit import descend, fit
 from ers_mj.estimation.initial_state import with_starts

@@ -32,14 +32,27 @@ MAY_READ = {
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
     "proving": ("data", "errors", "plants"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
+    "door": (
+        "control", "data", "diagnosis", "effects", "errors", "estimation", "identification", "plants", "position_loop",
+        "report", "selection", "servo", "validation", "view",
+    ),
     "commands": (
-        "control", "data", "diagnosis", "errors", "experiment_design", "identification", "online", "plants",
-        "position_loop", "proving", "report", "servo", "validation", "view",
+        "control", "data", "door", "errors", "experiment_design", "online", "plants", "proving", "report", "servo",
+        "validation", "view",
     ),
     "cli": ("commands", "errors"),
 }  # fmt: skip
-WRITERS = {"commands", "report", "view", "proving", "cli"}  # beside these only the tables of data/ open a file to write
+WRITERS = {
+    "commands",
+    "door",
+    "report",
+    "view",
+    "proving",
+    "cli",
+}  # beside these only the tables of data/ open a file to write
 FAMILIES = {
+    "data/consistency": ("sheet", "motion"),
+    "data/formats": ("base", "arrays", "clocks"),
     "effects": ("base", "quantities"),
     "control/controllers": ("base", "finite_time", "pid"),
     "identification/minimisers": ("base", "iga"),

@@ -13,6 +13,7 @@ from ers_mj import diagnosis as diagnosis_room
 from ers_mj.commands import output
 from ers_mj.data.recording import read_recording
 from ers_mj.diagnosis.evidence import Evidence
+from ers_mj.door.saving import as_json
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 
 N = 200
@@ -65,7 +66,7 @@ FILES = {
     "duty.csv": GOOD.replace("u_V", "u_duty_pct"),
     "twice.csv": GOOD.replace("theta_rad", "u_V"),
     "two_outputs.csv": csv(columns() | {"theta_deg": np.degrees(columns()["theta_rad"])}),
-    "notes.txt": GOOD,
+    "notes.odt": GOOD,
     "fake.parquet": GOOD,
     "bad.toml": "[parameters",
     "unknown.toml": "[parameters]\nJJ = 1\n",
@@ -111,7 +112,7 @@ DIAGNOSE = {
     "unknown input unit": "amps.csv",
     "column twice": "twice.csv",
     "two outputs": "two_outputs.csv",
-    "suffix": "notes.txt",
+    "suffix": "notes.odt",
     "no parquet": "fake.parquet",
     "no run": "good.csv#run=3",
     "second file bad": "good.csv empty.csv",
@@ -266,7 +267,7 @@ def stub(monkeypatch, **changes) -> list:
     """Put a diagnosis in the place of the real one; its calls."""
     calls = []
 
-    def diagnose(recordings, datasheet, holdout, *, seed, jobs, progress):
+    def diagnose(recordings, datasheet, holdout, *, seed, jobs, progress, search):
         calls.append(SimpleNamespace(recordings=recordings, datasheet=datasheet, holdout=holdout, seed=seed, jobs=jobs))
         progress("fitting", 0.5)
         if "raises" in changes:
@@ -279,6 +280,7 @@ def stub(monkeypatch, **changes) -> list:
             "where": [],
             "fit": {"heldout_rmse_before_rad": np.float64(0.1), "heldout_rmse_after_rad": float("nan")},
             "seed": seed,
+            "left_out": [{"part": part, "sentence": sentence} for part, sentence in search.left_out()],
             "data": {
                 "output_unit": "rad",
                 "input_unit": "V",
@@ -346,6 +348,7 @@ def test_the_sentence_says_what_exists(argv, words, place, monkeypatch, capsys):
 
 def test_diagnose_writes_its_files_and_tells(place, monkeypatch, capsys):
     calls = stub(monkeypatch)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
     assert (
         cli.main("diagnose good.csv --holdout second.csv --datasheet good.toml --seed 5 --jobs 2 --out res".split())
         == 0
@@ -359,12 +362,25 @@ def test_diagnose_writes_its_files_and_tells(place, monkeypatch, capsys):
     ]
     document = json.loads((place / "res/diagnosis.json").read_text())
     assert document["fit"]["heldout_rmse_after_rad"] is None and document["seed"] == 5
+    page = (place / "res/report.html").read_text()
+    assert "2 January 1970 · <code>ers diagnose good.csv --holdout second.csv" in page
+    assert all(f'href="{name}"' in page for name in ("diagnosis.json", "model.toml", "plant.xml"))
     assert read_datasheet(place / "res/model.toml").lumped["b"] == 1.0
     assert "PARAMETERS_ONLY" in out and "parameters_only" in out and "report.html" in out and err == ""
     (call,) = calls
     assert (
         [r.name for r in call.holdout] == ["second.csv"] and call.jobs == 2 and call.datasheet.parameters["J"] == 0.0031
     )
+
+
+def test_a_quick_look_says_what_it_leaves_out(place, monkeypatch, capsys):
+    stub(monkeypatch)
+    assert cli.main(["diagnose", "good.csv", "--quick"]) == 0
+    told = capsys.readouterr().out
+    assert "left out by --quick" in told and "not run in MuJoCo" in told
+    assert "not run in MuJoCo" in (place / "ers-out/report.html").read_text()
+    assert cli.main(["diagnose", "good.csv"]) == 0
+    assert "left out" not in capsys.readouterr().out
 
 
 def test_json_without_out_writes_nothing(place, monkeypatch, capsys):
@@ -546,7 +562,7 @@ def read_text_of_table1() -> str:
 # -- the program itself -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["", "demo", "diagnose", "simulate", "validate", "view"])
+@pytest.mark.parametrize("command", ["", "cache", "demo", "diagnose", "simulate", "validate", "view"])
 def test_help_has_an_example(command, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main([*command.split(), "--help"])
@@ -562,6 +578,23 @@ def test_help_loads_nothing_heavy():
     assert done.stderr.strip() == "[]"
 
 
+def test_the_cache_is_shown_and_cleared_of_what_is_ours(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cli.main(["cache", "--clear", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == 0 and list(tmp_path.iterdir()) == []
+    code = tmp_path / "ers_mj" / "code"
+    code.mkdir(parents=True, mode=0o700)
+    (tmp_path / "ers_mj").chmod(0o700)
+    stem = "ers_mj.plants.calm.rest-0123456789abcdef0123.py311"
+    for name in (f"{stem}.nbi", f"{stem}.1.nbc", "notes.nbi", "thesis.txt"):
+        (code / name).write_text("x" * 10)
+    assert cli.main(["cache"]) == 0
+    told = capsys.readouterr().out
+    assert str(code) in told and "2 files" in told and "plants" in told and "2 files that are not ours" in told
+    assert cli.main(["cache", "--clear"]) == 0
+    assert {file.name for file in code.iterdir()} - {"lock"} == {"notes.nbi", "thesis.txt"}
+
+
 def test_progress_is_silent_in_a_pipe(capsys):
     with output.Progress() as progress:
         progress("fitting", 0.3)
@@ -569,7 +602,7 @@ def test_progress_is_silent_in_a_pipe(capsys):
 
 
 def test_json_has_no_nan():
-    assert json.loads(output.as_json({"a": np.array([1.0, np.nan]), "b": (np.int64(2), float("inf"))})) == {
+    assert json.loads(as_json({"a": np.array([1.0, np.nan]), "b": (np.int64(2), float("inf"))})) == {
         "a": [1.0, None],
         "b": [2, None],
     }

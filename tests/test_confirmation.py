@@ -78,7 +78,7 @@ def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
 
 
 @pytest.mark.parametrize(
-    "begun, knocked, none",
+    "begun, struck, none",
     [
         (2.9, False, True),
         (-0.28, True, True),
@@ -88,16 +88,16 @@ def test_what_a_coarse_converter_rounds_off_is_no_sensors_error(plain):
         (2.6, True, False),
     ],
 )
-def test_a_knock_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out(plain, begun, knocked, none):
+def test_an_impulse_at_an_edge_whose_torque_may_as_well_be_none_is_taken_out(plain, begun, struck, none):
     """Of a recording where few samples bear it, or while its start is read; within one the interval of what moves a
     rudder that sticks tells little.
     """
-    knock = np.array([40.0, begun, 0.3, 1.0, np.inf])
+    impulse = np.array([40.0, begun, 0.3, 1.0, np.inf])
     start = plain
-    if knocked:
+    if struck:
         first, _, last = recorded()
-        start = started([first, trace("steps", [("load_disturbance", knock)], seed=1), last])
-    model = chosen(start, "load_disturbance", knock).chosen.model
+        start = started([first, trace("steps", [("load_disturbance", impulse)], seed=1), last])
+    model = chosen(start, "load_disturbance", impulse).chosen.model
     assert may_be_none("load_disturbance", model, start.traces, 1.0) == none
     assert not may_be_none("bias_torque", having(plain.fit, "bias_torque").model, start.traces, 1.0)
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj.commands.output import plain
 from ers_mj.data.recording import from_arrays
 from ers_mj.decisions.thresholds import POLICY
 from ers_mj.diagnosis.pipeline import diagnose
+from ers_mj.door.saving import plain
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
@@ -54,6 +54,14 @@ def test_a_concealed_dead_zone_is_named_and_measured(dead_zone):
     assert first["evidence"]["p_value"] < 0.05
     assert document["fit"]["heldout_rmse_after_rad"] < 2 * document["fit"]["noise_floor_rad"]
     assert document["where"][0]["label"] == "drive"
+
+
+def test_a_report_can_show_what_a_named_effect_does(dead_zone):
+    """Taken out of the model, with nothing refitted, it leaves far more in every recording."""
+    for view in dead_zone.evidence.records:
+        assert list(view.without) == ["drive_dead_zone"]
+        left = {name: np.sqrt(np.nanmean((run - view.measured) ** 2)) for name, run in view.without.items()}
+        assert left["drive_dead_zone"] > 3 * np.sqrt(np.nanmean((view.after - view.measured) ** 2))
 
 
 def test_the_document_is_whole_and_is_json(dead_zone):
@@ -112,7 +120,7 @@ def test_a_coarse_sensor_is_told_from_the_data():
     assert document["missing"][0]["parameters"]["step"]["value"] == pytest.approx(step, rel=0.01)
 
 
-def test_a_mimic_is_not_named_where_a_law_without_a_name_explains_more(dead_zone):
+def test_a_stand_in_is_not_named_where_a_law_without_a_name_explains_more(dead_zone):
     """A motor whose iron saturates is no sagging supply, which takes two thirds of it; a dead zone is no form of such a
     law. One round of the selection tells it.
     """
@@ -149,9 +157,9 @@ def test_a_gust_has_a_phase_of_its_own_in_every_recording():
     assert np.cos(phases - [0.4, 2.0]) * np.sign(amplitude) == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_knock_in_one_recording_is_found_there():
-    knock = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0, np.inf]))]
-    document = diagnose(acting([], knock), read_datasheet("table1")).document
+def test_an_impulse_in_one_recording_is_found_there():
+    impulse = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0, np.inf]))]
+    document = diagnose(acting([], impulse), read_datasheet("table1")).document
     first = document["missing"][0]
     assert first["effect"] == "load_disturbance" and first["parameters"]["record"]["value"] == 1
     assert first["parameters"]["t_0"]["value"] == pytest.approx(1.2, abs=0.02)

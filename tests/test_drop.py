@@ -19,7 +19,7 @@ from ers_mj.selection.drop import pruned, reconsidered
         ("periodic_gust", 400.0, ("load_disturbance", "periodic_gust")),
     ],
 )
-def test_a_knock_that_a_later_law_outweighs_is_looked_for_again(pushed, newest, gain, kept):
+def test_an_impulse_that_a_later_law_outweighs_is_looked_for_again(pushed, newest, gain, kept):
     """It was found in what the law had bent; beside another one with a clock of its own it stays."""
     current = having(having(pushed.fit, "load_disturbance", [10.0, 1.0, 0.1, 0.0, np.inf]), newest)
     rounds = [

@@ -1,4 +1,4 @@
-"""A knock is found where it acts, in its surroundings, and brought nearer."""
+"""An impulse is found where it acts, in its surroundings, and brought nearer."""
 
 from dataclasses import replace
 
@@ -16,15 +16,15 @@ from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.impulse_search import NEARING, Surroundings, between, brought_nearer
 from ers_mj.selection.screening import hot_spans, screen
 
-KNOCK = BY_NAME["load_disturbance"]
+IMPULSE = BY_NAME["load_disturbance"]
 
 
 @pytest.mark.parametrize("size, width, fade", [(-300.0, 0.08, np.inf), (-300.0, np.inf, 0.1), (-600.0, np.inf, 0.05)])
-def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed, size, width, fade):
+def test_an_impulse_on_a_resting_rudder_is_found_where_it_acts(pushed, size, width, fade):
     """It ends, or fades. Any other push leaves much of it: less throws the rudder not at all."""
     u = np.where(T < 1.0, INPUTS["multisine"](T), 0.0)
-    knock = np.array([size, 2.24, width, 0.0, fade])
-    y = ReducedModel(lumped(TRUTH), [("load_disturbance", knock)]).simulate(T, u).measured
+    impulse = np.array([size, 2.24, width, 0.0, fade])
+    y = ReducedModel(lumped(TRUTH), [("load_disturbance", impulse)]).simulate(T, u).measured
     y += NOISE * np.random.default_rng(9).standard_normal(T.size)
     model = pushed.fit.model
     model = replace(model, values={**model.values, **TRUTH}, scales=replace(model.scales, recordings=1))
@@ -39,7 +39,7 @@ def test_a_knock_on_a_resting_rudder_is_found_where_it_acts(pushed, size, width,
     assert np.fmin(best[2], best[4]) == pytest.approx(np.fmin(width, fade), rel=0.3)
 
 
-def test_a_knock_is_tried_in_its_surroundings(pushed):
+def test_an_impulse_is_tried_in_its_surroundings(pushed):
     """What begins in the run's own state gains there what it gains in all of the recording; beside a memory all of it
     is simulated.
     """
@@ -47,13 +47,13 @@ def test_a_knock_is_tried_in_its_surroundings(pushed):
     near = Surroundings(run, pushed.traces, 1.0)
     for moment in (0.02, 1.4, 2.95):
         gains = []
-        knocked = run.model.with_effect("load_disturbance", np.array([300.0, moment, 0.08, 1.0, np.inf]))
+        struck = run.model.with_effect("load_disturbance", np.array([300.0, moment, 0.08, 1.0, np.inf]))
         part, (level, without), *_ = near.of(1, moment)
         assert level == 1.0
         for some in (part, trace):
             before, after = (
                 float(np.sum(score(near.misfit(some, residuals_in(model, some, 1, 5.0)), 1.0)))
-                for model in (run.model, knocked)
+                for model in (run.model, struck)
             )
             assert some is trace or before == pytest.approx(without, abs=1e-9)
             gains.append(before - after)
@@ -63,7 +63,7 @@ def test_a_knock_is_tried_in_its_surroundings(pushed):
     assert Surroundings(run_of(warm, pushed.traces, 5.0), pushed.traces, 1.0).of(1, 1.4)[0] is trace
 
 
-def test_a_knock_is_sought_on_to_where_it_throws_the_rudder():
+def test_an_impulse_is_sought_on_to_where_it_throws_the_rudder():
     """A shaft twists under less, which gains a little; what moves the rudder lies in a window of a sixth above its
     friction.
     """
@@ -77,21 +77,21 @@ def test_a_knock_is_sought_on_to_where_it_throws_the_rudder():
     assert not between(gain, pushes[:3]) and not between(gain, pushes[3:])
 
 
-def test_a_knock_is_brought_nearer_within_its_bounds_and_no_longer_than_it_pays():
+def test_an_impulse_is_brought_nearer_within_its_bounds_and_no_longer_than_it_pays():
     """One that gains the more, the faster it fades, which has a least time; and one that gains nothing anywhere."""
-    tried, start, fade = [], np.array([10.0, 0.8, np.inf, 0.0, 0.05]), KNOCK.parameters[4]
+    tried, start, fade = [], np.array([10.0, 0.8, np.inf, 0.0, 0.05]), IMPULSE.parameters[4]
 
     def gain(push):
         tried.append(push[4])
         return 1.0 / push[4]
 
-    assert brought_nearer(gain, KNOCK, start)[4] == fade.lower <= min(tried) and max(tried) <= fade.upper
+    assert brought_nearer(gain, IMPULSE, start)[4] == fade.lower <= min(tried) and max(tried) <= fade.upper
     tried.clear()
-    brought_nearer(lambda push: tried.append(push[4]) or 0.0, KNOCK, start)
+    brought_nearer(lambda push: tried.append(push[4]) or 0.0, IMPULSE, start)
     assert len(tried) < NEARING.simulations / 4
 
 
-def test_knocks_are_looked_for_where_a_recording_leaves_enough(pushed):
+def test_impulses_are_looked_for_where_a_recording_leaves_enough(pushed):
     bench = bench_of(pushed)
     run = run_of(pushed.fit.model, pushed.traces, 5.0)
     noise = 0.9 * np.random.default_rng(1).standard_normal(run.left.size)

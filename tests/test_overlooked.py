@@ -26,9 +26,9 @@ def test_the_kin_of_a_law_that_leads_is_refitted_though_its_secant_promises_noth
     assert dict(best["current_limit"].model.effects)["current_limit"][0] == pytest.approx(300.0, rel=0.01)
 
 
-def test_a_stop_that_is_touched_once_is_no_knock():
+def test_a_stop_that_is_touched_once_is_no_impulse():
     """Only the steps reach it, and the rudder sticks there. Where its secant, taken from a stop too early, promises
-    nothing, a knock explains as much.
+    nothing, an impulse explains as much.
     """
     values = {**TRUTH, "c_2": 60.0}
     free = {name: ReducedModel(lumped(values)).simulate(SPARSE, INPUTS[name](SPARSE)).theta for name in NAMES}
@@ -36,11 +36,11 @@ def test_a_stop_that_is_touched_once_is_no_knock():
     start = started(recorded([("end_stop", np.array([-np.inf, upper, 60.0, 0.3]))], values=values, t=SPARSE), values)
     struck = screen(bench_of(start, exclude=all_but("load_disturbance")), [start.fit.model], False, False)
     refits = Refits(bench_of(start, exclude=all_but("end_stop", "drive_dead_zone", "load_disturbance")), start.fit)
-    knock = refits.on(struck.begins["load_disturbance"][0][0], 20)
-    best = {"load_disturbance": knock}
-    assert refits.won(knock) > refits.bench.policy.least_gain
+    impulse = refits.on(struck.begins["load_disturbance"][0][0], 20)
+    best = {"load_disturbance": impulse}
+    assert refits.won(impulse) > refits.bench.policy.least_gain
     refit_the_overlooked(refits, best, NOTHING, {}, 3.0)
-    assert refits.total(best["end_stop"]) < refits.total(knock)
+    assert refits.total(best["end_stop"]) < refits.total(impulse)
     assert dict(best["end_stop"].model.effects)["end_stop"][1] == pytest.approx(upper, abs=1e-3)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ers_mj.cli import main
-from ers_mj.commands.output import plain
+from ers_mj.door.saving import plain
 from ers_mj.effects import EFFECTS
 from ers_mj.errors import InputError
 from ers_mj.plants.inputs import INPUTS

@@ -28,7 +28,7 @@ def test_a_round_whose_effect_became_needless_is_given_again_once(pushed):
 @pytest.fixture(scope="module")
 def dragged():
     """A selection beside a drag that hides a friction of 1 % of the drive's torque."""
-    laws = [("quadratic_drag", np.array([1.0, np.inf])), ("load_dependent_friction", np.array([0.01, np.inf]))]
+    laws = [("quadratic_drag", np.array([1.0, np.inf])), ("load_dependent_friction", np.array([0.01, *4 * [np.inf]]))]
     start, told = started(recorded(laws)), []
     others = all_but(*(name for name, _ in laws), "stribeck", "inductance")
     return select(

@@ -1,4 +1,4 @@
-"""The README's example of a new effect, taken at its word: one file, and every part of the package knows it."""
+"""The example of docs/extending.md, taken at its word: one file, and every part of the package knows it."""
 
 import os
 import re
@@ -23,11 +23,11 @@ print(document["missing"][0]["effect"], document["missing"][0]["parameters"]["w_
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """A copy of the package with the README's effect in it, and the environment that runs it."""
+    """A copy of the package with that effect in it, and the environment that runs it."""
     folder = tmp_path_factory.mktemp("template")
     for part in ("ers_mj", "mjcf"):
         shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
-    code = re.search(r"## Add an effect.*?```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S).group(1)
+    code = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(), re.S).group(1)
     (folder / "ers_mj" / "effects" / "eddy_brake.py").write_text(code)
     return folder, {
         **os.environ,

@@ -224,6 +224,18 @@ def test_a_report_shows_the_worst_moment_before_and_after(sheet):
     assert page.count("data:image/jpeg;base64,") == 6 and "10 times as large" in page
 
 
+@draws
+@pytest.mark.parametrize(
+    ("effects", "unit", "rig"),
+    [((), "rad", "blade"), ((), "m", "carriage"), ((("gravity_imbalance", {"g_s": 30.0, "g_c": 10.0}),), "rad", "arm")],
+)
+def test_the_rig_is_drawn_as_what_it_is(effects, unit, rig):
+    plant = plant_of(Datasheet(lumped={"a_2": 70.0, "b": 90.0}, effects=effects), output_unit=unit)
+    frames = frames_of(plant, evidence(0.02, unit))
+    assert frames.rig == rig and len(frames.moments) == 3
+    assert f"The {rig} at the worst moments" in report_page({}, evidence(0.02, unit), frames)
+
+
 def test_frames_are_left_out_where_they_would_tell_nothing():
     plant = plant_of(SHEET)
     assert frames_of(plant, evidence(1e-4)) is None and frames_of(plant, evidence(0.02, "m")) is None

@@ -5,12 +5,14 @@ frequency), output (files, JSON, lines). What is slow to import is imported insi
 """
 
 from ers_mj.commands import (
+    cache,
     demo,
     diagnose,
     excite,
     frequency,
     gains,
     identify,
+    inspect,
     prove,
     simulate,
     trial,
@@ -19,4 +21,19 @@ from ers_mj.commands import (
     watch,
 )
 
-COMMANDS = (demo, diagnose, identify, simulate, validate, view, prove, trial, gains, frequency, watch, excite)
+COMMANDS = (
+    demo,
+    diagnose,
+    identify,
+    simulate,
+    validate,
+    view,
+    inspect,
+    prove,
+    trial,
+    gains,
+    frequency,
+    watch,
+    excite,
+    cache,
+)

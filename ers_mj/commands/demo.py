@@ -6,7 +6,7 @@ import argparse
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from ers_mj.commands.diagnose import diagnose_and_tell
+from ers_mj.commands.diagnose import add_quick, diagnose_and_tell
 from ers_mj.commands.options import add_common, add_out, results_folder
 from ers_mj.errors import InputError
 
@@ -21,6 +21,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Diagnose the recordings that ship inside the package: a rudder servo with a concealed effect.",
         epilog="example: ers demo --out demo-results",
     )
+    add_quick(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -29,18 +30,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """As `ers diagnose` on the shipped recordings."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    from ers_mj.data.recording import read_recording
-    from ers_mj.servo.datasheet import read_datasheet
-
     with as_file(files("ers_mj") / SHIPPED) as shipped:
         recordings, holdout = _shipped(shipped, "rec*.csv"), _shipped(shipped, "holdout*.csv")
-        return diagnose_and_tell(
-            [read_recording(path) for path in recordings],
-            [read_recording(path) for path in holdout],
-            read_datasheet(shipped / "datasheet.toml"),
-            folder,
-            arguments,
-        )
+        return diagnose_and_tell(recordings, holdout, shipped / "datasheet.toml", folder, arguments)
 
 
 def _shipped(folder: Path, pattern: str) -> list[Path]:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_common, add_input, add_map, add_out, add_recordings, mapping, results_folder
-from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, write_results, write_text
-from ers_mj.commands.recordings import refuse_mixed_inputs, refuse_twice
+from ers_mj.commands.options import add_common, add_out, add_reading, add_recordings, results_folder
+from ers_mj.commands.output import Progress, bold
+from ers_mj.commands.recordings import reader
+from ers_mj.door.saving import as_json
 
 if TYPE_CHECKING:
-    from ers_mj.data.recording import Recording
-    from ers_mj.diagnosis.pipeline import Diagnosis
+    from ers_mj.door.known import Known
+    from ers_mj.door.reading import Given
     from ers_mj.report.display import Unit
-    from ers_mj.servo.datasheet import Datasheet
 
 FITS = (("training", "train"), ("held out", "heldout"), ("recalibrated", "recalibrated"))
 
@@ -36,78 +36,57 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable"
     )
-    add_map(parser)
-    add_input(parser)
+    add_reading(parser)
     parser.add_argument(
         "--second", metavar="COLUMN", help="explain this column as well, as in u_V beside theta_ref_rad"
     )
+    add_quick(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
 
 
+def add_quick(parser: argparse.ArgumentParser) -> None:
+    """--quick."""
+    parser.add_argument(
+        "--quick", action="store_true", help="a first look in a third of the time; it says what it leaves out"
+    )
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write, tell; 0 whatever the verdict."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    names = mapping(arguments.map)
-    from ers_mj.data.recording import read_recording
-    from ers_mj.servo.datasheet import read_datasheet
-
-    datasheet = read_datasheet(arguments.datasheet) if arguments.datasheet is not None else None
-    read = partial(read_recording, mapping=names, input_column=arguments.input, second=arguments.second)
-    recordings = [read(spec) for spec in arguments.recordings]
-    holdout = [read(spec) for spec in arguments.holdout]
-    return diagnose_and_tell(recordings, holdout, datasheet, folder, arguments)
+    take = reader(arguments)
+    recordings = [take(spec) for spec in arguments.recordings]
+    holdout = [take(spec) for spec in arguments.holdout]
+    return diagnose_and_tell(recordings, holdout, arguments.datasheet, folder, arguments)
 
 
 def diagnose_and_tell(
-    recordings: list[Recording],
-    holdout: list[Recording],
-    datasheet: Datasheet | None,
+    recordings: Sequence[Given],
+    holdout: Sequence[Given],
+    datasheet: Known,
     folder: Path | None,
     arguments: argparse.Namespace,
 ) -> int:
     """The part that `diagnose` and `demo` share: from recordings to files and words."""
-    refuse_twice(recordings, holdout)
-    refuse_mixed_inputs([*recordings, *holdout])
-    from ers_mj.diagnosis import pipeline as diagnosis
+    from ers_mj.door.diagnosing import diagnose
 
     with Progress() as progress:
-        found = diagnosis.diagnose(
-            recordings, datasheet, holdout, seed=arguments.seed, jobs=arguments.jobs, progress=progress
+        found = diagnose(
+            recordings,
+            datasheet,
+            holdout,
+            seed=arguments.seed,
+            jobs=arguments.jobs,
+            progress=progress,
+            quick=arguments.quick,
         )
-        document = plain(found.document)
-        files = _write(folder, document, found, progress) if folder is not None else []
+        found.made_by = getattr(arguments, "told", "")
+        files = found.save(folder, force=True, progress=progress) if folder is not None else []
+    document = found.to_dict()
     print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
     return 0
-
-
-def _write(folder: Path, document: dict, found: Diagnosis, progress: Progress) -> list[Path]:
-    from ers_mj.report.diagnosis_report import report_page
-    from ers_mj.servo.datasheet import write_model
-    from ers_mj.view.frames import frames_of
-
-    progress("drawing the report", 1.0)
-    page = report_page(document, found.evidence, frames_of(found.plant, found.evidence))
-    following = (document.get("next_recording") or {}).get("excitation")
-    return write_results(
-        folder,
-        report_writers("diagnosis.json", document, page)
-        | {
-            "model.toml": lambda path: write_model(path, found.model),
-            "plant.xml": lambda path: write_text(path, found.plant.xml()),
-        }
-        | ({"next_recording.csv": lambda path: write_text(path, input_table(following))} if following else {}),
-    )
-
-
-def input_table(excitation: dict) -> str:
-    """The input to record next, as `ers simulate --input` takes it."""
-    from ers_mj.data.columns import input_name
-    from ers_mj.data.excitation import signal
-
-    column = input_name(excitation["input_unit"])
-    return "\n".join([f"t_s,{column}", *(f"{t:.9g},{u:.6g}" for t, u in zip(*signal(excitation), strict=True))]) + "\n"
 
 
 # -- the diagnosis in lines ---------------------------------------------------------------------------------------
@@ -126,9 +105,14 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     lines += _section(
         "problems in the data", [str(problem) for problem in (document.get("data") or {}).get("problems") or []][:6]
     )
+    return lines + _told_rest(document) + _section("written", [str(path) for path in files])
+
+
+def _told_rest(document: dict) -> list[str]:
+    """What a quick look left out, and what to record next."""
+    lines = _section("left out by --quick", [str(part["sentence"]) for part in document.get("left_out") or []])
     following = (document.get("next_recording") or {}).get("sentence")
-    lines += _section("record next", [following] if following else [])
-    return lines + _section("written", [str(path) for path in files])
+    return lines + _section("record next", [following] if following else [])
 
 
 def _section(title: str, sentences: list[str]) -> list[str]:

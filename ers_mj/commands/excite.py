@@ -7,7 +7,8 @@ import math
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import number, one_of, several, table_file
-from ers_mj.commands.output import Progress, as_json, bold, make_room
+from ers_mj.commands.output import Progress, bold
+from ers_mj.door.saving import as_json, make_room
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ import math
 from typing import TYPE_CHECKING, cast
 
 from ers_mj.commands.options import angle_deg, number, swing_deg, whole
-from ers_mj.commands.output import Progress, as_json, bold
+from ers_mj.commands.output import Progress, bold
+from ers_mj.door.saving import as_json
 
 if TYPE_CHECKING:
     from ers_mj.control.controllers import Gains

@@ -8,10 +8,10 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
+from ers_mj.door.saving import refuse_folder, refuse_table
 from ers_mj.errors import InputError
 
 DEFAULT_OUT = "ers-out"
-OTHER_FORMATS = (".parquet", ".mat", ".h5", ".hdf5", ".npz", ".json", ".toml")
 
 
 def number(least: float | None = None, above: float | None = None, most: float | None = None):
@@ -101,13 +101,20 @@ def add_map(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="name=column",
-        help="take the column as this name, as in t_s=Time; repeatable",
+        help="take a column as this name, also with its unit, a factor or arithmetic, as in t_s=Time,"
+        ' "t_s=Time [ms]", theta_rad=enc:counts/4096, "u_V=pwm*24/255", "theta_rad=state[3]"; repeatable',
+    )
+    parser.add_argument(
+        "--map-file", metavar="TOML", help="keeps what --map says in a table [map], and input, second, episode"
     )
 
 
-def add_input(parser: argparse.ArgumentParser) -> None:
-    """--input."""
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """--map, --map-file, --input and --episode: how recordings are read."""
+    add_map(parser)
     parser.add_argument("--input", metavar="COLUMN", help="what the servo is told, where several columns could be")
+    parser.add_argument("--episode", metavar="N", help="one run of a file that holds several, as FILE#run=N does")
+    parser.add_argument("--dbc", metavar="FILE", help="what the messages of a CAN log mean")
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:
@@ -161,11 +168,7 @@ def table_file(out: str, force: bool) -> Path:
     file = Path(out)
     if not out or file.is_dir():
         raise InputError(f"--out {out or 'is empty'}: a file was expected, as in --out rec.csv")
-    if file.suffix.lower() in OTHER_FORMATS:
-        raise InputError(f"{file}: the file name ends in {file.suffix!r}, simulate writes .csv")
-    if file.exists() and not force:
-        raise InputError(f"{file}: exists already, give --force to overwrite it")
-    refuse_unwritable(file)
+    refuse_table(file, force)
     return file
 
 
@@ -180,20 +183,5 @@ def results_folder(out: str | None, force: bool, as_json: bool) -> Path | None:
     folder = Path(DEFAULT_OUT if out is None else out)
     if out == "":
         raise InputError("--out is empty, a folder was expected")
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file, --out needs a folder")
-    refuse_unwritable(folder)
-    if out is not None and not force and folder.is_dir() and any(folder.iterdir()):
-        raise InputError(f"{folder}: holds files already, give --force to write into it or name another folder")
+    refuse_folder(folder, force or out is None)
     return folder
-
-
-def refuse_unwritable(path: Path) -> None:
-    """Raise InputError where `path` cannot be made: its nearest existing parent is a file or is locked."""
-    parent = path.absolute()
-    while not parent.exists():
-        parent = parent.parent
-    if not parent.is_dir() and parent != path.absolute():
-        raise InputError(f"{path}: cannot be made, {parent} is a file")
-    if not os.access(parent, os.W_OK):
-        raise InputError(f"{path}: cannot be written, {parent} is read-only")

@@ -12,8 +12,9 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, refuse_unwritable, whole
-from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, write_results, write_text, written
+from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, whole
+from ers_mj.commands.output import Progress, bold, written
+from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:

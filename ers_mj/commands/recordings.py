@@ -1,55 +1,30 @@
-"""What recordings of one call must have in common."""
+"""How commands read the recordings that they are given."""
 
 from __future__ import annotations
 
-from collections import Counter
+import argparse
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
-from ers_mj.errors import InputError
+from ers_mj.commands.options import mapping
 
 if TYPE_CHECKING:
     from ers_mj.data.recording import Recording
 
 
-def refuse_twice(recordings: list[Recording], holdout: list[Recording]) -> None:
-    """Raise InputError where one recording, by its content, is given twice or both trained and held out."""
-    first: dict[tuple[str, str], str] = {}
-    trained = {_identity(recording) for recording in recordings}
-    for recording, held_out in [*((r, False) for r in recordings), *((r, True) for r in holdout)]:
-        key = _identity(recording)
-        if held_out and key in trained:
-            raise InputError(
-                f"{recording.name}: is held out and also among the training recordings "
-                f"(as {first[key]}), a recording cannot judge what it taught"
-            )
-        if key in first:
-            raise InputError(f"{recording.name}: is the same recording as {first[key]}, give it once")
-        first[key] = recording.name
+def reader(arguments: argparse.Namespace) -> Callable[[str], Recording]:
+    """Reads a recording as the options say; what --map says goes before the file of --map-file."""
+    from ers_mj.data.mapping import read_map_file
+    from ers_mj.data.recording import read_recording
 
-
-def _identity(recording: Recording) -> tuple[str, str]:
-    """Content and run."""
-    return recording.sha256, recording.name.partition("#run=")[2]
-
-
-def refuse_mixed_inputs(recordings: list[Recording]) -> None:
-    """Raise InputError where inputs are not all of one kind, or outputs or inputs of one unit."""
-    kinds = Counter(recording.input_kind for recording in recordings)
-    if len(kinds) > 1:
-        common = kinds.most_common(1)[0][0]
-        odd = next(r for r in recordings if r.input_kind != common)
-        other = next(r for r in recordings if r.input_kind == common)
-        raise InputError(
-            f"{odd.name}: its input is a {odd.input_kind} and that of {other.name} a {common}, recordings of one kind"
-            " of input were expected (choose with --input)"
-        )
-    for noun, attribute in (("output", "output_unit"), ("input", "input_unit")):
-        units = Counter(getattr(recording, attribute) for recording in recordings)
-        if len(units) > 1:
-            common = units.most_common(1)[0][0]
-            odd = next(r for r in recordings if getattr(r, attribute) != common)
-            other = next(r for r in recordings if getattr(r, attribute) == common)
-            raise InputError(
-                f"{odd.name}: its {noun} is in {getattr(odd, attribute)} and that of {other.name} in {common}, "
-                "recordings of one unit were expected"
-            )
+    kept = read_map_file(arguments.map_file) if arguments.map_file is not None else {}
+    first = lambda option: getattr(arguments, option, None) or kept.get(option)
+    return partial(
+        read_recording,
+        mapping={**kept.get("map", {}), **mapping(arguments.map)},
+        input_column=first("input"),
+        second=first("second"),
+        episode=first("episode"),
+        dbc=first("dbc"),
+    )

@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import argparse
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import number, table_file, whole
-from ers_mj.commands.output import as_json, make_room
-from ers_mj.errors import InputError
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from ers_mj.servo.datasheet import Datasheet
+from ers_mj.door.saving import as_json
 
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
 
@@ -69,101 +61,26 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write; 0."""
     out = table_file(arguments.out, arguments.force)
-    from ers_mj.data.recording import write_recording
-    from ers_mj.servo.datasheet import read_datasheet
-    from ers_mj.servo.simulation import parse_effect, simulate_recording
+    from ers_mj.door.simulating import simulate
 
-    datasheet = read_datasheet(arguments.model)
-    if datasheet.loop:
-        return _loop(arguments, datasheet, out)
-    effects = [parse_effect(text) for text in arguments.effect]
-    t, u = _input(arguments)
-    columns = simulate_recording(
-        datasheet,
-        t,
-        u,
-        effects=effects,
+    found = simulate(
+        arguments.model,
+        arguments.input,
+        effects=arguments.effect,
         noise=math.radians(arguments.noise_deg),
         seed=arguments.seed,
+        rate_hz=arguments.rate_hz,
+        duration=arguments.duration,
         plant=arguments.plant,
         gap=math.radians(arguments.gap),
         linkage=arguments.linkage,
         play=arguments.play,
         inductance=arguments.inductance == "on",
     )
-    make_room(out)
-    write_recording(out, columns)
-    summary = _summary(arguments, columns, [*datasheet.effects, *effects])
+    found.save(out, arguments.force)
+    summary = {"out": arguments.out, **found.to_dict()}
     print(as_json(summary) if arguments.json else _told(summary))
     return 0
-
-
-def _loop(arguments: argparse.Namespace, datasheet: Datasheet, out: Path) -> int:
-    """Simulate a servo that is told a position."""
-    from ers_mj.data.recording import read_input, write_recording
-    from ers_mj.plants.inputs import INPUTS
-    from ers_mj.position_loop.saved import simulate_loop
-
-    if arguments.input in INPUTS:
-        raise InputError(f"--input {arguments.input} is a voltage; a model with a [loop] takes a CSV t_s,theta_ref_rad")
-    for option, value in (("--effect", arguments.effect), ("--gap", arguments.gap)):
-        if value:
-            raise InputError(f"{option} is for models without a [loop], this one's effects stand in its file")
-    t, r = read_input(arguments.input, "theta_ref_rad")
-    noise = math.radians(arguments.noise_deg)
-    columns = simulate_loop(datasheet, t, r, plant=arguments.plant, noise=noise, seed=arguments.seed)
-    make_room(out)
-    write_recording(out, columns)
-    summary = _summary(arguments, columns, list(datasheet.effects))
-    print(as_json(summary) if arguments.json else _told(summary))
-    return 0
-
-
-def _input(arguments: argparse.Namespace) -> tuple[np.ndarray, np.ndarray]:
-    """Time and voltage, of a name or of a file."""
-    import numpy as np
-
-    from ers_mj.data.recording import read_input
-    from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
-
-    if arguments.input not in INPUTS:
-        for option, value in (("--rate-hz", arguments.rate_hz), ("--duration", arguments.duration)):
-            if value is not None and Path(arguments.input).exists():
-                raise InputError(f"{option} is for named inputs ({', '.join(INPUTS)}), the file brings its own times")
-        file = Path(arguments.input)
-        if not file.exists() and not file.suffix:
-            raise InputError(
-                f"--input {file}: there is no such file and no input of that name; there are {', '.join(INPUTS)}"
-            )
-        return read_input(file)
-    rate, duration, most = arguments.rate_hz or RATE_HZ, arguments.duration or DURATION, 20_000_000
-    if not 2 <= rate * duration <= most:
-        raise InputError(
-            f"{duration:g} s at {rate:g} Hz are {rate * duration:.3g} samples, 2 to {most:.0e} were expected"
-        )
-    t = np.arange(round(rate * duration)) / rate
-    return t, INPUTS[arguments.input](t)
-
-
-def _summary(arguments: argparse.Namespace, columns: dict, effects: list) -> dict:
-    t, theta = columns["t_s"], columns["theta_rad"]
-    return {
-        "out": arguments.out,
-        "plant": arguments.plant,
-        "linkage": arguments.linkage,
-        "input": arguments.input,
-        "inductance": arguments.inductance == "on",
-        "gap_rad": math.radians(arguments.gap),
-        "play": arguments.play,
-        "samples": int(t.size),
-        "duration_s": float(t[-1] - t[0]),
-        "noise_rad": math.radians(arguments.noise_deg),
-        "seed": arguments.seed,
-        "effects": [{"name": name, "parameters": dict(values)} for name, values in effects],
-        "theta_rms_rad": float(theta.std()),
-        "theta_min_rad": float(theta.min()),
-        "theta_max_rad": float(theta.max()),
-    }
 
 
 def _told(summary: dict) -> str:

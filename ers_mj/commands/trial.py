@@ -20,7 +20,8 @@ from ers_mj.commands.options import (
     swing_deg,
     whole,
 )
-from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
+from ers_mj.commands.output import Progress, bold, written
+from ers_mj.door.saving import as_json, plain, report_writers, versions, write_results
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import add_jobs_and_json, add_out, number, one_of, results_folder, several
-from ers_mj.commands.output import Progress, as_json, bold, plain, report_writers, versions, write_results, written
+from ers_mj.commands.output import Progress, bold, written
+from ers_mj.door.saving import as_json
 
 if TYPE_CHECKING:
-    from ers_mj.servo.datasheet import Datasheet
     from ers_mj.validation.cases import Validation
 
 LINKAGES, SWITCH = ("constant", "rod"), ("off", "on")
@@ -60,50 +59,22 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate both, compare, write, tell; 0."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    from ers_mj.report.validity import as_document
-    from ers_mj.servo.datasheet import read_plant
-    from ers_mj.validation.cases import GRID, validate
+    from ers_mj.door.validating import validate
 
-    datasheet = read_plant(arguments.datasheet)
-    gaps, linkages, inductances, left_out = _asked(arguments, datasheet)
     with Progress() as progress:
-        maps = None if arguments.no_maps else GRID
-        found = validate(datasheet, gaps, linkages, inductances, maps=maps, jobs=arguments.jobs, progress=progress)
-        document = plain(
-            {
-                **as_document(found),
-                "left_out": left_out,
-                "datasheet": datasheet.name or arguments.datasheet,
-                "versions": versions(),
-            }
+        found = validate(
+            arguments.datasheet,
+            gap=arguments.gap and [math.radians(x) for x in arguments.gap],
+            linkage=arguments.linkage,
+            inductance=arguments.inductance and [x == "on" for x in arguments.inductance],
+            maps=not arguments.no_maps,
+            jobs=arguments.jobs,
+            progress=progress,
         )
-        files = _write(folder, document, found, progress) if folder is not None else []
-    print(as_json(document) if arguments.json else "\n".join(_told(found, document, files)))
+        files = found.save(folder, force=True, progress=progress) if folder is not None else []
+    document = found.to_dict()
+    print(as_json(document) if arguments.json else "\n".join(_told(found.validation, document, files)))
     return 0
-
-
-def _asked(
-    arguments: argparse.Namespace, datasheet: Datasheet
-) -> tuple[Sequence[float], Sequence[str], Sequence[bool], list[str]]:
-    """Gaps [rad], linkages, inductances, and what the default run leaves out because the datasheet cannot make it."""
-    if arguments.gap is None and arguments.linkage is None and arguments.inductance is None:
-        from ers_mj.validation.cases import possible
-
-        return possible(datasheet)
-    return (
-        [math.radians(x) for x in arguments.gap or (0.0,)],
-        arguments.linkage or ["constant"],
-        [x == "on" for x in arguments.inductance or ("off",)],
-        [],
-    )
-
-
-def _write(folder: Path, document: dict, found: Validation, progress: Progress) -> list[Path]:
-    from ers_mj.report.validation_report import validation_page
-
-    progress("drawing the report", 1.0)
-    page = validation_page(found, {"datasheet": document["datasheet"], **document["versions"]})
-    return write_results(folder, report_writers("validation.json", document, page))
 
 
 # -- the validation in lines ----------------------------------------------------------------------------------------

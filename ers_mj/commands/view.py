@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import mapping, number, pair, refuse_unwritable, whole
-from ers_mj.commands.output import Progress, as_json, write_whole
+from ers_mj.commands.options import mapping, number, pair, whole
+from ers_mj.commands.output import Progress
+from ers_mj.door.saving import as_json, refuse_unwritable, write_whole
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:

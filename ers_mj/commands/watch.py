@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import mapping, number, pair
-from ers_mj.commands.output import plain
+from ers_mj.door.saving import plain
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ers_mj.control.controllers import Servo
-from ers_mj.data.tables import listed, numbers, parse_table, read_content
+from ers_mj.data.formats import load
+from ers_mj.data.tables import listed, numbers
 from ers_mj.errors import InputError
 
 ANGLES = {"theta_ref_rad": 1.0, "theta_ref_deg": math.radians(1.0)}
@@ -94,7 +95,7 @@ def named(name: str, amplitude: float, start: float, rate_hz: float) -> Referenc
     """One of the cases, of this amplitude [rad] about this start [rad].
 
     Raises:
-        InputError: the rate makes too few or too many samples of it.
+        InputError: the rate does not make a usable number of samples of it.
     """
     shape, duration = CASES[name]
     n = round(duration * rate_hz)
@@ -118,7 +119,7 @@ def read_reference(path: str | os.PathLike, servo: Servo, u_max: float) -> Refer
         InputError: the file is no such thing.
     """
     file = Path(path)
-    table = parse_table(read_content(file), file.suffix.lower(), file.name)
+    table = load(file, file.name)[0].table
     names = [name for name in ANGLES if name in table.column_names]
     if "t_s" not in table.column_names or len(names) != 1:
         raise InputError(

@@ -100,7 +100,7 @@ def sampled(plant: Plant, rate_hz: float, start: tuple[float, float]) -> Sampled
     """A plant that is given its voltage sample by sample.
 
     Raises:
-        InputError: its command is late by too many samples.
+        InputError: its command is later than a loop keeps samples.
     """
     refuse_late(plant, rate_hz, 1_000_000)
     if isinstance(plant, ReducedModel):

@@ -18,6 +18,7 @@ from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.sentences import remainder, sentence, shown
+from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
@@ -85,7 +86,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "record_state": states,
         "fit": case.fits,
         "parameters": _parameters(case),
-        "next_recording": next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit),
+        "next_recording": _next_recording(case),
         "data": data,
         "trail": [_move(move) for move in case.selection.trail],
         "seed": case.seed,
@@ -93,6 +94,8 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
     }
     if verdict == "unexplained" or case.suspects:
         document["suspects"] = _suspects(case)
+    if left_out := case.search.left_out():
+        document["left_out"] = [{"part": part, "sentence": sentence} for part, sentence in left_out]
     evidence = Evidence(
         tuple(views(case, samples)),
         tuple(ladder(case)),
@@ -117,10 +120,11 @@ def _suspects(case: Case) -> list[dict]:
     first = case.selection.rounds[0] if case.selection.rounds else ()
     others = [c for c in first[:3] if c.name in BY_NAME] if case.verdict == "unexplained" else []
     return [
-        {"effect": c.name, "sentence": f"{BY_NAME[c.name].sentence}: buys {c.gain:.1f} of the misfit"}
+        {"effect": c.name, "sentence": f"{BY_NAME[c.name].sentence}: lowers the robust cost by {c.gain:.1f}"}
         for c in case.suspects
     ] + [
-        {"effect": c.name, "sentence": f"buys {c.gain:.1f} of {case.start.fit.cost:.1f} of the misfit"} for c in others
+        {"effect": c.name, "sentence": f"lowers the robust cost by {c.gain:.1f} of {case.start.fit.cost:.1f}"}
+        for c in others
     ]
 
 
@@ -274,6 +278,15 @@ def _combinations(case: Case, rows: dict) -> dict:
         return {}
     named = {"k_s/J": "a_1", "n K_t/(J R)": "b", "T_LH/J": "c_1", "F_c/J": "c_2", "L/R": "tau_e", "n K_t/J": "ampere"}
     return {combination: rows[name] for combination, name in named.items() if name in rows}
+
+
+def _next_recording(case: Case) -> dict:
+    """What to record next, where that is designed."""
+    if not case.search.advised:
+        return {"sentence": "not designed in a quick look", "excitation": None}
+    if is_unexcited(case.start.traces):
+        return moving_input(case.start.traces, case.input_unit, case.output_unit)
+    return next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit)
 
 
 def _move(move: Move) -> dict:

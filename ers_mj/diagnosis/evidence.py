@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from ers_mj.diagnosis.mismatch_spectrum import Mismatch
 class RecordView:
     """One recording beside its free runs, each (N,): t [s], u, and outputs in output units, NaN where missing.
 
-    ``shaded`` are the spans of time [s] in which the located mismatch lives.
+    ``shaded`` are the spans of time [s] in which the located mismatch lives. ``without`` are the free runs of the model
+    after with one named effect taken out of it and nothing refitted, by the effect's name.
     """
 
     name: str
@@ -24,11 +26,21 @@ class RecordView:
     before: np.ndarray
     after: np.ndarray
     shaded: tuple[tuple[float, float], ...] = ()
+    without: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def error_before(self) -> float:
+        """Root mean square of what the model before leaves [output unit], 0 where nothing was measured."""
+        error = self.measured - self.before
+        known = error[np.isfinite(error)]
+        return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One candidate: what it gains in block cost over the baseline, how surely, and what it scores on held-out data."""
+    """One candidate: what it gains in block cost over what its round began with, how surely, what it scores on held-out
+    data, and ``total``, what it takes off the baseline's block cost.
+    """
 
     effects: tuple[str, ...]
     gain: float
@@ -37,6 +49,7 @@ class Rung:
     chosen: bool
     note: str
     parameters: int
+    total: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,3 +77,8 @@ class Evidence:
     output_unit: str
     input_unit: str
     spectrum: Mismatch | None = None
+
+    @property
+    def told(self) -> list[RecordView]:
+        """The recordings as a reader meets them: held-out ones first, among them where the model before does worst."""
+        return sorted(self.records, key=lambda view: (not view.held_out, -view.error_before))

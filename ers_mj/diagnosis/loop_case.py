@@ -11,7 +11,6 @@ import numpy as np
 
 from ers_mj.data.recording import Recording
 from ers_mj.decisions import verdict as rules
-from ers_mj.decisions.explained import cost
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
@@ -98,10 +97,6 @@ class LoopCase:
         c, noise = self.confirmed, self.noise
         return rules.share(c.before.rmse**2, c.after.rmse**2, noise**2)
 
-    @property
-    def heldout_cost(self) -> tuple[float, float]:
-        return cost(self.confirmed.before.misfit, 1.0), cost(self.confirmed.after.misfit, 1.0)
-
     @cached_property
     def left_before(self) -> dict[str, float]:
         return {"output": self._remembered(self.base)}
@@ -113,10 +108,6 @@ class LoopCase:
     @property
     def left_elsewhere(self) -> float:
         return self.left["output"]
-
-    @property
-    def free_train(self) -> float:
-        return self.train[1] / self.noise
 
     @property
     def free_held(self) -> float:
@@ -154,7 +145,7 @@ class LoopCase:
     @cached_property
     def more_is_left(self) -> bool:
         """Whether a mismatch stays that nothing named accounts for."""
-        return rules.is_more_left(self, self.policy) or self.confirmed.after.rmse > self.policy.clear * self.noise
+        return rules.is_more_left(self, self.policy) or self.confirmed.after.rmse > self.policy.loop_wrong * self.noise
 
     @cached_property
     def fits(self) -> dict:

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ers_mj.data.informative import searched
 from ers_mj.data.prepared import Trace, counted, trace_of
 from ers_mj.data.recording import Recording
 from ers_mj.decisions.thresholds import POLICY, Policy
@@ -18,14 +19,16 @@ from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.document import Diagnosis, told
 from ers_mj.diagnosis.loop_pipeline import diagnose_loop
 from ers_mj.diagnosis.mujoco_check import Rig
+from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.effects.quantities import Symptoms
 from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes
-from ers_mj.selection.confirmation import confirmed
+from ers_mj.selection.budget import SEARCH, Budget, Search
+from ers_mj.selection.confirmation import Confirmed, confirmed
 from ers_mj.selection.confounders import without_confounders
-from ers_mj.selection.stepwise import select
+from ers_mj.selection.stepwise import Selection, select
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import MOST_TAU, Model
 
@@ -41,6 +44,7 @@ def diagnose(
     jobs: int | None = None,
     progress: Progress = lambda text, share: None,
     policy: Policy = POLICY,
+    search: Search = SEARCH,
 ) -> Diagnosis:
     """Locate, name and model what a simulation of these recordings leaves out.
 
@@ -52,11 +56,14 @@ def diagnose(
         jobs: threads; all cores by default. The result does not depend on it.
         progress: called with a text and a share of the work done.
         policy: the thresholds that decide.
+        search: how far it is searched, and which parts are left out.
 
     Raises:
         InputError: no motion of the model resembles the recordings.
     """
-    jobs, first = jobs or _cores(), recordings[0]
+    jobs = jobs or _cores()
+    recordings, holdout = searched(recordings, holdout)
+    first = recordings[0]
     if first.input_kind == "position":
         return diagnose_loop(recordings, holdout, seed=seed, jobs=jobs, progress=progress, policy=policy)
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
@@ -64,35 +71,43 @@ def diagnose(
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
-    sensors = symptoms(recordings, start.traces, travel, policy)
+    still = is_unexcited(start.traces)  # nothing can be told then, and nothing is named
+    sensors = {} if still else symptoms(recordings, start.traces, travel, policy)
     chosen = select(
         start.fit,
         start.traces,
         anchors=start.anchors,
-        exclude=(*_ordinary(start.fit.model, policy), *SUSPECTS),
+        held=start.held,
+        exclude=tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,
         policy=policy,
+        budget=Budget(start.traces, search=search),
     )
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
-    chosen = replace(
-        chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
-    )
+    best = polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
+    chosen = replace(chosen, base=start.fit, chosen=best)
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
-    named, suspects = without_confounders(selection, start.traces, jobs, policy)
+    named, suspects = (selection, ()) if still else without_confounders(selection, start.traces, jobs, policy, search)
     if named is not selection:
         selection, judged = confirmed(start, named, held, jobs, policy)
-    progress("running the MuJoCo plant", 0.84)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
-    before = rig.rmse(judged.base_models, judged.parts, jobs)
-    multibody = before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
+    multibody = _in_mujoco(rig, selection, judged, jobs, progress) if search.in_mujoco else (None, None)
     progress("locating", 0.92)
-    case = Case(
-        recordings, list(holdout), datasheet, start, selection, judged, sensors, suspects, seed, rig, multibody, policy
-    )
+    given = recordings, list(holdout), datasheet
+    case = Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search)
     return told(case, held)
+
+
+def _in_mujoco(
+    rig: Rig, selection: Selection, judged: Confirmed, jobs: int, progress: Progress
+) -> tuple[float | None, float | None]:
+    """The held-out errors of the MuJoCo plants before and after, the same where nothing is named."""
+    progress("running the MuJoCo plant", 0.84)
+    before = rig.rmse(judged.base_models, judged.parts, jobs)
+    return before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
 
 
 def _ordinary(model: Model, policy: Policy) -> list[str]:

@@ -5,39 +5,38 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ers_mj.data.prepared import Trace
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import RecordView, Rung
 from ers_mj.diagnosis.localisation import Samples, shaded
 from ers_mj.effects import BY_NAME
-from ers_mj.selection.cross_validation import free_run, pooled
+from ers_mj.selection.cross_validation import pooled
+from ers_mj.servo.model import Model
 
 
 def views(case: Case, samples: Samples) -> list[RecordView]:
     """Every recording, the held-out ones first, with where it is explained least."""
-    out = []
-    for model, base, fold in zip(case.confirmed.models, case.confirmed.base_models, case.confirmed.parts):
-        t = fold.held_out
-        out.append(RecordView(t.name, True, t.t, t.u, t.y, free_run(base, t), free_run(model, t), ()))
-    held_names = {v.name for v in out}
-    for k, t in enumerate(case.start.traces):
-        spans = shaded(t, k, samples) if case.verdict in ("missing_physics", "unexplained") else ()
-        if t.name in held_names and case.confirmed.parts[0].training is not None and len(case.start.traces) > 1:
-            i = [v.name for v in out].index(t.name)
-            out[i] = replace(out[i], shaded=spans)
+    parts = zip(case.confirmed.base_models, case.confirmed.models, case.confirmed.parts)
+    out = [_view(case, base, model, fold.held_out, 0, True) for base, model, fold in parts]
+    held = {view.name: k for k, view in enumerate(out)}
+    is_left_out = case.confirmed.parts[0].training is not None and len(case.start.traces) > 1
+    for k, trace in enumerate(case.start.traces):
+        spans = shaded(trace, k, samples) if case.verdict in ("missing_physics", "unexplained") else ()
+        if is_left_out and trace.name in held:
+            place = held[trace.name]
+            out[place] = replace(out[place], shaded=spans)
         else:
-            out.append(
-                RecordView(
-                    t.name,
-                    False,
-                    t.t,
-                    t.u,
-                    t.y,
-                    free_run(case.start.fit.model, t, k),
-                    free_run(case.model, t, k),
-                    spans,
-                )
-            )
+            out.append(replace(_view(case, case.start.fit.model, case.model, trace, k, False), shaded=spans))
     return out
+
+
+def _view(case: Case, base: Model, model: Model, trace: Trace, record: int, is_held_out: bool) -> RecordView:
+    """One recording beside the runs of both models, and of the second without each of the effects that are named."""
+    run = case.confirmed.measure.run
+    named = {name for name, _ in model.effects_of(record)}.intersection(case.told_effects)
+    without = {name: run(model.without_effect(name), trace, record) for name in case.told_effects if name in named}
+    runs = run(base, trace, record), run(model, trace, record)
+    return RecordView(trace.name, is_held_out, trace.t, trace.u, trace.y, *runs, without=without)
 
 
 def ladder(case: Case) -> Iterator[Rung]:
@@ -56,4 +55,5 @@ def ladder(case: Case) -> Iterator[Rung]:
                 chosen,
                 "" if candidate.name in BY_NAME else "differs between recordings",
                 candidate.fit.size,
+                case.start.fit.cost - candidate.fit.cost,
             )

@@ -18,6 +18,10 @@ class AsymmetricFriction(Friction):
         "the mean as frictionloss and damping, half the Coulomb difference as a constant torque "
         "(exact); a viscous difference, or one that grows with speed, step by step"
     )
+    apart = (
+        "acts only while it moves and turns with the direction; a bias_torque also shifts where the rudder rests, "
+        "which shows only under a spring or a hanging load"
+    )
     parameters = (
         Parameter("dF", "torque", "half the difference of Coulomb friction, up minus down", positive=False),
         Parameter("dB", "damping", "half the difference of viscous friction, up minus down", positive=False),

@@ -19,6 +19,10 @@ class Backlash(Transmission):
         "the joint gap, its limit a spring-damper (negative solref) that does not pull; the "
         "shares of inertia, damping and friction on the rocker"
     )
+    apart = (
+        "free travel at each reversal of torque, of a width that does not grow with the load; shaft_compliance "
+        "twists in proportion to it"
+    )
     parameters = (
         Parameter("gap", "position", "half-width of the play"),
         Parameter("rho", "ratio", "motor side's share of the inertia", lower=0.2, upper=0.9, absent=0.5),
@@ -29,6 +33,7 @@ class Backlash(Transmission):
         Parameter("zeta", "ratio", "contact's damping ratio", lower=0.05, upper=2.0, absent=0.2),
     )
     tries, tangible, is_play = 3, False, True
+    parts_damping = True
 
     def starts(self, scales):
         contact = min(120.0, 0.5 / scales.sample_time)

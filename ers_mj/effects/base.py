@@ -42,6 +42,7 @@ class Effect:
     sentence: ClassVar[str] = ""
     subsystem: ClassVar[str] = ""
     mjcf: ClassVar[str] = ""
+    apart: ClassVar[str] = ""  # what tells it from its neighbours, for the catalogue of docs/effects.md
     named: ClassVar[bool] = (
         # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see confounders.py)
         True
@@ -79,12 +80,14 @@ class Effect:
     follows_current: ClassVar[bool] = (
         False  # its law changes as fast as the current, or within a small angle: half the segment length
     )
+    parts_damping: ClassVar[bool] = False  # it tells the back-EMF's share of the damping from the mechanical one
     at_motor: ClassVar[bool] = (
         # its torque and memory are the motor's, at whose angle and speed they are taken where a play or a shaft parts
         # it from the rudder
         False
     )
     is_play: ClassVar[bool] = False  # a slack between motor and rudder, which a plant has once
+    holds_place: ClassVar[bool] = False  # it may stand in a baseline where others have a spring (see ``columns``)
     after_noise: ClassVar[bool] = False  # a sensor's converter or wire: it acts on what is read, noise and all
     holds: ClassVar[bool] = False  # a wire that brings an earlier reading again
     # letters of a position loop (position_loop/model.py) that it is told by, where a firmware closes one
@@ -137,6 +140,10 @@ class Effect:
         """
         return None
 
+    def columns(self, y: np.ndarray) -> np.ndarray:
+        """Torques (N, k) along the output y (N,) that one of each of its numbers makes, if it ``holds_place``."""
+        raise NotImplementedError
+
     def grown(self, name: str, p: np.ndarray, scales: Scales) -> list[np.ndarray]:
         """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of
         this one.
@@ -164,7 +171,7 @@ class Effect:
         return c
 
     def constants(self, p: np.ndarray, c: Coefficients) -> np.ndarray:
-        """What the compiled law receives as its ``p`` (at most 7 numbers)."""
+        """What the compiled law receives as its ``p`` (at most 11 numbers)."""
         return p
 
     def is_lawful(self, p: np.ndarray) -> bool:

@@ -11,6 +11,10 @@ class BiasTorque(Load):
     name = "bias_torque"
     sentence = "a constant torque of {tau_0} pushes the rudder to one side"
     mjcf = "an actuator of constant force on the rudder"
+    apart = (
+        "one constant torque; gravity changes along the travel, asymmetric_friction turns with the direction "
+        "(over Coulomb friction alone the two cannot be told apart)"
+    )
     parameters = (Parameter("tau_0", "torque", "constant torque, positive towards growing angle", positive=False),)
     sized = 1
 

@@ -20,6 +20,10 @@ class Cogging(Drive):
         "a passive dcmotor on the rudder's angle, or the motor's where that is a body of its own, its cogging of one"
         " pole behind a gear of 2 pi / period, and another for the second harmonic"
     )
+    apart = (
+        "returns with the angle with or without current, faster than a gear's ripple; a periodic_gust returns "
+        "with the clock"
+    )
     parameters = (
         Parameter("A", "torque", "amplitude, seen at the output", positive=False),
         Parameter("period", "position", "period, seen at the output"),
@@ -35,10 +39,11 @@ class Cogging(Drive):
 
     def starts(self, scales):
         travel = scales.high - scales.low
+        periods = [*(travel / order for order in ORDERS), *scales.finer_waves("torque", ORDERS[-1])]
         return [
-            np.array([0.2 * scales.acceleration, travel / order, 0.0, np.inf, np.inf])
-            for order in ORDERS
-            if travel / order <= scales.cog
+            np.array([0.2 * scales.acceleration, period, 0.0, np.inf, np.inf])
+            for period in periods
+            if period <= scales.cog
         ]
 
     def grown(self, name, p, scales):

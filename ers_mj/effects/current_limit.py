@@ -14,6 +14,10 @@ class CurrentLimit(Drive):
     name = "current_limit"
     sentence = "the drive limits its current: the motor gives no more than {tau_max} at the rudder"
     mjcf = "the forcerange of the motor (the saturation of a dcmotor); beyond it, set step by step by the load actuator"
+    apart = (
+        "clips torque, so it bites at starts and reversals where the back-EMF is small; a voltage limit bites on "
+        "the command alone"
+    )
     parameters = (
         Parameter("tau_max", "torque", "largest motor torque n K_t i at the output", absent=np.inf),
         Parameter(
@@ -28,6 +32,7 @@ class CurrentLimit(Drive):
     needs, follows_current = (("tau_max",),), True
     in_loop = ("most",)
     loop_sentence = "the servo limits its current: its motor gives {value} at most"
+    parts_damping = True
 
     def starts(self, scales):
         peak = scales.drive or 4.0 * scales.acceleration

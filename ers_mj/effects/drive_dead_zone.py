@@ -13,8 +13,12 @@ class DriveDeadZone(Drive):
     """
 
     name = "drive_dead_zone"
-    sentence = "the drive swallows commands up to {d}"
+    sentence = "the drive ignores commands up to {d}"
     mjcf = "none: the command is processed before it reaches ctrl"
+    apart = (
+        "takes its share by the sign of the command, where friction takes it by that of the speed: they part when the"
+        " rudder runs on against the command"
+    )
     parameters = (
         Parameter("d", "input", "half-width of the dead zone"),
         Parameter(

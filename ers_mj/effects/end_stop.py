@@ -11,6 +11,7 @@ class EndStop(Load):
     name = "end_stop"
     sentence = "the travel ends at a stop"
     mjcf = "the range of the absolute angle, its limit a spring-damper (negative solref) that does not pull"
+    apart = "stiff, at the end of the travel only; a cubic moment grows from the rest angle on"
     parameters = (
         Parameter("lower", "position", "lower stop", positive=False, absent=-np.inf, on_travel=True),
         Parameter("upper", "position", "upper stop", positive=False, absent=np.inf, on_travel=True),

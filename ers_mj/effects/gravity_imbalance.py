@@ -15,11 +15,15 @@ class GravityImbalance(Load):
     name = "gravity_imbalance"
     sentence = "gravity pulls at an off-centre mass: {g_s} sin(angle) + {g_c} cos(angle)"
     mjcf = "an off-axis point mass under gravity, every other part weightless; its inertia is taken from the rudder"
+    apart = (
+        "follows sine and cosine of the angle; over a narrow travel it is a bias_torque and a spring, and is told "
+        "as such"
+    )
     parameters = (
         Parameter("g_s", "torque", "m g l cos(phase)", positive=False),
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),
     )
-    sized, tries = 2, 3
+    sized, tries, holds_place = 2, 3, True
     is_weight = True
     redundant, curves = (
         1,
@@ -33,6 +37,12 @@ class GravityImbalance(Load):
         size, middle = 0.2 * scales.acceleration, 0.5 * (scales.low + scales.high)
         turns = middle + np.pi / 2 * np.array([0.0, 1.0, 0.5, -0.5])
         return [size * np.array([np.cos(turn), -np.sin(turn)]) for turn in turns]
+
+    def columns(self, y):
+        return -np.column_stack([np.sin(y), np.cos(y)])
+
+    def coefficients(self, p, c):
+        return c._replace(g_s=c.g_s + p[0], g_c=c.g_c + p[1])
 
     @law
     def torque(p, theta, w, j, t):

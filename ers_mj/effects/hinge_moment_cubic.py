@@ -19,6 +19,10 @@ class HingeMomentCubic(Load):
         "a cubic term in the stiffness polynomial; with x_p none: the ctrl of the load actuator is set step by step"
         " from the angle"
     )
+    apart = (
+        "bends the spring's line on both sides of the rest angle; gravity's bend follows from its size, an "
+        "end_stop's is sudden"
+    )
     parameters = (
         Parameter("k_3", "cubic", "torque per angle cubed", positive=False),
         Parameter("x_p", "position", "angle from the rest angle around which it grows more slowly", absent=np.inf),

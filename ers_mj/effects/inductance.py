@@ -15,6 +15,10 @@ class Inductance(Drive):
     name = "inductance"
     sentence = "the motor current lags by an extra {tau_L}, more winding inductance than the datasheet has"
     mjcf = "the inductance of the dcmotor; where it falls with the current it is set step by step"
+    apart = (
+        "delays torque only, by a first-order lag that the motion smooths; input_delay moves everything by one "
+        "time, sensor_lag delays the reading and not the motion"
+    )
     parameters = (
         # no sample tells a shorter one from none, and to simulate it takes as much longer as it is shorter
         Parameter("tau_L", "time", "electrical time constant beyond the baseline's", lower=2e-5),
@@ -29,6 +33,7 @@ class Inductance(Drive):
     absorbs = ("tau_e",)
     sized = 1
     tangible = False
+    parts_damping = True
 
     def starts(self, scales):
         return [np.array([times * scales.sample_time, np.inf]) for times in (2.0, 5.0)]

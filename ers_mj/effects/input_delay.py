@@ -11,6 +11,10 @@ class InputDelay(Drive):
     name = "input_delay"
     sentence = "the command reaches the motor {T_d} late"
     mjcf = "the delay of the motor actuator"
+    apart = (
+        "moves the whole response by one time; inductance rounds it, and a sensor's lag also shifts when sticking "
+        "is seen"
+    )
     parameters = (Parameter("T_d", "time", "dead time of the command"),)
     sized = 1
     tangible = False

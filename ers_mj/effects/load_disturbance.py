@@ -1,4 +1,4 @@
-"""A knock: a torque that comes once and goes again."""
+"""An impulse disturbance: a torque that comes once and goes again."""
 
 import math
 
@@ -19,8 +19,9 @@ class LoadDisturbance(Load):
     name = "load_disturbance"
     sentence = "in one recording a load of {A} acts from {t_0} for {width}"
     mjcf = "none: the ctrl of the load actuator is set step by step from the clock"
+    apart = "one impulse in one recording at one time; what returns with the angle or the clock is another effect"
     parameters = (
-        Parameter("A", "torque", "torque of the knock", positive=False, per_record=True),
+        Parameter("A", "torque", "torque of the impulse", positive=False, per_record=True),
         Parameter("t_0", "time", "when it begins", positive=False, per_record=True),
         Parameter("width", "time", "how long it lasts", lower=2 * EDGE, upper=10.0, absent=np.inf, per_record=True),
         Parameter("record", "count", "recording in which it acts, from 0", positive=False, fitted=False),

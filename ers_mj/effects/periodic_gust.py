@@ -18,6 +18,7 @@ class PeriodicGust(Load):
     name = "periodic_gust"
     sentence = "a load of amplitude {A} swings at {f}, whatever the drive does"
     mjcf = "none: the ctrl of the load actuator is set step by step from the clock"
+    apart = "returns with the clock whatever the rudder does; cogging and ripple return with the angle"
     parameters = (
         Parameter("A", "torque", "amplitude", positive=False),
         Parameter("f", "frequency", "frequency"),

@@ -11,7 +11,7 @@ ORDERS = (1, 1.5, 2, 3, 4, 6, 8)  # periods within the travel from which a fit i
 
 
 class PositionDependentFriction(Friction):
-    """F(theta) = F_c + dF exp(-((theta - place) / width)^2 / 2), a dent in the screw or a place worn smooth (dF < 0);
+    """F(theta) = F_c + dF exp(-((theta - place) / width)^2 / 2), a pitted place of a screw or one worn smooth (dF < 0);
     or F_c + dF sin(2 pi theta / period + phase), a screw that binds once a turn.
 
     Terms that are absent are infinite.
@@ -20,6 +20,10 @@ class PositionDependentFriction(Friction):
     name = "position_dependent_friction"
     sentence = "friction changes along the travel by {dF} (around {place}, within ±{width}; every {period})"
     mjcf = "none: frictionloss is set step by step from the angle"
+    apart = (
+        "returns at the same place in both directions and reverses with the motion; cogging and a cubic moment "
+        "keep their sign"
+    )
     parameters = (
         Parameter(
             "dF", "torque", "friction at the place minus friction elsewhere, or amplitude of the wave", positive=False
@@ -35,12 +39,13 @@ class PositionDependentFriction(Friction):
 
     def starts(self, scales):
         travel, size = scales.high - scales.low, 0.2 * scales.acceleration
-        dents = [
+        places = [
             np.array([size, scales.low + at * travel, width * travel, np.inf, np.inf])
             for width in (0.08, 0.25)
             for at in (0.51, 0.27, 0.74, 0.03, 0.96)
         ]
-        return dents + [np.array([size, np.inf, np.inf, travel / order, 0.0]) for order in ORDERS]
+        periods = [*(travel / order for order in ORDERS), *scales.finer_waves("friction", ORDERS[-1])]
+        return places + [np.array([size, np.inf, np.inf, period, 0.0]) for period in periods]
 
     def constants(self, p, c):
         if np.isfinite(p[1]) and np.isfinite(p[3]):

@@ -18,6 +18,7 @@ class QuadraticDrag(Friction):
         "a quadratic term in the damping polynomial; with n none: the ctrl of the load actuator is set step by step"
         " from the speed"
     )
+    apart = "shows at high speed only; inductance and a sagging supply brake by current, which rises at low speed too"
     parameters = (
         Parameter("c", "drag", "torque per speed squared, at 1 output unit/s"),
         Parameter("n", "ratio", "exponent of the speed, where it is not 2", lower=1.2, upper=4.0, absent=np.inf),

@@ -16,6 +16,7 @@ class RunningIn(Friction):
     named = False
     sentence = "friction that changes with the path travelled"
     mjcf = "none: frictionloss is set step by step from the path"
+    apart = "changes with the path travelled; thermal_drift changes with the current's heat"
     parameters = (
         Parameter(
             "change",

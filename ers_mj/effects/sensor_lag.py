@@ -15,6 +15,10 @@ class SensorLag(Sensor):
     name = "sensor_lag"
     sentence = "the sensor lags behind the output by a time constant of {T}"
     mjcf = "none: the reading is filtered after the simulation"
+    apart = (
+        "the reading creeps on after the rudder has stuck; input_delay and inductance make the motion late, and it"
+        " ends at once"
+    )
     parameters = (
         Parameter("T", "time", "time constant of the sensor"),
         Parameter("T_d", "time", "dead time of its reading", absent=np.inf),

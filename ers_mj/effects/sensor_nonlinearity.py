@@ -18,6 +18,9 @@ class SensorNonlinearity(Sensor):
     name = "sensor_nonlinearity"
     sentence = "the sensor errs along the travel (bend {bend}, twist {twist}, wave {A} every {period})"
     mjcf = "none: the reading is bent after the simulation"
+    apart = (
+        "errs at rest as in motion and in proportion to nothing but the place; a variable_ratio changes the dynamics"
+    )
     parameters = (
         Parameter("bend", "per_position", "error per angle squared", positive=False, absent=np.inf),
         Parameter("twist", "per_position_squared", "error per angle cubed", positive=False, absent=np.inf),
@@ -34,7 +37,8 @@ class SensorNonlinearity(Sensor):
         travel = scales.high - scales.low
         size = 0.01 * travel
         polynomial = [np.array([size / scales.position**2, size / scales.position**3, np.inf, np.inf, np.inf])]
-        return polynomial + [np.array([np.inf, np.inf, size, travel / order, 0.0]) for order in ORDERS]
+        periods = [*(travel / order for order in ORDERS), *scales.finer_waves("reading", ORDERS[-1])]
+        return polynomial + [np.array([np.inf, np.inf, size, period, 0.0]) for period in periods]
 
     def measure(self, p, t, y):
         bend, twist, amplitude, period, phase = p

@@ -22,6 +22,7 @@ class ShaftCompliance(Transmission):
         "stiffness (linear and cubic) and damping of the joint gap, without its limit; the shares of inertia, damping"
         " and friction on the rocker"
     )
+    apart = "a resonance, and a twist that grows with the torque from zero on; backlash has a slack of fixed width"
     parameters = (
         Parameter(
             "f_shaft", "frequency", "natural frequency of the shaft's spring", lower=2.0, upper=1000.0, absent=np.inf
@@ -40,6 +41,7 @@ class ShaftCompliance(Transmission):
     )
     needs = (("f_shaft",),)
     tries, tangible = 3, False
+    parts_damping = True
 
     def starts(self, scales):
         highest = 0.2 / scales.sample_time

@@ -17,6 +17,10 @@ class Stribeck(Friction):
     name = "stribeck"
     sentence = "friction at rest is {dF_s} higher than in motion and drops off around {v_s}"
     mjcf = "none: the law's exponent is free and it has no bristles as LuGre has; frictionloss is set step by step"
+    apart = (
+        "a jump when motion begins and at reversals; presliding bends before it slips, drive_dead_zone depends on the"
+        " command"
+    )
     parameters = (
         Parameter("dF_s", "torque", "static minus Coulomb friction"),
         Parameter("v_s", "speed", "Stribeck velocity"),

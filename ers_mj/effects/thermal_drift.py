@@ -26,6 +26,7 @@ class ThermalDrift(Drive):
         "none: the torque is set step by step (the thermal of a dcmotor knows heat in watts, which no recording of an"
         " angle tells)"
     )
+    apart = "changes over seconds of load and recovers; supply_sag follows the current at once"
     parameters = (
         Parameter(
             "rise",
@@ -40,6 +41,7 @@ class ThermalDrift(Drive):
     )
     needs = (("rise",),)
     sized, tries = 1, 2
+    parts_damping = True
 
     def starts(self, scales):
         return [np.array([0.4, max(part * scales.duration, SHORTEST), scales.input]) for part in (0.3, 1.5, 0.06)]

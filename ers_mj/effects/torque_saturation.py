@@ -14,6 +14,7 @@ class TorqueSaturation(Drive):
     named = False
     sentence = "a torque that is not in proportion to the current"
     mjcf = "none: the torque is set step by step from the current"
+    apart = "bends the torque over the current smoothly; a limit has an edge, a sag depends on the command too"
     parameters = (
         Parameter("fall", "ratio", "loss at the peak over what is left there", positive=False, lower=-0.9, upper=20.0),
         Parameter("u", "input", "largest input, 24 where it is not told", fitted=False, absent=24.0),

@@ -25,6 +25,10 @@ class TransmissionRipple(Transmission):
     name = "transmission_ripple"
     sentence = "the gear ratio swings by an amplitude of {ripple} of itself every {period} of the rudder's angle"
     mjcf = "none: the torque is set step by step from angle, speed and current"
+    apart = (
+        "returns with the angle, slower than a motor's poles; its ratio form grows with the motor's torque and "
+        "vanishes without current, which cogging does not"
+    )
     parameters = (
         Parameter("ripple", "ratio", "amplitude over the mean ratio", positive=False, lower=-0.9, upper=0.9),
         Parameter("period", "position", "period, seen at the output"),
@@ -53,6 +57,7 @@ class TransmissionRipple(Transmission):
 
     def starts(self, scales):
         periods = [(scales.high - scales.low) / order for order in ORDERS]
+        periods += scales.finer_waves("torque", ORDERS[-1])
         return [
             *(np.array([0.05, period, 0.0, np.inf, np.inf, np.inf]) for period in periods),
             *(

@@ -21,6 +21,7 @@ class UnevenDamping(Friction):
     named = False
     sentence = "damping that changes along the travel"
     mjcf = "none: the torque is set step by step from angle and speed"
+    apart = "grows with speed and depends on the place; position_dependent_friction does not grow with speed"
     parameters = (
         Parameter(
             "d_1",

@@ -19,6 +19,10 @@ class VariableRatio(Transmission):
         "the gear ratio changes along the travel: by {slope} times the angle from rest and {bend} times its square"
     )
     mjcf = "none: torque and inertia are set step by step; a rod on a rocker arm is the rudder system's own linkage"
+    apart = (
+        "scales torque, back-EMF and reflected inertia together along the travel; a bent sensor changes only what "
+        "is read"
+    )
     parameters = (
         Parameter("slope", "per_position", "relative change of the ratio per angle", positive=False),
         Parameter("bend", "per_position_squared", "relative change of the ratio per angle squared", positive=False),

@@ -15,6 +15,7 @@ class VoltageSaturation(Drive):
     name = "voltage_saturation"
     sentence = "the drive gives no more than {u_max}, whatever is commanded"
     mjcf = "the ctrlrange of the motor; a soft knee is put into the command before it reaches ctrl"
+    apart = "one level of the command above which nothing changes, at any speed; current_limit depends on speed"
     parameters = (
         Parameter("u_max", "input", "largest input that reaches the motor", absent=np.inf),
         Parameter(

@@ -78,11 +78,11 @@ def _run_in(model: Model, trace: Trace, record: int, rate: float) -> tuple[np.nd
             channel.kind == "current" and model.dead_time > 0
         ):  # before it is over it follows a command that was not recorded
             row[trace.t < trace.t[0] + model.dead_time] = 0.0
-    left = left.ravel()
-    left[trace.unseen] = 0.0
-    left.flags.writeable = False
-    trace.runs.keep(key, (left, motion))
-    return left, motion
+    flat = left.ravel()
+    flat[trace.unseen] = 0.0
+    flat.flags.writeable = False
+    trace.runs.keep(key, (flat, motion))
+    return flat, motion
 
 
 def cost_of(model: Model, traces: Sequence[Trace], rate: float, tau: float) -> float:
@@ -103,7 +103,7 @@ def begun(model: Model, traces: Sequence[Trace], rate: float) -> Run:
 
 
 def is_rough(traces: Sequence[Trace]) -> bool:
-    """Whether a converter is so coarse that C has dents wherever a threshold is passed a sample sooner or later."""
+    """Whether a converter is so coarse that C has a local minimum wherever a threshold is passed."""
     return any(trace.converter is not None for trace in traces)
 
 

@@ -90,7 +90,7 @@ def _found(begun: Search, settings: Settings, simulate: Simulator | None) -> tup
     fewer = again.rank < search.structure.rank
     search = replace(search, unknowns=replace(search.unknowns, reference=letters), structure=again)
     x = search.coordinates(letters)
-    if fewer and (settings.method == "ls" or settings.polish):  # what one coordinate too many had kept apart
+    if fewer and (settings.method == "ls" or settings.polish):  # what a coordinate that cannot be told had kept apart
         x, search, more = polished(search, x, math.inf, simulate)
         used += more
     return x, search, minimum, used

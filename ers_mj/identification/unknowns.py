@@ -12,7 +12,7 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 from ers_mj.errors import InputError
-from ers_mj.estimation.baseline import opening
+from ers_mj.estimation.search import opening
 from ers_mj.servo.datasheet import LUMPED, Datasheet, refuse_impossible
 from ers_mj.servo.model import BASE, Model
 

@@ -23,12 +23,16 @@ OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 def code_folder() -> Path:
     """`ers_mj/code` in the user's cache, or a fresh private one of this process where that is not safe."""
-    return _folder(os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache"))
+    return _folder(place())
+
+
+def place() -> Path:
+    """`ers_mj/code` in the user's cache, whether it is there or not."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ers_mj" / "code"
 
 
 @lru_cache
-def _folder(caches: str) -> Path:
-    folder = Path(caches) / "ers_mj" / "code"
+def _folder(folder: Path) -> Path:
     refused = refusal(folder)
     if not refused:
         return folder

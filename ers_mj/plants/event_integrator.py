@@ -26,14 +26,16 @@ from ers_mj.plants.events import (
     STOP,
     breakaway,
     locate,
+    state_after,
     switch,
     violation,
 )
-from ers_mj.plants.flow import flow
+from ers_mj.plants.flow import is_linear
 from ers_mj.plants.forces import derivative
 from ers_mj.plants.laws import remember
 from ers_mj.plants.maps import MAPS, no_maps, one_body_segment, two_body_segment
 from ers_mj.plants.modes import corrected, start_mode, start_state
+from ers_mj.plants.series import expand
 from ers_mj.plants.state import (
     READ,
     READ_BOOL,
@@ -94,23 +96,26 @@ OF_A_SAMPLE = types.NamedUniTuple(MAPS, 3, Maps)
 
 @inline
 def _smooth_step(c, t, x, m, drive, tau, a_emf, left, dt, h_max):
-    """(length, state after it) of a step within the mode, shortened where the speed turns twice within it."""
+    """(length, state after it, span of the expansion that holds it or 0) of a step within the mode, shortened where the
+    speed turns twice within it.
+    """
     h = left if m.s == 0 and c.two_body <= 0 else min(left, h_max)
-    z = flow(c, t, x, m, drive, tau, a_emf, h)
+    span = h if is_linear(c, m) and expand(c, x, m, drive, tau, a_emf, h) else 0.0
+    z = state_after(c, t, x, m, drive, tau, a_emf, span, h)
     while h > dt / 40 and turns(c, t, x, z, m, drive, tau, a_emf, h):
         h *= 0.25
-        z = flow(c, t, x, m, drive, tau, a_emf, h)
-    return h, z
+        z = state_after(c, t, x, m, drive, tau, a_emf, span, h)
+    return h, z, span
 
 
 @inline
-def _first_event(c, t, x, z, m, drive, tau, a_emf, h):
+def _first_event(c, t, x, z, m, drive, tau, a_emf, span, h):
     """(event, time after t, state then) of what happens first within h, which ends in z: -1 where nothing does."""
     first, event = h, -1
     for e in ORDER:
         g = violation(e, c, t + first, z, m)
         if g > (ROUNDING if e == CROSSING or e == STOP or e == CONTACT else 0.0):
-            first, z = locate(e, c, t, x, m, drive, tau, a_emf, first, g)
+            first, z = locate(e, c, t, x, m, drive, tau, a_emf, span, first, g)
             event = e
     return event, first, z
 
@@ -130,8 +135,8 @@ def advance(c, t, x, m, drive, tau, a_emf, dt, h_max, corner):
             x, m = switch(BREAKAWAY, c, t, x, m, corner)
     left, events = dt, 0
     while left > 1e-13 * dt:
-        h, z = _smooth_step(c, t, x, m, drive, tau, a_emf, left, dt, h_max)
-        event, first, z = _first_event(c, t, x, z, m, drive, tau, a_emf, h)
+        h, z, span = _smooth_step(c, t, x, m, drive, tau, a_emf, left, dt, h_max)
+        event, first, z = _first_event(c, t, x, z, m, drive, tau, a_emf, span, h)
         if event < 0:
             x = z
         else:

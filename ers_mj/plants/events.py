@@ -7,6 +7,7 @@ import numpy as np
 from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.flow import flow
 from ers_mj.plants.forces import bristle_level, held_motor, held_rudder, motor_friction
+from ers_mj.plants.series import expanded
 from ers_mj.plants.state import C, F, M, Mode, N, State, X, has_bristle, never_sticks, types
 
 # events, speeds first: between their zeros angles are monotone, so that later events have one root
@@ -174,7 +175,15 @@ def switch(e, c, t, x, m, corner):
 
 
 @inline
-def _narrow(e, c, t, x, m, drive, tau, a_emf, dt):
+def state_after(c, t, x, m, drive, tau, a_emf, span, h):
+    """The state h after x: of the expansion over ``span`` from there, where there is one."""
+    if span > 0.0:
+        return expanded(c, drive, tau, a_emf, h / span)
+    return flow(c, t, x, m, drive, tau, a_emf, h)
+
+
+@inline
+def _narrow(e, c, t, x, m, drive, tau, a_emf, span, dt):
     """(where event function e is negative within dt, its value there), 0 and one not below 0 where it is nowhere.
 
     A body that has just been released starts on the root that it left; the search then begins where it moves.
@@ -186,24 +195,26 @@ def _narrow(e, c, t, x, m, drive, tau, a_emf, dt):
         of_bristle = has_bristle(c) and (e == CROSSING or e == MOTOR_BREAKAWAY)
         if not (is_speed or of_bristle) or low < dt / 200:
             return 0.0, g_low
-        z = flow(c, t, x, m, drive, tau, a_emf, low)
+        z = state_after(c, t, x, m, drive, tau, a_emf, span, low)
         g_low = violation(e, c, t + low, z, m)
     return low, g_low
 
 
-@unit(types.Tuple((F, X))(N, C, F, X, M, F, F, F, F, F))
-def locate(e, c, t, x, m, drive, tau, a_emf, dt, g_end):
-    """First instant in (0, dt] where event function e vanishes (Illinois method on the flow), and the state there."""
-    low, g_low = _narrow(e, c, t, x, m, drive, tau, a_emf, dt)
+@unit(types.Tuple((F, X))(N, C, F, X, M, F, F, F, F, F, F))
+def locate(e, c, t, x, m, drive, tau, a_emf, span, dt, g_end):
+    """First instant in (0, dt] where event function e vanishes (Illinois method on the flow), and the state there, just
+    beyond: short of it a contact would be lost again as soon as it is made.
+    """
+    low, g_low = _narrow(e, c, t, x, m, drive, tau, a_emf, span, dt)
     if g_low >= 0.0:
         return 0.0, x
     high, g_high, side = dt, g_end, 0
     for _ in range(60):
         at = high - g_high * (high - low) / (g_high - g_low)
-        z = flow(c, t, x, m, drive, tau, a_emf, at)
+        z = state_after(c, t, x, m, drive, tau, a_emf, span, at)
         g = violation(e, c, t + at, z, m)
-        if abs(g) <= 1e-11 * abs(g_end) or high - low < 1e-14:
-            break
+        if 0.0 <= g <= 1e-11 * g_end:
+            return at, z
         if g > 0:
             high, g_high = at, g
             if side == 1:
@@ -214,4 +225,6 @@ def locate(e, c, t, x, m, drive, tau, a_emf, dt, g_end):
             if side == -1:
                 g_high *= 0.5
             side = -1
-    return at, z
+        if high - low < 1e-14:
+            break
+    return high, state_after(c, t, x, m, drive, tau, a_emf, span, high)

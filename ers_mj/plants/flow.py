@@ -53,7 +53,7 @@ def _of_rudder(c, m, f, k):
 
 
 @inline
-def _balance(c, m, f, r):
+def balance(c, m, f, r):
     """The linear balance of a mode under constant forces f on the rudder and r on the motor beside its own."""
     a_1 = a_2 = force = a_2m = force_m = k = d = 0.0
     if c.two_body > 0 and m.twist != 0:
@@ -67,7 +67,7 @@ def _balance(c, m, f, r):
 
 
 @inline
-def _steps_of(c, b, tau, a_emf, dt):
+def steps_of(c, b, tau, a_emf, dt):
     """Steps of about one time constant that dt takes."""
     rate = abs(b.a_2) + math.sqrt(abs(b.a_1)) + (math.sqrt(abs(a_emf) / tau) if tau > 0 else a_emf)
     if is_parted(c):
@@ -78,7 +78,7 @@ def _steps_of(c, b, tau, a_emf, dt):
 
 
 @inline
-def _next_term(c, m, b, v, drive, tau, a_emf, q, first):
+def next_term(c, m, b, v, drive, tau, a_emf, q, first):
     """The term of a Taylor series after v, over a step of which q is the share; ``first`` weighs what is constant."""
     two, bristle = is_parted(c), has_bristle(c)
     speed = v.w_m if two else v.w
@@ -106,7 +106,7 @@ def _next_term(c, m, b, v, drive, tau, a_emf, q, first):
 
 
 @inline
-def _is_small(v, x):
+def is_small(v, x):
     """Whether a term no longer moves a sum."""
     return abs(v.w) <= 1e-15 * abs(x.w) and abs(v.j) <= 1e-15 * abs(x.j) and abs(v.w_m) <= 1e-15 * abs(x.w_m)
 
@@ -118,15 +118,15 @@ def linear(c, x, m, drive, tau, a_emf, dt, scale, f, r):
     ``scale`` 1 includes the constant forces, f on the rudder and r on the motor among them, 0 leaves them and the drive
     out (the homogeneous flow).
     """
-    b = _balance(c, m, f, r)
-    n = _steps_of(c, b, tau, a_emf, dt)
+    b = balance(c, m, f, r)
+    n = steps_of(c, b, tau, a_emf, dt)
     h = dt / n
     for _ in range(n):
         v = x
         for k in range(1, 40):
-            v = _next_term(c, m, b, v, drive, tau, a_emf, h / k, scale if k == 1 else 0.0)
+            v = next_term(c, m, b, v, drive, tau, a_emf, h / k, scale if k == 1 else 0.0)
             x = State(x.theta + v.theta, x.w + v.w, x.j + v.j, x.theta_m + v.theta_m, x.w_m + v.w_m)
-            if k > 2 and _is_small(v, x):
+            if k > 2 and is_small(v, x):
                 break
     if tau <= 0:
         return State(x.theta, x.w, scale * drive - a_emf * (x.w_m if is_parted(c) else x.w), x.theta_m, x.w_m)
@@ -198,12 +198,18 @@ def _driven(c, t, x, m, drive, tau, a_emf, dt):
     return linear(c, x, m, drive, tau, a_emf, dt, 1.0, f, r)
 
 
+@inline
+def is_linear(c, m):
+    """Whether neither laws nor what bends or hardens act within the mode."""
+    return not bends(c, m) and c.harden <= 0 and (c.lawful == 0 or (m.s == 0 and c.two_body <= 0))
+
+
 @unit(X(C, F, X, M, F, F, F, F))
 def flow(c, t, x, m, drive, tau, a_emf, dt):
     """The state dt later within the mode; NaN of a motion that runs away, since a shaft that hardens gets the stiffer
     the further it is twisted.
     """
-    if not bends(c, m) and c.harden <= 0 and (c.lawful == 0 or (m.s == 0 and c.two_body <= 0)):
+    if is_linear(c, m):
         return linear(c, x, m, drive, tau, a_emf, dt, 1.0, 0.0, 0.0)
     if is_parted(c) and c.harden <= 0:
         return _driven(c, t, x, m, drive, tau, a_emf, dt)

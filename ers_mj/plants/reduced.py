@@ -52,8 +52,9 @@ def lowered(c: Coefficients, effects: Sequence[tuple[str, np.ndarray]]) -> tuple
     """What laws.laid_out takes of a plant with these effects: coefficients, the laws that are on, their constants."""
     given = {}
     for name, values in effects:
+        c = BY_NAME[name].coefficients(values, c)
+    for name, values in effects:
         effect = BY_NAME[name]
-        c = effect.coefficients(values, c)
         if (effect.torque or effect.friction or effect.inertia or effect.memory) and effect.is_lawful(values):
             given[name] = effect.constants(values, c)
     on = acting(tuple(given), c.has_motor_side)
@@ -219,11 +220,12 @@ class ReducedModel:
     @property
     def has_tangents(self) -> bool:
         """Whether ``tangents`` can tell how the output changes: of one body, on a bristle or not, that meets no stop,
-        read by a sensor of a smooth law.
+        creeps nowhere, read by a sensor of a smooth law.
         """
         c = Coefficients(*self._lowered[0])
         return (
             not self.has_motor_side
+            and c.creep == 0.0
             and c.lower == -np.inf
             and c.upper == np.inf
             and all(BY_NAME[name].tangible for name, _ in self.effects if _touches_sensor(name))

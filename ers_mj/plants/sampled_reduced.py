@@ -11,7 +11,7 @@ from ers_mj.plants import fixed_steps
 from ers_mj.plants.compiled import kernel
 from ers_mj.plants.cuts import corner_speed, cut, longest_step
 from ers_mj.plants.event_integrator import advance
-from ers_mj.plants.laws import laid_out, remember
+from ers_mj.plants.laws import MEMORY, laid_out, remember
 from ers_mj.plants.modes import start_mode, start_state
 from ers_mj.plants.reduced import ReducedModel
 from ers_mj.plants.state import MODES, PLANT, VECTOR, F, Mode, N, State, is_bounded, plant_in, types
@@ -78,6 +78,25 @@ class SampledReduced:
             fixed_steps.begin(self._plant, self._x)
         else:
             begin(self._plant, self._x, self._mode)
+
+    @property
+    def state(self) -> np.ndarray:
+        """All that tells what comes (n,): motion, mode, laws' memories, what was sent, samples gone by."""
+        return np.concatenate([self._x, self._mode, self._memories, self._sent, [self._samples]])
+
+    @state.setter
+    def state(self, packed: np.ndarray) -> None:
+        ends = np.cumsum([self._x.size, self._mode.size, self._memories.size, len(self._sent)])
+        self._x, mode, memories, sent, samples = np.split(np.array(packed, float), ends)
+        self._mode = np.rint(mode).astype(np.int64)
+        plant = self._plant.view(PLANT)[0]
+        plant.laws["constants"][plant.memory_of[: plant.memories].astype(int), MEMORY] = memories
+        self._sent, self._samples = sent.tolist(), round(float(samples[0]))
+
+    @property
+    def _memories(self) -> np.ndarray:
+        plant = self._plant.view(PLANT)[0]
+        return plant.laws["constants"][plant.memory_of[: plant.memories].astype(int), MEMORY].copy()
 
     @property
     def theta(self) -> float:

@@ -7,11 +7,14 @@ from __future__ import annotations
 import math
 
 import mujoco
+import numpy as np
 
 from ers_mj.plants.mjcf import read_mjcf
 
 PREFIX = "stage_"
+MASS = "imbalance"  # body off the shaft on which gravity pulls, written by its effect
 CAMERAS = (f"{PREFIX}side", "side")  # put here, or the model's own
+ARM_FLOOR = -0.09  # [m] by which the floor lies lower under an arm, which may hang down
 REACH = 0.11  # [m] to either side of the shaft: what the camera of scene.xml sees, with room for a carriage
 STOP_RADIUS, STOP_OFFSET = 0.0328, 0.027  # [m] of the levers' stop about the shaft, and along it
 STEEL, WHITE, BLUE, RED = (0.45, 0.47, 0.50, 1), (0.82, 0.83, 0.82, 1), (0.17, 0.38, 0.68, 1), (0.80, 0.18, 0.14, 1)
@@ -33,13 +36,26 @@ def staged(spec: mujoco.MjSpec, reach: float = 1.0) -> mujoco.MjModel:
     scale = reach / REACH if is_slide else 1.0
     if all(geom.type != mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.geoms):
         _surround(spec, scale)
-    if "motor" in names:
+    rig = rig_of(spec)
+    if rig == "rudder":
         _place_stop(spec, "lever_up" in names)
-    elif is_slide:
+    elif rig == "carriage":
         _shape_slide(spec, scale)
+    elif rig == "arm":
+        _shape_arm(spec)
     else:
         _shape_blade(spec)
     return spec.compile()
+
+
+def rig_of(spec: mujoco.MjSpec) -> str:
+    """What a plant is drawn as: the rudder system, an arm under gravity, the carriage of a sliding output, a blade."""
+    names = {body.name for body in spec.bodies}
+    if "motor" in names:
+        return "rudder"
+    if spec.joint("rocker").type == mujoco.mjtJoint.mjJNT_SLIDE:
+        return "carriage"
+    return "arm" if MASS in names else "blade"
 
 
 def _surround(spec: mujoco.MjSpec, scale: float) -> None:
@@ -86,6 +102,25 @@ def _shape_blade(spec: mujoco.MjSpec) -> None:
     _add(rudder, box, (0.030, 0.004, 0.0075), (0, 0.066, 0), BLUE)
     _add(rudder, box, (0.075, 0.090, 0.003), (0.035, 0.160, 0), WHITE)
     _add(rudder, box, (0.010, 0.090, 0.0014), (0.118, 0.160, 0), RED)
+
+
+def _shape_arm(spec: mujoco.MjSpec) -> None:
+    """A lumped angle under gravity: an arm on a servo's shaft, a weight at its end, on the side of the mass."""
+    box, rod = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
+    along = [math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0]  # z onto the shaft
+    x, _, z = spec.body(MASS).pos
+    length = math.hypot(x, z)
+    x, z = (x / length, z / length) if length > 0 else (1.0, 0.0)
+    turned = [math.cos(0.5 * math.atan2(-z, x)), 0.0, math.sin(0.5 * math.atan2(-z, x)), 0.0]  # x onto the arm
+    for floor in spec.geoms:
+        if floor.type == mujoco.mjtGeom.mjGEOM_PLANE:
+            floor.pos = floor.pos + np.array([0.0, 0.0, ARM_FLOOR])
+    rudder = _bare(spec, "rudder")
+    _add(spec.worldbody, box, (0.024, 0.020, 0.014), (0, 0.034, 0), BLUE)
+    _add(spec.worldbody, box, (0.010, 0.010, 0.065), (0, 0.034, -0.078), WHITE)
+    _add(rudder, rod, (0.006, 0.016, 0), (0, 0.002, 0), STEEL, along)
+    _add(rudder, box, (0.046, 0.004, 0.006), (0.040 * x, -0.010, 0.040 * z), WHITE, turned)
+    _add(rudder, rod, (0.015, 0.010, 0), (0.086 * x, -0.010, 0.086 * z), RED, along)
 
 
 def _shape_slide(spec: mujoco.MjSpec, scale: float) -> None:

@@ -26,7 +26,8 @@ from ers_mj.effects.base import Coefficients
 from ers_mj.plants.compiled import inline, record_in
 
 MOST_LAWS = 40  # effects that act by laws at once
-N_CONSTANTS = 7  # of a law at most
+N_CONSTANTS = 11  # of a law at most
+MOST_PIECES, MOST_TERMS = 4, 40  # of an expansion of the flow in time
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
 
 
@@ -71,6 +72,9 @@ LAW = _record(
 PLANT = _record(
     [
         *((letter, np.float64) for letter in Coefficients._fields),
+        ("pieces", np.int64),  # of the expansion at hand, the count of terms and the terms of each (see series)
+        ("counts", np.int64, (MOST_PIECES,)),
+        ("terms", np.float64, (MOST_PIECES * MOST_TERMS * 5,)),
         ("lawful", np.int64),  # laws that add to the forces
         *((count, np.int64) for count in COUNTED.values()),  # numbers of laws, where their code lies, whose it is
         *((f"{kind}_at", np.int64, (MOST_LAWS,)) for kind in COUNTED),

@@ -12,6 +12,8 @@ from ers_mj.position_loop.runs import Run
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import kernel_effects
 
+MUJOCO_STEP = 2.5e-4  # [s]
+
 
 def model_of(datasheet: Datasheet) -> LoopModel:
     """The servo of a model.toml with a [loop].
@@ -23,6 +25,13 @@ def model_of(datasheet: Datasheet) -> LoopModel:
         raise InputError(f"{datasheet.name}: has no [loop], a model of a position command was expected")
     lumped = {k: v for k, v in datasheet.lumped.items() if k in LETTERS}
     return LoopModel({**lumped, **datasheet.loop}, (), kernel_effects(datasheet.effects), datasheet.loop_sensor)
+
+
+def looped_plant(datasheet: Datasheet, is_angle: bool = True) -> LoopedPlant:
+    """The servo in MuJoCo, its loop around one joint of inertia 1."""
+    model, still = model_of(datasheet), np.zeros(2)
+    run = Run("still", np.array([0.0, 1.0]), still, still, still > 0, still < 1, 1.0, 0.0, (0.0, 0.0), 0.0)
+    return LoopedPlant(MechanicalPlant(*model.plant_of(run), is_angle=is_angle, timestep=MUJOCO_STEP), model.of(run)[0])
 
 
 def simulate_loop(
@@ -39,8 +48,7 @@ def simulate_loop(
     model, still = model_of(datasheet), np.ones(t.size, bool)
     run = Run("simulated", t - t[0], np.ascontiguousarray(r, float), r, still, still, 1.0, 0.0, (r[0], 0.0), r[0])
     if plant == "mujoco":
-        looped = LoopedPlant(MechanicalPlant(*model.plant_of(run), timestep=2.5e-4), model.of(run)[0])
-        theta = looped.simulate(run.t, run.r, run.start, run.before)
+        theta = looped_plant(datasheet).simulate(run.t, run.r, run.start, run.before)
     else:
         theta = model.predicted(run)
     theta = theta + noise * np.random.default_rng(seed).standard_normal(t.size)

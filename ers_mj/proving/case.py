@@ -44,7 +44,7 @@ class Plan:
 
 
 def plans(count: int, seed: int) -> list[Plan]:
-    """Kinds in their shares, in random order; singles and outsiders go through their lists in random order."""
+    """Kinds in their shares, singles and laws outside the library through their lists, all in random order."""
     rng = np.random.default_rng([seed, 0])
     kinds = [str(kind) for kind in rng.permutation([kind for kind, k in shares(count).items() for _ in range(k)])]
     lists = {"single": _cycle(rng, LISTED, count), "outside": _cycle(rng, OUTSIDE, count)}

@@ -34,7 +34,7 @@ LATE = {
     "throttle": (0.02, 0.1),
     "sts3215": (0.02, 0.1),
 }  # [s] delay or lag, a few samples and more
-UNTOUCHED = "untouched"  # the kind of a case that is a rig as it is: what is named there is no false alarm
+UNTOUCHED = "untouched"  # the kind of a case that is a rig as it is: what is named there is no false positive
 ALSO = ("torque_enable", "vin_V", "pulse_V")  # columns handed on as they are
 
 

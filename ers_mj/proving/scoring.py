@@ -180,7 +180,7 @@ def _costs(rows: Sequence[Mapping], several: Sequence[Mapping]) -> dict:
 
 
 def _several(rows: Iterable[Mapping]) -> tuple[int, int, int]:
-    """(concealed, of these named by class, names too many); a class named twice is found once."""
+    """(concealed, of these named by class, false positives); a class named twice is found once."""
     concealed = found = spurious = 0
     for row in rows:
         truth, named = Counter(map(class_of, row["labels"])), Counter(map(class_of, row["named"]))
@@ -201,7 +201,7 @@ def _hits(row: Mapping) -> list[tuple[float, bool]]:
 
 
 def confusion(rows: Iterable[Mapping]) -> dict[str, dict[str, int]]:
-    """{truth: {named: count}}: singles by label, nulls as `nothing`, outsiders as `outside`, several joined by +."""
+    """{truth: {named: count}}: singles by label, what is none of the library's as `outside`, several joined by +."""
     table: dict[str, Counter] = {}
     for row in rows:
         truth = {"null": NOTHING, OUTSIDE: OUTSIDE}.get(row["kind"]) or "+".join(sorted(row["labels"]))

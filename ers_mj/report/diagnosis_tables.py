@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from ers_mj.diagnosis.evidence import Evidence, Rung
-from ers_mj.report import diagnosis_figures, page
+from ers_mj.report import charts, page
+from ers_mj.report.diagnosis_charts import MOST_RUNGS, rung_name
 from ers_mj.report.display import NONE, Unit, figure, interval, missing, shown
 
 FITS = (
@@ -23,24 +24,21 @@ FITS = (
 )
 
 
-def candidates(document: Mapping, evidence: Evidence, unit: Unit) -> str:
+def candidates(evidence: Evidence, unit: Unit) -> str:
     """The section of everything that was tried, as a figure and as a table, errors in this unit."""
     if not evidence.ladder:
         return ""
-    baseline = next((r.heldout_rmse for r in evidence.ladder if not r.effects), None)
-    baseline = (document.get("fit") or {}).get("heldout_rmse_before_rad") if baseline is None else baseline
-    drawn = page.figure(
-        diagnosis_figures.ladder(evidence.ladder, evidence, baseline),
-        'The <span class="b">orange line</span> is the model before, the dashed one the noise floor; what was '
-        '<span class="a">chosen</span> is green.',
+    drawn = charts.place(
+        "ladder", "the candidates and what each takes off the cost; the same stands in the table below"
     )
     heads = ["candidate", f">held-out error [{page.text(unit.label)}]", ">gain", ">z", ">numbers", "note"]
     table = page.table(heads, [(_rung(rung, unit), "chosen" if rung.chosen else "") for rung in evidence.ladder])
-    if len(evidence.ladder) > diagnosis_figures.MOST_RUNGS:
+    if len(evidence.ladder) > MOST_RUNGS:
         table = f"<details><summary>All {len(evidence.ladder)} candidates as a table</summary>{table}</details>"
     lead = (
-        "Every candidate was fitted in simulation; gain is what it takes off the training cost, z how surely, paired by"
-        " blocks of time, numbers how many it adds."
+        "Every candidate was fitted in simulation. The chart shows by how much it lowers the baseline’s robust cost; in"
+        " the table gain is the same against its round’s, z how surely, paired by blocks of time, numbers how many it"
+        " adds."
     )
     return page.section("The candidates", lead, drawn + table)
 
@@ -49,7 +47,7 @@ def _rung(rung: Rung, unit: Unit) -> tuple[str, ...]:
     gain = NONE if missing(rung.gain) else figure(rung.gain)
     z = NONE if missing(rung.z) else f"{rung.z:.1f}".replace("-", "−")
     return (
-        page.text(diagnosis_figures.rung_name(rung)),
+        page.text(rung_name(rung)),
         unit.bare(rung.heldout_rmse),
         gain,
         z,
@@ -62,7 +60,7 @@ def trail(document: Mapping) -> str:
     """The section of what the selection did, move by move."""
     rows = [(_move(move), "chosen" if move.get("accepted") else "") for move in document.get("trail") or ()]
     table = page.table(["move", "before", "after", ">gain", "because"], rows)
-    lead = "What was compared round by round, what was accepted and why; gain is what it takes off the training cost."
+    lead = "What was compared round by round, what was accepted and why; gain is how much it lowers the robust cost."
     return page.section("How it was decided", lead, table)
 
 

@@ -1,4 +1,4 @@
-"""What the figures of all pages share: inline SVG at two widths, room for labels, curves thinned to what can be seen.
+"""What the figures of all pages share: inline SVG at two widths, room for labels, axes and ticks.
 
 draw(width) -> Figure, once wide and once narrow for a phone -> SVG text in the page
 """
@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable, Sequence
 
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -61,45 +60,6 @@ def margins(figure: Figure, top: float = 0.1) -> None:
     )
     for ax in figure.axes:
         ax.yaxis.set_label_coords(-0.62 / (width - 0.92), 0.5)
-
-
-def rect(figure: Figure, left: float, bottom: float, right: float, top: float) -> tuple[float, float, float, float]:
-    """Where axes lie in a figure, from distances in inches to its left and lower edge; a negative ``right`` or ``top``
-    to the opposite one.
-    """
-    width, height = figure.get_size_inches()
-    right, top = right if right > 0 else width + right, top if top > 0 else height + top
-    return left / width, bottom / height, (right - left) / width, (top - bottom) / height
-
-
-def decimate(t: np.ndarray, x: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """t and x (N,) thinned to the lowest and the highest value of each of points/2 spans; a span of NaN stays a
-    hole.
-    """
-    bins = points // 2
-    if t.size <= points:
-        return t, x
-    edges = np.linspace(0, t.size, bins + 1).astype(int)
-    starts = edges[:-1]
-    low = np.minimum.reduceat(np.where(np.isfinite(x), x, np.inf), starts)
-    high = np.maximum.reduceat(np.where(np.isfinite(x), x, -np.inf), starts)
-    empty = ~np.isfinite(low)
-    rising = x[edges[1:] - 1] >= x[starts]
-    first, second = np.where(rising, low, high), np.where(rising, high, low)
-    first[empty], second[empty] = np.nan, np.nan
-    middle = t[(edges[:-1] + edges[1:] - 1) // 2]
-    return np.column_stack([t[starts], middle]).ravel(), np.column_stack([first, second]).ravel()
-
-
-def largest(x: np.ndarray) -> float:
-    """The largest size in x, 0 where nothing is known."""
-    return float(np.nanmax(np.abs(x))) if np.isfinite(x).any() else 0.0
-
-
-def label_aside(ax: Axes) -> None:
-    """The label of the vertical axis at the same distance from it whatever the numbers between them."""
-    width = ax.figure.get_size_inches()[0]
-    ax.yaxis.set_label_coords(-0.62 / (ax.get_position().width * width), 0.5)
 
 
 def plain_ticks(ax: Axes, ticks: Sequence[float]) -> None:

@@ -15,8 +15,9 @@ from ers_mj.data.prepared import Trace
 from ers_mj.identification.answer import Identified
 from ers_mj.identification.precision import Profile
 from ers_mj.report.display import SUPERSCRIPT, shown
-from ers_mj.report.drawing import both_widths, decimate, margins
+from ers_mj.report.drawing import both_widths, margins
 from ers_mj.report.style import STYLE
+from ers_mj.report.thinning import decimate
 
 POINTS = {True: 900, False: 450}
 SHADES = (STYLE.after, STYLE.before, "#1d4f91", "#8a6bb8", "#a83a1e", "#4c8c2b", "#5b6b7b")

@@ -5,6 +5,7 @@ bars.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -15,23 +16,27 @@ from ers_mj.report.display import figure as digits
 Row = tuple[Sequence[str], str]  # cells as html, class
 
 
-def frame(title: str, kind: str, body: str) -> str:
-    """The whole page as HTML: no script, no font, no address outside it."""
-    style = files("ers_mj.report").joinpath("report.css").read_text(encoding="utf-8")
+def frame(
+    title: str, kind: str, body: str, styles: Sequence[str] = ("report.css",), head: str = "", foot: str = ""
+) -> str:
+    """The whole page as HTML: no font, no address outside it, no script but what `foot` brings."""
+    style = "".join(files("ers_mj.report").joinpath(name).read_text(encoding="utf-8") for name in styles)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n{head}'
         f"<title>{text(title)}</title>\n<style>\n{style}</style>\n</head>\n"
-        f'<body>\n<main class="{text(kind)}">\n{body}\n</main>\n</body>\n</html>\n'
+        f'<body>\n<main class="{text(kind)}">\n{body}\n</main>\n{foot}</body>\n</html>\n'
     )
 
 
-def header(kind: str, verdict: str, small: str, sentence: object, tiles: Iterable[tuple[str, str]]) -> str:
-    """What a page begins with: a verdict, a sentence, and tiles of (label, value) as html."""
+def header(
+    kind: str, verdict: str, small: str, sentence: object, tiles: Iterable[tuple[str, str]], below: str = ""
+) -> str:
+    """What a page begins with: a verdict, a sentence, tiles of (label, value) as html, and what stands below them."""
     cells = "".join(f'<div class="tile"><span>{label}</span><b>{value}</b></div>' for label, value in tiles)
     return (
         f'<header class="{text(kind)}">\n<p class="verdict">{text(verdict)}<small>{text(small)}</small></p>\n'
-        f'<h1>{text(sentence)}</h1>\n<div class="tiles">{cells}</div>\n</header>'
+        f'<h1>{text(sentence)}</h1>\n<div class="tiles">{cells}</div>\n{below}</header>'
     )
 
 
@@ -69,20 +74,38 @@ def named(name: object) -> str:
 
 
 def section(title: str, lead: str, content: str, kind: str = "") -> str:
-    """A section, nothing where it has no content."""
+    """A section, nothing where it has no content; its id is its title in lower case."""
     if not content:
         return ""
     lead = f'<p class="lead">{lead}</p>' if lead else ""
-    return f'<section class="{kind}">\n<h2>{title}</h2>\n{lead}\n{content}\n</section>'
+    mark = "-".join(re.findall(r"\w+", title.lower()))
+    return f'<section id="{mark}" class="{kind}">\n<h2>{title}</h2>\n{lead}\n{content}\n</section>'
+
+
+def contents(body: str) -> str:
+    """Links to the sections of a page."""
+    found = re.findall(r'<section id="([^"]+)"[^>]*>\n<h2>(.*?)</h2>', body)
+    items = "\n".join(f'<li><a href="#{mark}">{title}</a></li>' for mark, title in found)
+    return f'<nav aria-label="Contents"><ol>\n{items}\n</ol></nav>' if items else ""
 
 
 def table(heads: Sequence[str], rows: Iterable[Row]) -> str:
-    """A table in its own scrolling box; heads that begin with > stand on the right, as their cells do."""
-    right = [head.startswith(">") for head in heads]
-    mark = [' class="n"' if side else "" for side in right]
-    head = "".join(f"<th{m}>{h.lstrip('>')}</th>" for h, m in zip(heads, mark, strict=True))
+    """A table in its own scrolling box; heads that begin with > stand on the right, as their cells do. On a phone each
+    row stands for itself, its cells under their heads.
+    """
+    right = ["n" if head.startswith(">") else "" for head in heads]
+    names = [head.lstrip(">") for head in heads]
+    head = "".join(
+        f'<th class="{side}">{name}</th>' if name else "<td></td>" for name, side in zip(names, right, strict=True)
+    )
+
+    def one(cell: str, name: str, side: str) -> str:
+        kind = f"{side} none" if cell == NONE else side
+        label = f' data-label="{name}"' if name else ""
+        return f'<td class="{kind}"{label}>{cell}</td>'
+
     lines = [
-        f'<tr class="{kind}">' + "".join(f"<td{m}>{cell}</td>" for cell, m in zip(cells, mark, strict=True)) + "</tr>"
+        f'<tr class="{kind}">{"".join(one(*cell) for cell in zip(cells, names, right, strict=True))}</tr>'
         for cells, kind in rows
     ]
     body = "\n".join(lines)

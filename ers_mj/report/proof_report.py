@@ -18,7 +18,7 @@ TOLD = {
     "false_alarm_rate": "null cases with a named effect",
     "pair_recall": "effects found, of several at once",
     "pair_recall_visible": "of these visible from 1 sigma on by themselves",
-    "pair_spurious": "names too many, for an effect of several",
+    "pair_spurious": "false positives, for an effect of several",
     "unexplained_recall": "effects outside the library flagged",
     "false_flag_rate": "all others flagged",
     "subsystem_recall": "single effects with the right subsystem first",
@@ -43,7 +43,7 @@ def headline(results: Mapping) -> str:
     k, n = results["of"].get("top1_class", (0, 0))
     null, nulls = results["of"].get("false_alarm_rate", (0, 0))
     parts = [f"{k} of {n} concealed single effects are named right by class"] if n else []
-    parts += [f"{null} of {nulls} null cases raise a false alarm"] if nulls else []
+    parts += [f"{null} of {nulls} cases that hide nothing raise a false positive"] if nulls else []
     return ("; ".join(parts) or f"{results['cases']} cases were diagnosed") + "."
 
 
@@ -107,7 +107,7 @@ def _tiles(results: Mapping) -> list[tuple[str, str]]:
     tiles = []
     for name, label in (
         ("top1_class", "named right"),
-        ("false_alarm_rate", "false alarms"),
+        ("false_alarm_rate", "false positives"),
         ("unexplained_recall", "unknown effects flagged"),
     ):
         k, n = results["of"].get(name, (0, 0))

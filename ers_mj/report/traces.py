@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.report.display import Unit, noun, shown
-from ers_mj.report.drawing import both_widths, decimate, largest, margins
+from ers_mj.report.drawing import both_widths, margins
 from ers_mj.report.style import STYLE
+from ers_mj.report.thinning import decimate, largest, merged, worst_span
 
 LABELS = ("measured", "model before", "model after")
 
@@ -28,18 +27,6 @@ def close_up(view: RecordView, evidence: Evidence, labels: tuple[str, str, str] 
     if span is None:
         return None
     return both_widths(lambda width: _traces(view, evidence, width, span, labels), "the same, the worst span enlarged")
-
-
-def worst_span(view: RecordView, share: float = 0.08) -> tuple[float, float] | None:
-    """The span [s] of this share of the recording in which the squared residual before is largest."""
-    n = max(int(share * view.t.size), 60)
-    if view.t.size < 6 * n:
-        return None
-    error = np.nan_to_num(view.measured - view.before) ** 2
-    total = np.concatenate([[0.0], np.cumsum(error)])
-    begin = int(np.argmax(total[n:] - total[:-n]))
-    begin = min(max(begin - n // 4, 0), view.t.size - int(1.5 * n) - 1)
-    return float(view.t[begin]), float(view.t[begin + int(1.5 * n)])
 
 
 def _traces(
@@ -114,17 +101,3 @@ def shade(above, below, spans: tuple[tuple[float, float], ...], t: np.ndarray) -
         )
         below.axvspan(begin, end, color=STYLE.shade, alpha=0.28, linewidth=0, zorder=0)
         labelled = True
-
-
-def merged(spans: tuple[tuple[float, float], ...], closest: float) -> Iterator[tuple[float, float]]:
-    """Spans in order, those nearer than `closest` joined."""
-    current = None
-    for begin, end in sorted(spans):
-        if current is not None and begin <= current[1] + closest:
-            current = (current[0], max(current[1], end))
-            continue
-        if current is not None:
-            yield current
-        current = (begin, end)
-    if current is not None:
-        yield current

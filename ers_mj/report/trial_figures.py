@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from ers_mj.control.monte_carlo import Spread
 from ers_mj.control.trial import Trial
-from ers_mj.report.drawing import both_widths, decimate
+from ers_mj.report.drawing import both_widths
 from ers_mj.report.style import STYLE
+from ers_mj.report.thinning import decimate
 
 COLOURS = {
     "ftrc": STYLE.after,

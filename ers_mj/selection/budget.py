@@ -5,7 +5,7 @@ decisions/thresholds.py); it decides what there is to choose from, and how long 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ers_mj.data.prepared import Trace
 from ers_mj.plants.effort import Effort
@@ -90,9 +90,50 @@ class Search:
     # ``nameless_behind`` of what the named effect buys.
     many: int = 2
     nameless_behind: float = 0.5
+    # Where it ends, in seconds that simulating takes a slow core (see Budget): no sweep after ``sweeps``, no race
+    # beside a bristle after ``raced``, no round after ``last``, or ``longest``.
+    sweeps: float = 60.0
+    raced: float = 50.0
+    last: float = 140.0
+    longest: float = 220.0
+    # Whether the held-out recordings are run in MuJoCo as well, and the next recording is designed.
+    in_mujoco: bool = True
+    advised: bool = True
+
+    def left_out(self) -> tuple[tuple[str, str], ...]:
+        """The parts of a diagnosis that this search leaves out against the usual one, each with a sentence."""
+        parts = (
+            ("sweep", not self.sweeps, "effects that no first-order promise shows were not looked for"),
+            (
+                "second look",
+                not self.most_pairs,
+                "what was named was not weighed against pairs and exchanges of effects",
+            ),
+            ("rounds", self.last < SEARCH.last, "the search was ended after a tenth of the usual time at most"),
+            ("MuJoCo", not self.in_mujoco, "the held-out recordings were not run in MuJoCo"),
+            ("next recording", not self.advised, "the next recording was not designed"),
+        )
+        return tuple((part, sentence) for part, is_left, sentence in parts if is_left)
 
 
 SEARCH = Search()
+QUICK = replace(  # a first look
+    SEARCH,
+    laps=3,
+    later_laps=2,
+    most_rivals=1,
+    most_reversed=0,
+    fewer_reversed=0,
+    most_pairs=0,
+    most_parted=0,
+    most_mended=1,
+    sweeps=0.0,
+    raced=5.0,
+    last=12.0,
+    longest=12.0,
+    in_mujoco=False,
+    advised=False,
+)
 
 
 class Budget:
@@ -101,15 +142,16 @@ class Budget:
 
     After ``sweeps`` nothing is looked for that does not show by itself; a round beside a bristle is left at its first
     refits at ``raced``; none is begun after ``last``, and none after ``longest`` where effects without a bristle leave
-    more than forks of stick and slip do. They grow as the recordings last longer than a minute together.
+    more than forks of stick and slip do. They grow as the recordings last longer than a minute together. The ``search``
+    says how long each is.
     """
 
-    def __init__(self, traces: Sequence[Trace], effort: Effort | None = None):
-        self.effort = Effort() if effort is None else effort
+    def __init__(self, traces: Sequence[Trace], effort: Effort | None = None, search: Search = SEARCH):
+        self.effort, self.search = Effort() if effort is None else effort, search
         longer = max(1.0, sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / 60.0)
-        begun = self.effort.spent
-        self.sweeps, self.raced = begun + longer * 60_000_000, begun + longer * 50_000_000
-        self.last, self.longest = begun + longer * 140_000_000, begun + longer * 220_000_000
+        begun, second = self.effort.spent, longer * 1_000_000
+        self.sweeps, self.raced = begun + second * search.sweeps, begun + second * search.raced
+        self.last, self.longest = begun + second * search.last, begun + second * search.longest
 
     @property
     def spent(self) -> int:

@@ -22,7 +22,7 @@ from ers_mj.selection.finishing import Early, finished, told
 from ers_mj.selection.overlooked import refit_held_taut, refit_the_overlooked
 from ers_mj.selection.refits import Label, Refits, is_law_of_dear, is_out_of_reach, leaders
 from ers_mj.selection.screening import Begin, screen
-from ers_mj.servo.model import STATES, Model
+from ers_mj.servo.model import DRIFTS, Model
 
 
 def candidates(
@@ -31,10 +31,10 @@ def candidates(
     """The promising effects, and what may differ between recordings, each refitted with the whole baseline, best first.
 
     They race: each is fitted on as long as it wins something, since the valley of a true effect may be long and narrow
-    and a mimic's short; from each place on its own where the baseline is bent far from the noise. Where none comes near
-    the ``least`` gain that matters they are left at that, and where no explanation could buy enough none is looked for.
-    Once so much has been simulated as ``last`` all but the best are left at their first refits, or where the last stage
-    brought them: beside a bristle that stays wrong a race may take minutes.
+    and a confounder's short; from each place on its own where the baseline is bent far from the noise. Where none comes
+    near the ``least`` gain that matters they are left at that, and where no explanation could buy enough none is looked
+    for. Once so much has been simulated as ``last`` all but the best are left at their first refits, or where the last
+    stage brought them: beside a bristle that stays wrong a race may take minutes.
     """
     if is_out_of_reach(bench, base, least):
         return []
@@ -79,7 +79,7 @@ class _Race(Refits):
     def _refit_the_promising(self) -> set[str]:
         """First refits, of further effects as long as a promise was none; the names of those."""
         model, records = self.base.model, len(self.bench.traces)
-        states = [s for s in STATES if records > 1 and s not in (model.states or {})]
+        states = [s for s in DRIFTS if records > 1 and s not in (model.states or {})]
         self.starts = {(s, 0): [Begin(model.with_state(s, records), {})] for s in states}
         self.best = self.quick([(label, begins[0]) for label, begins in self.starts.items()])
         failed: set[str] = set()

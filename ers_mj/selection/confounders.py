@@ -14,6 +14,7 @@ from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.estimation.fit import Along, polished
 from ers_mj.estimation.objective import Fit
 from ers_mj.selection.bench import Bench
+from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import Candidate, is_clocked
 from ers_mj.selection.drop import pruned
@@ -27,7 +28,7 @@ QUICK, LONG = 8, 20  # steps of a first refit on a borrowed Jacobian, and of one
 
 
 def without_confounders(
-    selection: Selection, traces: Sequence[Trace], jobs: int, policy: Policy = POLICY
+    selection: Selection, traces: Sequence[Trace], jobs: int, policy: Policy = POLICY, search: Search = SEARCH
 ) -> tuple[Selection, tuple[Candidate, ...]]:
     """The selection without the effects in whose place a law without a name explains more, and these laws, each over
     the model that it extends.
@@ -36,7 +37,7 @@ def without_confounders(
     goes as well. Where nothing is named and more than noise is left, the one that explains most of it is told, if it
     explains as much as an effect must.
     """
-    bench = Bench(traces, selection.tau, jobs, policy=policy)
+    bench = Bench(traces, selection.tau, jobs, policy=policy, search=search)
     current = _at_observer(bench, selection.chosen)
     if not current.model.names:
         return selection, _alone(bench, current)

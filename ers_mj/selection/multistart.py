@@ -78,7 +78,7 @@ def wider(finished: Mapping[str, Fit], exclude: Sequence[str]) -> list[tuple[str
     its fit finds it.
 
     What is dear gives way to its own wider form only beyond a tie: that takes several times as long to simulate, and
-    one dent may decide.
+    one local minimum may decide.
     """
     out = []
     for name, found in finished.items():

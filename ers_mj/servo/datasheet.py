@@ -101,6 +101,12 @@ class Datasheet:
         lumped = {name: rule(known) for name, (needs, rule) in FOLLOWS.items() if known.keys() >= set(needs.split())}
         return {name: x for name, x in lumped.items() if math.isfinite(x)} | dict(self.lumped)
 
+    @property
+    def emf_damping(self) -> float | None:
+        """What the back-EMF damps [1/s], where the letters are given from which it follows."""
+        known = {"n": 1.0, **self.parameters}
+        return _emf_damping(known) if known.keys() >= {"K_t", "K_e", "J", "R"} else None
+
 
 def _emf_damping(p: Mapping[str, float]) -> float:
     """What the back-EMF damps, n^2 K_t K_e/(J R) [1/s]."""
@@ -136,7 +142,16 @@ def read_datasheet(path: str | os.PathLike[str]) -> Datasheet:
     if os.fspath(path) == "table1":
         return Datasheet(parameters=TABLE_1, name="table1")
     path = Path(path)
-    document = _document(path)
+    return datasheet_of(_document(path), path)
+
+
+def datasheet_of(document: Mapping[str, Any], path: str | os.PathLike[str] = "datasheet") -> Datasheet:
+    """The datasheet in a document laid out as its TOML is, which comes from `path`.
+
+    Raises:
+        InputError: as `read_datasheet` does.
+    """
+    path = Path(path)
     _refuse_unknown(document, SECTIONS, "section", str(path))
     sheet = Datasheet(
         parameters=_section(document, "parameters", TABLE_1, path),
@@ -174,7 +189,7 @@ def _document(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is not valid TOML ({str(error)[:120]})") from None
 
 
-def _section(document: dict[str, Any], section: str, known: Iterable[str], path: Path) -> dict[str, float]:
+def _section(document: Mapping[str, Any], section: str, known: Iterable[str], path: Path) -> dict[str, float]:
     """One section's numbers: its keys known, no value negative or zero where that makes no sense."""
     where = f"{path}: [{section}]"
     numbers = _numbers(document.get(section, {}), where, known)
@@ -210,7 +225,7 @@ def _loop(table: object, where: str) -> dict[str, Any]:
     return {"loop": loop, "loop_kind": words["kind"], "loop_sensor": words["sensor"]}
 
 
-def _entries(document: dict[str, Any], path: Path) -> list[object]:
+def _entries(document: Mapping[str, Any], path: Path) -> list[object]:
     entries = document.get("effect", [])
     if not isinstance(entries, list):
         raise InputError(f"{path}: effect is {_kind(entries)}, a list of [[effect]] was expected")
@@ -230,7 +245,7 @@ def _effect(entry: object, path: Path) -> tuple[str, dict[str, float]]:
 
 def _numbers(table: object, where: str, known: Iterable[str] | None = None) -> dict[str, float]:
     """The finite numbers of a table, under known keys where any are given."""
-    if not isinstance(table, dict):
+    if not isinstance(table, Mapping):
         raise InputError(f"{where} is {_kind(table)}, a table was expected")
     if known is not None:
         _refuse_unknown(table, known, "key", where)

@@ -86,6 +86,7 @@ def build_plant(
     linkage: str = "constant",
     inductance: bool = False,
     play: str = "gap",
+    is_angle: bool = True,
 ) -> Plant:
     """The plant of a datasheet, with ``simulate(t, u)`` from rest at theta_0.
 
@@ -98,10 +99,16 @@ def build_plant(
         linkage: "constant" or, in MuJoCo, "rod".
         inductance: whether the datasheet's L acts.
         play: "gap", two bodies, or "printed", Eq. (4) around the reduced model.
+        is_angle: whether the output turns.
 
     Raises:
         InputError: the datasheet, the effects or the options do not make a plant.
     """
+    if datasheet.loop:
+        raise InputError(
+            f"{datasheet.name or 'the model'}: closes a position loop of its own ([loop]), a servo told a voltage was"
+            " expected"
+        )
     chosen = kernel_effects([*datasheet.effects, *effects], inertia_of(datasheet))
     c = lumped(_values(datasheet, inductance))
     if plant != "mujoco" and linkage != "constant":
@@ -114,9 +121,8 @@ def build_plant(
         from ers_mj.plants.mechanical import MechanicalPlant
         from ers_mj.plants.skeletons import bodily
 
-        return MechanicalPlant(
-            c, chosen, parameters=bodily(datasheet.parameters, True, c.b), linkage=linkage, gap=gap or 0.0
-        )
+        shape = bodily(datasheet.parameters, is_angle, c.b)
+        return MechanicalPlant(c, chosen, parameters=shape, linkage=linkage, gap=gap or 0.0, is_angle=is_angle)
     return ReducedModel(stiff_play(c, gap) if gap else c, chosen)
 
 

@@ -5,15 +5,15 @@ after.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.errors import InputError
+from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
-from ers_mj.view.rendering import Painter, jpeg_bytes
-from ers_mj.view.replay import posed
+from ers_mj.plants.staging import rig_of
 
 ENLARGED = (1, 2, 5, 10, 20, 50)
 
@@ -27,6 +27,7 @@ class Choice:
         apart: least distance of two, as a share of the recording.
         worthwhile: a mismatch is shown from so many times the noise.
         visible: what the largest difference is enlarged to, at least [rad].
+        visible_share: the same of an output that slides, as a share of its reach.
         size: width and height of a picture [pixels].
     """
 
@@ -34,6 +35,7 @@ class Choice:
     apart: float = 0.1
     worthwhile: float = 4.0
     visible: float = math.radians(6)
+    visible_share: float = 0.1
     size: tuple[int, int] = (480, 360)
 
 
@@ -42,7 +44,7 @@ CHOICE = Choice()
 
 @dataclass(frozen=True)
 class Frame:
-    """One moment: time [s], outputs [rad], and the pictures as JPEG."""
+    """One moment: time [s], outputs [output unit], and the pictures as JPEG."""
 
     t: float
     measured: float
@@ -55,33 +57,40 @@ class Frame:
 @dataclass(frozen=True)
 class Frames:
     """The moments of a recording; differences from what was measured are drawn `enlarged` times. Empty where `why_not`
-    says why.
+    says why. ``rig`` is what moves: rudder, arm, carriage (see staging.rig_of).
     """
 
     name: str
     moments: tuple[Frame, ...]
     enlarged: int = 1
     why_not: str = ""
+    rig: str = "rudder"
+    output_unit: str = "rad"
 
 
-def frames_of(plant: MechanicalPlant, evidence: Evidence) -> Frames | None:
+def frames_of(plant: MechanicalPlant | LoopedPlant, evidence: Evidence) -> Frames | None:
     """Where the model before does worst, on a held-out recording if there is one.
 
-    None where no picture would help: the output is no angle, or before and after do not differ beyond noise.
+    None where no picture would help: the output is neither angle nor way, or before and after do not differ beyond
+    noise.
     """
-    if evidence.output_unit != "rad" or not evidence.records:
+    if not evidence.records or evidence.output_unit not in ("rad", "m"):
         return None
-    view = min(evidence.records, key=lambda view: not view.held_out)
+    if plant.is_angle != (evidence.output_unit == "rad"):
+        return None
+    view = evidence.told[0]
     chosen = worst_moments(view)
     error = np.abs(view.before - view.measured)[chosen]
     gained = np.nan_to_num(np.abs(view.before - view.after)[chosen])
     if not chosen.size or max(gained) <= CHOICE.worthwhile * np.nan_to_num(evidence.noise):
         return None
-    enlarged = next((times for times in ENLARGED if times * error.max() >= CHOICE.visible), ENLARGED[-1])
+    visible = CHOICE.visible if plant.is_angle else CHOICE.visible_share * float(np.nanmax(np.abs(view.measured)))
+    enlarged = next((times for times in ENLARGED if times * error.max() >= visible), ENLARGED[-1])
+    told = Frames(view.name, (), enlarged, rig=rig_of(plant.spec()), output_unit=evidence.output_unit)
     try:
-        return Frames(view.name, _drawn(plant, view, chosen, enlarged), enlarged)
+        return replace(told, moments=_drawn(plant, view, chosen, enlarged))
     except InputError as error:
-        return Frames(view.name, (), why_not=str(error))
+        return replace(told, why_not=str(error))
 
 
 def worst_moments(view: RecordView) -> np.ndarray:
@@ -95,11 +104,17 @@ def worst_moments(view: RecordView) -> np.ndarray:
     return np.array(sorted(chosen), int)
 
 
-def _drawn(plant: MechanicalPlant, view: RecordView, chosen: np.ndarray, enlarged: int) -> tuple[Frame, ...]:
+def _drawn(
+    plant: MechanicalPlant | LoopedPlant, view: RecordView, chosen: np.ndarray, enlarged: int
+) -> tuple[Frame, ...]:
+    from ers_mj.view.rendering import Painter, jpeg_bytes
+    from ers_mj.view.replay import posed
+
     t, measured, before, after = (x[chosen] for x in (view.t, view.measured, view.before, view.after))
     shown = np.concatenate([measured + enlarged * (x - measured) for x in (before, after)])
-    film = posed(plant, np.concatenate([t, t]), shown)
-    with Painter(film.model, *CHOICE.size) as painter:
+    unit = "rad" if plant.is_angle else "m"
+    film = posed(plant, np.concatenate([t, t]), shown, output_unit=unit)
+    with Painter(film.model, *CHOICE.size, plain=True) as painter:
         pictures = [
             jpeg_bytes(painter.draw(qpos, y))
             for qpos, y in zip(film.qpos, np.concatenate([measured, measured]), strict=True)

@@ -22,13 +22,13 @@ INSTALL = "install EGL (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), or
 
 
 class Painter:
-    """Draws one model off screen, for use in a `with`.
+    """Draws one model off screen, for use in a `with`; ``plain``: without shadows and reflections, in half the time.
 
     Raises:
         InputError: this machine cannot draw without a window; the sentence says what to install.
     """
 
-    def __init__(self, model: mujoco.MjModel, width: int, height: int):
+    def __init__(self, model: mujoco.MjModel, width: int, height: int, plain: bool = False):
         self.model, self.width, self.height = model, width, height
         self.data, self.other = mujoco.MjData(model), mujoco.MjData(model)
         self.option, self.scene = mujoco.MjvOption(), mujoco.MjvScene(model, 2000)
@@ -41,6 +41,8 @@ class Painter:
             raise InputError(
                 f"pictures cannot be drawn here ({' '.join(str(error).split())[:100]}): {INSTALL}"
             ) from None
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION) if plain else ():
+            self.scene.flags[flag.value] = 0
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self.target)
 
     def __enter__(self) -> Painter:

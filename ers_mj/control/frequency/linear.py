@@ -78,7 +78,21 @@ def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: flo
     for effect, values in plant.effects:
         if any(lag := BY_NAME[effect].remembers(values)):
             held, load = held * _late(*lag, held.dt), load * _late(*lag, load.dt)
-    return LinearPlant(name, held, load, theta, omega, _left_out(plant))
+    return LinearPlant(name, held, load, theta, omega, left_out(plant))
+
+
+def continuous(plant: ReducedModel, theta: float, omega: float, order: int) -> control.StateSpace:
+    """Voltage to angle of a reduced plant about the angle theta [rad] while it slips at omega [rad/s], in continuous
+    time; dead times as Pade's approximations of this order, behind one another: command, plant, sensor.
+    """
+    A, B, C = matrices(plant, theta, omega)
+    system, delay = control.ss(A, B[:, :1], C, 0), coefficients(plant).delay
+    if delay > 0:
+        system = system * control.ss(control.tf(*control.pade(delay, order)))
+    for effect, values in plant.effects:
+        if any(lag := BY_NAME[effect].remembers(values)):
+            system = _late(*lag, 0, order) * system
+    return system
 
 
 def coefficients(plant: ReducedModel | MechanicalPlant) -> Coefficients:
@@ -86,7 +100,7 @@ def coefficients(plant: ReducedModel | MechanicalPlant) -> Coefficients:
     return Coefficients(*plant._lowered[0]) if isinstance(plant, ReducedModel) else plant._lowered
 
 
-def _left_out(plant: ReducedModel | MechanicalPlant) -> tuple[str, ...]:
+def left_out(plant: ReducedModel | MechanicalPlant) -> tuple[str, ...]:
     """Effects that change the command or the reading in ways that are not linear; in MuJoCo also laws that the stepping
     applies.
     """
@@ -257,12 +271,12 @@ def _held(move: Move, C: np.ndarray, h: float, delay: float) -> control.StateSpa
     return control.ss(A, B, np.hstack([C, np.zeros((1, line))]), 0, h)
 
 
-def _late(T: float, T_d: float, dt: float) -> control.StateSpace:
+def _late(T: float, T_d: float, dt: float, order: int = 4) -> control.StateSpace:
     """What a late sensor makes of the angle: its lag T, and behind it its dead time T_d where it has one."""
     if not T_d:
         return _lag(T, dt)
     if not dt:
-        return _lag(T, dt) * control.ss(control.tf(*control.pade(T_d, 4)))
+        return _lag(T, dt) * control.ss(control.tf(*control.pade(T_d, order)))
     whole, part = divmod(T_d / dt, 1.0)
     return _lag(T, dt) * control.ss(control.tf([1.0 - part, part], [1.0, *[0.0] * (int(whole) + 1)], dt))
 
