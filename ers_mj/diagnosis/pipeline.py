@@ -69,8 +69,7 @@ def diagnose(
     chosen = select(
         start.fit,
         start.traces,
-        anchors=start.anchors,
-        held=start.held,
+        start=start,
         exclude=(*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,
