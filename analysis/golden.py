@@ -158,19 +158,11 @@ class Findings:
         return tuple(self.table["nameless"])
 
     @property
-    def heldout_cost(self) -> tuple[float, float]:
-        return self.table["goes_in_blocks"]["before"], self.table["goes_in_blocks"]["after"]
-
-    @property
     def explained(self) -> float:
         t = self.table
         shares = [rules.share(b**2, a**2, n**2) for b, a, n in t["explained_pooled"]]
         shown = [rules.Shown(*row) for row in t["shown"]]
         return max(*shares, rules.explained_each(shown, t["left_before"], t["left"], self.policy))
-
-    @property
-    def free_train(self) -> float:
-        return self.table["rmse_over_noise"]["train_rmse_after"]
 
     @property
     def free_held(self) -> float:

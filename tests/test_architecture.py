@@ -49,6 +49,8 @@ WRITERS = {
     "cli",
 }  # beside these only the tables of data/ open a file to write
 FAMILIES = {
+    "data/consistency": ("sheet", "motion"),
+    "data/formats": ("base", "arrays", "clocks"),
     "effects": ("base", "quantities"),
     "control/controllers": ("base", "finite_time", "pid"),
     "identification/minimisers": ("base", "iga"),

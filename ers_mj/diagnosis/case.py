@@ -14,7 +14,7 @@ import numpy as np
 from ers_mj.data.prepared import Blocks
 from ers_mj.data.recording import Recording
 from ers_mj.decisions import verdict as rules
-from ers_mj.decisions.explained import cost, is_consistent
+from ers_mj.decisions.explained import is_consistent
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.mujoco_check import Rig, run_in_mujoco
 from ers_mj.effects import BY_NAME
@@ -159,18 +159,9 @@ class Case:
 
         return [rules.Shown(b.sure, a.sure, noise, misfit(b), misfit(a)) for b, a, noise in self.confirmed.shown]
 
-    @property
-    def heldout_cost(self) -> tuple[float, float]:
-        before, after = (pooled(scores).misfit for scores in (self.confirmed.before, self.confirmed.after))
-        return cost(before, 1.0), cost(after, 1.0)
-
     @cached_property
     def left_elsewhere(self) -> float:
         return left_elsewhere(self.model, self.start.traces)
-
-    @property
-    def free_train(self) -> float:
-        return self.fits["train_rmse_after_rad"] / self.noise
 
     @property
     def free_held(self) -> float:

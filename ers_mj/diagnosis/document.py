@@ -16,6 +16,7 @@ from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.sentences import remainder, sentence, shown
+from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
@@ -278,6 +279,8 @@ def _next_recording(case: Case) -> dict:
     """What to record next, where that is designed."""
     if not case.search.advised:
         return {"sentence": "not designed in a quick look", "excitation": None}
+    if is_unexcited(case.start.traces):
+        return moving_input(case.start.traces, case.input_unit, case.output_unit)
     return next_recording(*case.rivals(), case.start.traces, case.input_unit, case.output_unit)
 
 

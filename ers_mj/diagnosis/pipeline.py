@@ -11,12 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ers_mj.data.informative import searched
 from ers_mj.data.prepared import Trace, counted, trace_of
 from ers_mj.data.recording import Recording
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.document import Diagnosis, told
 from ers_mj.diagnosis.mujoco_check import Rig
+from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.effects.quantities import Symptoms
 from ers_mj.estimation.baseline import baseline, sharpened
@@ -59,31 +61,32 @@ def diagnose(
         InputError: no motion of the model resembles the recordings.
     """
     jobs = jobs or _cores()
+    recordings, holdout = searched(recordings, holdout)
     first = recordings[0]
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
     traces = [trace_of(r, inertia) for r in recordings]
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
-    sensors = symptoms(recordings, start.traces, travel, policy)
+    still = is_unexcited(start.traces)  # nothing can be told then, and nothing is named
+    sensors = {} if still else symptoms(recordings, start.traces, travel, policy)
     chosen = select(
         start.fit,
         start.traces,
-        start=start,
-        exclude=(*_ordinary(start.fit.model, policy), *SUSPECTS),
+        start=None if still else start,
+        exclude=tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,
         policy=policy,
         budget=Budget(start.traces, search=search),
     )
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
-    chosen = replace(
-        chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
-    )
+    best = polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
+    chosen = replace(chosen, base=start.fit, chosen=best)
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
-    named, suspects = without_confounders(selection, start.traces, jobs, policy, search)
+    named, suspects = (selection, ()) if still else without_confounders(selection, start.traces, jobs, policy, search)
     if named is not selection:
         selection, judged = confirmed(start, named, held, jobs, policy)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
