@@ -93,8 +93,7 @@ def diagnose(
     multibody = _in_mujoco(rig, selection, judged, jobs, progress) if search.in_mujoco else (None, None)
     progress("locating", 0.92)
     given = recordings, list(holdout), datasheet
-    case = Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search)
-    return told(case, held)
+    return told(Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search), held)
 
 
 def _in_mujoco(
