@@ -76,8 +76,7 @@ def diagnose(
     chosen = select(
         start.fit,
         start.traces,
-        anchors=start.anchors,
-        held=start.held,
+        start=None if still else start,
         exclude=tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS),
         jobs=jobs,
         progress=progress,
@@ -97,8 +96,7 @@ def diagnose(
     multibody = _in_mujoco(rig, selection, judged, jobs, progress) if search.in_mujoco else (None, None)
     progress("locating", 0.92)
     given = recordings, list(holdout), datasheet
-    case = Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search)
-    return told(case, held)
+    return told(Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search), held)
 
 
 def _in_mujoco(
