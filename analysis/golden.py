@@ -133,7 +133,7 @@ def kept(row: dict, folds: dict, name: str, policy: Policy) -> bool:
         log_ratio=number(judged["log_ratio"]),
     )
     excluded = any(row.get(key) for key in ("may_be_none", "a_converters", "any_wave"))
-    again = row.get("recalibrated") or {"after": 1.0, "before": 0.0}
+    again = {"after": 1.0, "before": 0.0} | (row.get("recalibrated") or {})  # without errors: nothing to recalibrate
     halved = again["after"] ** 2 < policy.half * again["before"] ** 2
     return confirmation.is_confirmed(held, lambda: halved, policy) and not excluded
 
@@ -158,19 +158,11 @@ class Findings:
         return tuple(self.table["nameless"])
 
     @property
-    def heldout_cost(self) -> tuple[float, float]:
-        return self.table["goes_in_blocks"]["before"], self.table["goes_in_blocks"]["after"]
-
-    @property
     def explained(self) -> float:
         t = self.table
         shares = [rules.share(b**2, a**2, n**2) for b, a, n in t["explained_pooled"]]
         shown = [rules.Shown(*row) for row in t["shown"]]
         return max(*shares, rules.explained_each(shown, t["left_before"], t["left"], self.policy))
-
-    @property
-    def free_train(self) -> float:
-        return self.table["rmse_over_noise"]["train_rmse_after"]
 
     @property
     def free_held(self) -> float:

@@ -19,9 +19,9 @@ import numpy as np
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import read_recording
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.baseline import scales_of
 from ers_mj.estimation.fit import fit
 from ers_mj.estimation.initial_state import with_starts
+from ers_mj.estimation.scales import scales_of
 from ers_mj.servo.model import Model
 
 BESIDE = ((), ("load_dependent_friction",), ("supply_sag",), ("load_dependent_friction", "supply_sag"))

@@ -15,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from ers_mj import __version__
 from ers_mj.commands import COMMANDS
-from ers_mj.errors import InputError
+from ers_mj.errors import ErsError, InputError
 
 
 class Parser(argparse.ArgumentParser):
@@ -80,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         arguments = parse(given)
         arguments.told = shlex.join(["ers", *given])  # on the page that this call makes
         return arguments.run(arguments)
-    except InputError as error:
+    except ErsError as error:
         print(f"ers: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -75,7 +75,7 @@ def test_a_shaft_whose_motor_bears_nothing_is_a_filter_in_the_drive(pushed, foun
 
 
 def test_what_leaves_the_same_in_all_blocks_is_no_other_offer(pushed, found):
-    torque = found("load_dependent_friction", [0.01, np.inf], 2.0)
+    torque = found("load_dependent_friction", [0.01, *4 * [np.inf]], 2.0)
     same, other = (
         replace(found("stribeck", None, 1.9), fit=replace(torque.fit, misfit=m))
         for m in (torque.fit.misfit, torque.fit.misfit + np.linspace(0.0, 0.5, torque.fit.misfit.size))

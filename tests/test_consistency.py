@@ -124,7 +124,7 @@ def test_a_clock_of_its_own_refreshes_a_column_out_of_step(drive, put):
     theta = np.interp(taken, np.arange(N), drive["theta_rad"] + 1e-3 * np.sin(np.arange(N)))
     record = read_recording(put(drive | {"theta_rad": theta}))
     assert kinds(record) == ["held"]
-    assert np.diff(record.t).min() > 3 * STEP
+    assert np.diff(record.t[record.valid]).min() > 3 * STEP
     known = record.valid
     assert set(record.y[known]) <= set(theta)
 

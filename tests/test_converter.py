@@ -128,7 +128,7 @@ def test_a_model_further_from_the_readings_than_their_rounding_is_wrong(torque, 
     coarse = counted([trace], float(np.ptp(trace.y)))
     found = fit(model(truth), with_starts(model(truth), coarse))
     assert is_beyond_rounding(found.model, coarse) is wrong and not is_beyond_rounding(found.model, [trace])
-    bristle = found.model.with_effect("presliding", np.array([1e-3, 0.2, np.inf, np.inf]))
+    bristle = found.model.with_effect("presliding", np.array([1e-3, 0.2, *4 * [np.inf]]))
     assert not is_beyond_rounding(bristle, coarse)
 
 

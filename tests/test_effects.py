@@ -98,7 +98,7 @@ def test_an_open_circuit_feels_nothing_of_the_current(effect):
 
 def test_a_bristle_is_begun_with_damping_that_fades_where_it_was_lost(pushed):
     scales, effect = pushed.fit.model.scales, BY_NAME["presliding"]
-    lasting, fading = (np.array([1e-3, 0.1, w_d, np.inf]) for w_d in (10.0 * scales.speed, 0.1 * scales.speed))
+    lasting, fading = (np.array([1e-3, 0.1, w_d, *3 * [np.inf]]) for w_d in (10.0 * scales.speed, 0.1 * scales.speed))
     assert [p[0] == 1e-3 and p[2] < scales.speed for p in effect.grown("presliding", lasting, scales)] == [
         True,
         False,

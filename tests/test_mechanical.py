@@ -137,7 +137,7 @@ def test_the_exported_model_is_the_plant():
 
 def test_the_export_says_what_it_does_not_carry():
     plant = rudder(
-        effects=[("load_dependent_friction", np.array([0.05, np.inf])), ("drive_dead_zone", np.array([0.2]))]
+        effects=[("load_dependent_friction", np.array([0.05, *4 * [np.inf]])), ("drive_dead_zone", np.array([0.2]))]
     )
     assert plant.stepped == ("load_dependent_friction",)
     assert "drive_dead_zone, load_dependent_friction" in plant.xml().splitlines()[0]
@@ -146,7 +146,7 @@ def test_the_export_says_what_it_does_not_carry():
 def test_a_plant_survives_the_way_to_another_process():
     u, plant = (
         INPUTS["chirp"](T[:200]),
-        rudder(gap=0.01, effects=[("load_dependent_friction", np.array([0.05, np.inf]))]),
+        rudder(gap=0.01, effects=[("load_dependent_friction", np.array([0.05, *4 * [np.inf]]))]),
     )
     again = pickle.loads(pickle.dumps(plant))
     assert np.array_equal(again.simulate(T[:200], u).theta, plant.simulate(T[:200], u).theta)

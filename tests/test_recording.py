@@ -253,7 +253,7 @@ def test_malformed_csv_is_refused_in_one_sentence(tmp_path, columns, case):
         ("rec.parquet", "t_s,u_V,theta_rad\n1,2,3\n", "not a readable Parquet file"),
         ("rec.parquet", "", "empty"),
         ("rec.parquet", b"PAR1" + bytes(100) + b"PAR1", "not a readable Parquet file"),
-        ("rec.mat", "t_s,u_V,theta_rad\n1,2,3\n", "ends in '.mat', recordings end in .csv, .parquet"),
+        ("rec.xyz", "t_s,u_V,theta_rad\n1,2,3\n", "ends in '.xyz', recordings end in .csv, "),
         ("rec", "t_s,u_V,theta_rad\n1,2,3\n", "ends in ''"),
     ],
 )
@@ -271,8 +271,8 @@ def test_paths_that_lead_nowhere(tmp_path, spec):
 
 def test_parquet_columns_that_are_no_numbers(tmp_path, columns):
     times = pa.array(np.arange(N), pa.timestamp("ms"))
-    pa.parquet.write_table(pa.table(columns | {"t_s": times}), tmp_path / "rec.parquet")
-    with pytest.raises(InputError, match=r"rec.parquet: the column t_s holds timestamp\[ms\], numbers were expected"):
+    pa.parquet.write_table(pa.table(columns | {"u_V": times}), tmp_path / "rec.parquet")
+    with pytest.raises(InputError, match=r"rec.parquet: the column u_V holds timestamp\[ms\], numbers were expected"):
         read_recording(tmp_path / "rec.parquet")
 
 
@@ -282,7 +282,7 @@ def test_parquet_columns_that_are_no_numbers(tmp_path, columns):
         ("rec.csv", "holds the runs 1, 2, choose one as in rec.csv#run=1"),
         ("rec.csv#run=9", "there is no run '9', the runs are 1, 2"),
         ("rec.csv#run=", "there is no run '', the runs are 1, 2"),
-        ("single.csv#run=1", "has no column run, its columns are t_s, u_V, theta_rad"),
+        ("single.csv#run=1", "has no column run or episode_index or episode, its columns are t_s, u_V, theta_rad"),
     ],
 )
 def test_runs_that_cannot_be_chosen(tmp_path, columns, spec, words):

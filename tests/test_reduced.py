@@ -49,7 +49,10 @@ def test_presliding_equals_an_independent_dahl(name, x_s_deg, delta):
     dahl = {"label": "presliding", "strength": x_s_deg, "shape": shape}
     truth = quick.simulate(dict(TABLE_1.parameters), [dahl], T, u, step=5e-6, stand=0.0).true
     ours = (
-        ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.0, np.inf, delta]))])
+        ReducedModel(
+            table_1().coefficients,
+            [("presliding", np.array([np.radians(x_s_deg), 0.0, np.inf, delta, np.inf, np.inf]))],
+        )
         .simulate(T, u)
         .theta
     )
@@ -64,7 +67,7 @@ def test_presliding_equals_an_independent_lugre(name, x_s_deg, w_d):
     lugre = {"label": "presliding", "strength": x_s_deg, "shape": shape}
     truth = quick.simulate(dict(TABLE_1.parameters), [lugre], T, u, step=5e-6, stand=0.0).true
     ours = (
-        ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.4, w_d, np.inf]))])
+        ReducedModel(table_1().coefficients, [("presliding", np.array([np.radians(x_s_deg), 0.4, w_d, *3 * [np.inf]]))])
         .simulate(T, u)
         .theta
     )
@@ -95,7 +98,7 @@ def test_a_shaft_beside_a_bristle_equals_an_independent_scheme(name, x_s_deg, de
             "shaft_compliance",
             np.array([np.sqrt(k / J) / (2.0 * np.pi), zeta * np.sqrt(rho * (1.0 - rho)), rho, phi, np.inf]),
         ),
-        ("presliding", np.array([(1.0 - phi) * np.radians(x_s_deg), 0.0, np.inf, delta])),
+        ("presliding", np.array([(1.0 - phi) * np.radians(x_s_deg), 0.0, np.inf, delta, np.inf, np.inf])),
     ]
     ours = ReducedModel(table_1().coefficients, effects).simulate(T, u).theta
     rigid = ReducedModel(table_1().coefficients, effects[:1]).simulate(T, u).theta
@@ -105,7 +108,7 @@ def test_a_shaft_beside_a_bristle_equals_an_independent_scheme(name, x_s_deg, de
 @pytest.mark.parametrize(
     "label, strength, shape, ours",
     [
-        ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08, np.inf]),
+        ("load_dependent_friction", 0.08, {"form": "motor torque"}, [0.08, *4 * [np.inf]]),
         (
             "cogging",
             0.04,
@@ -175,7 +178,7 @@ def test_a_bent_bristle_holds_still():
     corner still holds.
     """
     c = table_1().coefficients
-    sprung = ReducedModel(c, [("presliding", np.array([0.008, 0.2, np.inf, np.inf]))])
+    sprung = ReducedModel(c, [("presliding", np.array([0.008, 0.2, *4 * [np.inf]]))])
     away = sprung.simulate(
         T, (0.3 * c.c_2_plus + c.c_1 + c.a_1 * 0.1) / c.b * np.ones(T.size), start=(c.theta_0 + 0.1, 0.0)
     ).theta
@@ -190,7 +193,7 @@ def test_a_rudder_that_bounces_in_the_corner_on_its_bristle_is_simulated_to_the_
     """
     c = lumped({"a_1": 36.0, "c_1": 188.0, "c_2": 112.0, "theta_0": 0.263, "a_2": 92.0, "b": 138.0, "tau_e": 0.00115})
     t = np.arange(0.0, 7.5, 5e-3)
-    bristle = ("presliding", np.array([0.00096, 0.018, np.inf, 1.41]))
+    bristle = ("presliding", np.array([0.00096, 0.018, np.inf, 1.41, np.inf, np.inf]))
     alone, wavy = (
         ReducedModel(c, [bristle, *more]).simulate(t, 0.3 * INPUTS["multisine"](t)).theta
         for more in ([], [("position_dependent_friction", np.array([0.2, np.inf, np.inf, 0.18, 0.0]))])

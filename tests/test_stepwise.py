@@ -28,7 +28,7 @@ def test_a_round_whose_effect_became_needless_is_given_again_once(pushed):
 @pytest.fixture(scope="module")
 def dragged():
     """A selection beside a drag that hides a friction of 1 % of the drive's torque."""
-    laws = [("quadratic_drag", np.array([1.0, np.inf])), ("load_dependent_friction", np.array([0.01, np.inf]))]
+    laws = [("quadratic_drag", np.array([1.0, np.inf])), ("load_dependent_friction", np.array([0.01, *4 * [np.inf]]))]
     start, told = started(recorded(laws)), []
     others = all_but(*(name for name, _ in laws), "stribeck", "inductance")
     return select(
@@ -54,7 +54,7 @@ def test_the_trail_tells_every_move(dragged):
     last = found.trail[-1]
     assert (last.kind, last.accepted, last.before) == ("add", False, last.after) and "no effect" in last.because
     assert all(move.because and move.kind in str(move) for move in found.trail)
-    assert str(added[0]).startswith("add: baseline -> quadratic_drag, +") and " stays, " in str(last)
+    assert str(added[0]).startswith("add: baseline -> quadratic_drag, robust cost -") and " stays, " in str(last)
     assert [text for text, _ in progress] == [f"round {k}: comparing effects" for k in range(1, len(found.rounds) + 1)]
 
 

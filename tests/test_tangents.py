@@ -53,10 +53,10 @@ def test_of_the_coefficients(name, inductance):
 @pytest.mark.parametrize(
     "bristle",
     [
-        [0.01, 0.5, np.inf, np.inf],
-        [0.0017, 0.25, np.inf, np.inf],
-        [0.0003, 0.5, 0.3, np.inf],
-        [0.0017, 0.25, np.inf, 1.5],
+        [0.01, 0.5, *4 * [np.inf]],
+        [0.0017, 0.25, *4 * [np.inf]],
+        [0.0003, 0.5, 0.3, *3 * [np.inf]],
+        [0.0017, 0.25, np.inf, 1.5, np.inf, np.inf],
     ],
     ids=["soft", "firm", "stiff", "Dahl's"],
 )

@@ -105,9 +105,9 @@ def plain_form(name, p):
 @pytest.mark.parametrize(
     ("name", "p"),
     [
-        ("presliding", [0.005, 0.1, np.inf, 1.5]),
-        ("presliding", [0.005, 0.1, np.inf, 2.0]),
-        ("presliding", [0.02, 0.1, np.inf, 0.7]),
+        ("presliding", [0.005, 0.1, np.inf, 1.5, np.inf, np.inf]),
+        ("presliding", [0.005, 0.1, np.inf, 2.0, np.inf, np.inf]),
+        ("presliding", [0.02, 0.1, np.inf, 0.7, np.inf, np.inf]),
         ("current_limit", [80.0, 0.3]),
         ("inductance", [0.008, 60.0]),
         ("hinge_moment_cubic", [300.0, 0.2]),
@@ -115,7 +115,7 @@ def plain_form(name, p):
         ("asymmetric_friction", [30.0, 0.0, 0.2, 0.5]),
         ("stribeck", [80.0, 0.6, 2.0, 0.5]),
         ("load_disturbance", [250.0, 0.6, 0.5, 0.0, 0.1]),
-        ("load_dependent_friction", [0.3, 60.0]),
+        ("load_dependent_friction", [0.3, 60.0, *3 * [np.inf]]),
         ("periodic_gust", [40.0, 1.3, 0.4, 0.3, 0.5, 0.4, 1.0]),
     ],
 )
@@ -148,7 +148,7 @@ def test_a_shaft_beside_a_play_softens_its_contact():
 @pytest.mark.parametrize(
     "second", [("shaft_compliance", [25.0, 0.1, 0.6, 0.2, 0.02]), ("backlash", [0.012, 0.6, 0.2, 120.0, 0.2])]
 )
-@pytest.mark.parametrize("bristle", [[0.005, 0.3, np.inf, np.inf], [0.01, 0.3, 1.0, 1.5]])
+@pytest.mark.parametrize("bristle", [[0.005, 0.3, *4 * [np.inf]], [0.01, 0.3, 1.0, 1.5, np.inf, np.inf]])
 def test_two_bodies_beside_a_bristle_agree(second, bristle):
     """What the bristle changes beside a play or a shaft is the same in either plant, whichever is named first."""
     both = [(second[0], np.array(second[1])), ("presliding", np.array(bristle))]

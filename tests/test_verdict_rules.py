@@ -22,18 +22,16 @@ class Findings:
     sensors: tuple = ()
     suspects: tuple = ()
     explained: float = 1.0
-    heldout_cost: tuple = (50.0, 1.0)
     left_before: dict = field(default_factory=lambda: left(0.5))
     left: dict = field(default_factory=left)
     left_elsewhere: float = 0.0
-    free_train: float = 1.0
     free_held: float = 1.0
     least_astray: float = 2.0
     datasheet_explains: bool = False
 
 
 RIGHT = Findings()
-NONE = Findings((), explained=0.0, heldout_cost=(1.0, 1.0), left_before=left())
+NONE = Findings((), explained=0.0, left_before=left())
 
 
 @pytest.mark.parametrize(
@@ -44,11 +42,11 @@ NONE = Findings((), explained=0.0, heldout_cost=(1.0, 1.0), left_before=left())
         ({"least_astray": 31.0}, "unexplained"),  # no free run meets the plant
         ({"suspects": ("torque_saturation",)}, "unexplained"),
         ({"sensors": ("sensor_dropout",)}, "missing_physics"),
-        ({"left": left(0.2), "free_train": 1.2}, "unexplained"),
-        ({"left": left(0.2)}, "parameters_only"),  # of the output nothing where free runs leave none
+        ({"left": left(0.2)}, "unexplained"),
+        ({"left": left(0.02)}, "parameters_only"),
         ({"left": left(current=0.2)}, "unexplained"),
-        ({"left_elsewhere": 0.06, "free_train": 1.2}, "unexplained"),
-        ({"left_elsewhere": 0.06}, "parameters_only"),
+        ({"left_elsewhere": 0.06}, "unexplained"),
+        ({"left_elsewhere": 0.04}, "parameters_only"),
     ],
 )
 def test_the_verdict_on_a_servo_without_names(change, said):
@@ -61,36 +59,16 @@ def test_the_verdict_on_a_servo_without_names(change, said):
     "change, said, more",
     [
         ({}, "missing_physics", False),
-        ({"explained": 0.4, "heldout_cost": (20.0, 10.0), "left": left(0.2)}, "unexplained", True),
-        ({"explained": 0.4}, "missing_physics", False),  # nearly all of a large C goes
+        ({"explained": 0.4, "left": left(0.2)}, "unexplained", True),
         ({"suspects": ("torque_saturation",)}, "missing_physics", True),
-        ({"left": left(0.2), "explained": 0.9, "free_train": 2.0}, "missing_physics", True),
-        ({"left": left(0.14), "explained": 0.99, "free_train": 2.0}, "missing_physics", False),
+        ({"left": left(0.2), "explained": 0.9}, "missing_physics", True),
+        ({"left": left(0.14), "explained": 0.99}, "missing_physics", False),
     ],
 )
 def test_the_verdict_on_a_servo_with_a_name(change, said, more):
     case = replace(RIGHT, **change)
     assert rules.verdict(case) == said and rules.is_more_left(case) is more
     assert tuple(rules.told_effects(case)) == (RIGHT.names if said == "missing_physics" else ())
-
-
-@pytest.mark.parametrize(
-    "before, after, named", [(150.0, 10.0, True), (150.0, 60.0, False), (5.0, 0.2, False), (29.0, 0.0, False)]
-)
-def test_what_nearly_all_of_a_large_misfit_asks_for_is_named_though_its_free_runs_fork(before, after, named):
-    case = replace(RIGHT, explained=0.1, heldout_cost=(before, after))
-    assert rules.goes_in_blocks(case) is named
-    assert bool(rules.told_effects(case)) is named
-
-
-@pytest.mark.parametrize(
-    "explained, before, after, named",
-    [(0.45, 0.12, 0.01, True), (0.45, 0.12, 0.06, False), (0.3, 0.12, 0.01, False), (0.45, 0.02, 0.0, False)],
-)
-def test_what_memory_loses_is_named_though_one_free_run_forks(explained, before, after, named):
-    case = replace(RIGHT, explained=explained, left_before=left(before), left=left(after), heldout_cost=(20.0, 10.0))
-    assert rules.goes_from_memory(case) is named
-    assert bool(rules.told_effects(case)) is named
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from ers_mj.commands import (
     frequency,
     gains,
     identify,
+    inspect,
     prove,
     simulate,
     trial,
@@ -20,4 +21,19 @@ from ers_mj.commands import (
     watch,
 )
 
-COMMANDS = (demo, diagnose, identify, simulate, validate, view, prove, trial, gains, frequency, watch, excite, cache)
+COMMANDS = (
+    demo,
+    diagnose,
+    identify,
+    simulate,
+    validate,
+    view,
+    inspect,
+    prove,
+    trial,
+    gains,
+    frequency,
+    watch,
+    excite,
+    cache,
+)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_common, add_input, add_map, add_out, add_recordings, mapping, results_folder
+from ers_mj.commands.options import add_common, add_out, add_reading, add_recordings, results_folder
 from ers_mj.commands.output import Progress, bold
+from ers_mj.commands.recordings import reader
 from ers_mj.door.saving import as_json
 
 if TYPE_CHECKING:
@@ -36,8 +36,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable"
     )
-    add_map(parser)
-    add_input(parser)
+    add_reading(parser)
     parser.add_argument(
         "--second", metavar="COLUMN", help="explain this column as well, as in u_V beside theta_ref_rad"
     )
@@ -57,10 +56,7 @@ def add_quick(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write, tell; 0 whatever the verdict."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    names = mapping(arguments.map)
-    from ers_mj.door.reading import read
-
-    take = partial(read, map=names, input=arguments.input, second=arguments.second)
+    take = reader(arguments)
     recordings = [take(spec) for spec in arguments.recordings]
     holdout = [take(spec) for spec in arguments.holdout]
     return diagnose_and_tell(recordings, holdout, arguments.datasheet, folder, arguments)

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
 from ers_mj.commands.options import (
     add_out,
+    add_reading,
     angle_deg,
-    mapping,
     number,
     one_of,
-    pair,
     results_folder,
     several,
     swing_deg,
 )
 from ers_mj.commands.output import Progress, bold, written
+from ers_mj.commands.recordings import reader
 from ers_mj.door.saving import as_json, plain, report_writers, versions, write_results
 
 if TYPE_CHECKING:
@@ -57,14 +57,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     _add_how(parser)
     add_plant(parser)
     add_laws(parser)
-    parser.add_argument(
-        "--map",
-        action="append",
-        type=pair,
-        default=[],
-        metavar="NAME=COLUMN",
-        help="column of the recordings that holds NAME; repeatable",
-    )
+    add_reading(parser)
     add_out(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
     parser.set_defaults(run=run)
@@ -129,12 +122,12 @@ def run(arguments: argparse.Namespace) -> int:
     folder = results_folder(arguments.out, arguments.force, arguments.json)
     from ers_mj.control.controllers import CONTROLLERS
     from ers_mj.control.frequency.study import study
-    from ers_mj.data.recording import read_recording
 
     controllers = chosen_controllers(arguments)
     datasheet, design = plant_and_design(arguments.datasheet, arguments.design)
     conditions = _conditions(arguments, datasheet)
-    recordings = [read_recording(spec, mapping(arguments.map)) for spec in arguments.recordings]
+    read = reader(arguments)
+    recordings = [read(spec) for spec in arguments.recordings]
     with Progress() as progress:
         found = study(datasheet, controllers, arguments.plant, conditions, recordings, design=design, progress=progress)
         document = plain(

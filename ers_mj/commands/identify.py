@@ -7,11 +7,9 @@ from pathlib import Path
 
 from ers_mj.commands.options import (
     add_common,
-    add_input,
-    add_map,
     add_out,
+    add_reading,
     add_recordings,
-    mapping,
     number,
     one_of,
     pair,
@@ -20,6 +18,7 @@ from ers_mj.commands.options import (
     whole,
 )
 from ers_mj.commands.output import Progress, bold, written
+from ers_mj.commands.recordings import reader
 from ers_mj.door.saving import as_json
 from ers_mj.errors import InputError
 
@@ -41,8 +40,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add_recordings(parser)
     _add_way(parser)
     _add_search(parser)
-    add_map(parser)
-    add_input(parser)
+    add_reading(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -108,14 +106,13 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Identify, write, tell; 0 whatever comes out."""
     folder = results_folder(arguments.out, arguments.force, arguments.json)
-    names = mapping(arguments.map)
+    read = reader(arguments)
     fixed, bounds = _values(arguments.fix, "--fix", _value), _values(arguments.bounds, "--bounds", _ends)
     from ers_mj.door.identifying import identify
-    from ers_mj.door.reading import read
 
     with Progress() as progress:
         found = identify(
-            [read(spec, names, input=arguments.input) for spec in arguments.recordings],
+            [read(spec) for spec in arguments.recordings],
             arguments.datasheet,
             method=arguments.method,
             plant=arguments.plant,

@@ -101,13 +101,20 @@ def add_map(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="name=column",
-        help="take the column as this name, as in t_s=Time; repeatable",
+        help="take a column as this name, also with its unit, a factor or arithmetic, as in t_s=Time,"
+        ' "t_s=Time [ms]", theta_rad=enc:counts/4096, "u_V=pwm*24/255", "theta_rad=state[3]"; repeatable',
+    )
+    parser.add_argument(
+        "--map-file", metavar="TOML", help="keeps what --map says in a table [map], and input, second, episode"
     )
 
 
-def add_input(parser: argparse.ArgumentParser) -> None:
-    """--input."""
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """--map, --map-file, --input and --episode: how recordings are read."""
+    add_map(parser)
     parser.add_argument("--input", metavar="COLUMN", help="what the servo is told, where several columns could be")
+    parser.add_argument("--episode", metavar="N", help="one run of a file that holds several, as FILE#run=N does")
+    parser.add_argument("--dbc", metavar="FILE", help="what the messages of a CAN log mean")
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ers_mj.control.controllers import Servo
-from ers_mj.data.tables import listed, numbers, parse_table, read_content
+from ers_mj.data.formats import load
+from ers_mj.data.tables import listed, numbers
 from ers_mj.errors import InputError
 
 ANGLES = {"theta_ref_rad": 1.0, "theta_ref_deg": math.radians(1.0)}
@@ -118,7 +119,7 @@ def read_reference(path: str | os.PathLike, servo: Servo, u_max: float) -> Refer
         InputError: the file is no such thing.
     """
     file = Path(path)
-    table = parse_table(read_content(file), file.suffix.lower(), file.name)
+    table = load(file, file.name)[0].table
     names = [name for name in ANGLES if name in table.column_names]
     if "t_s" not in table.column_names or len(names) != 1:
         raise InputError(

@@ -1,6 +1,7 @@
 """A recording: time, input and output of a servo, checked, in SI, and locked.
 
-    file -> table (tables.py) -> columns by role (columns.py) -> numbers -> checks (checks.py) -> Recording
+    file -> table (formats/) -> columns by role (mapping.py, columns.py) -> numbers -> checks (checks.py)
+         -> data before physics (consistency/) -> Recording
 
 What cannot be used is refused with one sentence (`InputError`); what can be worked around is, and is
 told in `Recording.problems`. Time is axis 0, every array is (N,).
@@ -9,7 +10,7 @@ told in `Recording.problems`. Time is axis 0, every array is (N,).
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from ers_mj.data.columns import (
     COLUMNS,
     CONSTANT,
     OPTIONAL,
-    Choice,
+    Asking,
     choose_columns,
     input_name,
     kind_of,
@@ -31,18 +32,13 @@ from ers_mj.data.columns import (
 )
 from ers_mj.data.consistency import consistent
 from ers_mj.data.consistency.sheet import Fault, Sheet
+from ers_mj.data.expressions import Column
+from ers_mj.data.formats import load
+from ers_mj.data.formats.base import Loaded
+from ers_mj.data.inspection import Inspection, inspected
+from ers_mj.data.mapping import Source
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.data.tables import (
-    cell_of,
-    listed,
-    numbers,
-    parse_table,
-    read_content,
-    reason,
-    select_run,
-    split_spec,
-    write_whole,
-)
+from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec, write_whole
 from ers_mj.errors import InputError
 
 
@@ -138,6 +134,10 @@ class Recording:
         there = {name: getattr(self, field) for field, name in names.items() if getattr(self, field) is not None}
         return {name: np.full(self.t.size, x) if isinstance(x, float) else x for name, x in there.items()}
 
+    def inspect(self) -> Inspection:
+        """What it holds and could tell, before anything is fitted."""
+        return inspected(self)
+
 
 # -- the three ways in and out --------------------------------------------------------------------------
 
@@ -148,24 +148,29 @@ def read_recording(
     *,
     input_column: str | None = None,
     second: str | None = None,
+    episode: str | int | None = None,
+    dbc: str | os.PathLike[str] | None = None,
 ) -> Recording:
-    """Read one recording from CSV or Parquet.
+    """Read one recording from a file of any format that `formats` knows.
 
     Args:
         path_or_spec: a path, or "FILE#run=17" for one run of a file that holds several.
-        mapping: contract name -> column of the file, for files that use other names.
+        mapping: contract name -> column of the file, with a unit or arithmetic where wanted (see mapping.py).
         input_column: the column that the servo is told, where several could be.
         second: a column to explain beside the output, such as the duty beside a position command.
+        episode: one run of a file that holds several, where the path names none.
+        dbc: what the messages of a CAN log mean.
 
     Raises:
         InputError: whatever makes the file unusable, in one sentence that names it.
     """
     path, run = split_spec(os.fspath(path_or_spec))
+    run = str(episode) if run is None and episode is not None else run
     name = path.name if run is None else f"{path.name}#run={run}"
-    content = read_content(path)
-    table = select_run(parse_table(content, path.suffix.lower(), name), run, name)
-    choice = choose_columns(table.column_names, dict(mapping or {}), name, input_column, second)
-    return _of_table(table, choice, name, str(path), hashlib.sha256(content).hexdigest())
+    loaded, digest = load(path, name, dict(mapping or {}), [Path(dbc)] if dbc is not None else [])
+    table = select_run(loaded.table, run, name)
+    asked = Asking(dict(mapping or {}), input_column, second)
+    return _of_table(replace(loaded, table=table), asked, name, path=str(path), sha256=digest)
 
 
 def from_columns(
@@ -201,21 +206,44 @@ def from_columns(
     except pa.ArrowException as error:
         raise InputError(f"{name}: holds what is no column of numbers ({reason(error)})") from None
     content = b"".join(label.encode() + arrays[label].tobytes() for label in sorted(arrays))
-    choice = choose_columns(table.column_names, dict(mapping or {}), name, input_column, second)
-    return _of_table(table, choice, name, "", hashlib.sha256(content).hexdigest())
+    asked = Asking(dict(mapping or {}), input_column, second)
+    return _of_table(Loaded(table), asked, name, path="", sha256=hashlib.sha256(content).hexdigest())
 
 
-def _of_table(table: pa.Table, choice: Choice, name: str, path: str, sha256: str) -> Recording:
-    """The recording in a table of named columns, these of them chosen."""
-    roles = {field: COLUMNS[contract] for field, contract in choice.roles().items()}
-    labels = {field: choice.columns[contract] for field, contract in choice.roles().items()}
-    printed = {field: numbers(table[column], column, name) for field, column in labels.items()}
-    read = Read(name, choice.kind, labels, {field: role.unit for field, role in roles.items()})
-    factors = {field: role.factor for field, role in roles.items()}
-    found = read.fields(printed, factors, ignored(table.column_names, labels.values()))
+def _of_table(loaded: Loaded, asked: Asking, name: str, **origin: Any) -> Recording:
+    """The recording in a table of named columns, as it was asked for."""
+    table = loaded.table
+    choice = choose_columns(table.column_names, asked, name, loaded.units)
+    sources = {field: choice.sources[contract] for field, contract in choice.roles().items()}
+    printed, factors = _printed(table, sources, name)
+    units = {field: COLUMNS[contract].unit for field, contract in choice.roles().items()}
+    labels = {field: source.columns[0] for field, source in sources.items()}
+    read = Read(name, choice.kind, labels, units, frozenset(f for f, source in sources.items() if source.sure))
+    found = read.fields(printed, factors, _notes(loaded.notes, sources, table.column_names))
     if choice.second:
-        found |= {"second_name": choice.second, "second_unit": roles["second"].unit}
-    return Recording(**found, path=path, sha256=sha256)
+        found |= {"second_name": choice.second, "second_unit": units["second"]}
+    return Recording(**found, **origin)
+
+
+def _notes(told: Sequence[str], sources: Mapping[str, Source], columns: list[str]) -> list[Fault]:
+    """What the file's reader tells, what was assumed of its columns, and which are ignored."""
+    assumed = [source.told for source in sources.values() if source.told]
+    taken = {column for source in sources.values() for column in source.columns}
+    return [Fault("read", "", sentence) for sentence in (*told, *assumed)] + ignored(columns, taken)
+
+
+def _printed(
+    table: pa.Table, sources: Mapping[str, Source], name: str
+) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+    """By field: values (N,) as the file prints them, and the factor from there."""
+
+    def column(part: Column) -> np.ndarray:
+        cells = element(table[part[0]], part[1], part[0], name)
+        stamps = seconds(cells) if part[0] in sources["t"].columns else None
+        return numbers(cells, part[0], name) if stamps is None else stamps
+
+    found = {field: source.values(column, name) for field, source in sources.items()}
+    return {field: x for field, (x, _) in found.items()}, {field: factor for field, (_, factor) in found.items()}
 
 
 def write_recording(path: str | os.PathLike[str], columns: Mapping[str, Sequence[float] | np.ndarray]) -> None:
@@ -339,16 +367,16 @@ def _array(x: Any, field: str, name: str) -> np.ndarray:
     return array
 
 
-def read_input(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Time [s] and voltage [V], each (N,), of a CSV or Parquet file with the columns t_s and u_V.
+def read_input(path: str | os.PathLike[str], column: str = "u_V") -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and input, each (N,), of a CSV or Parquet file with the columns t_s and ``column``.
 
     Raises:
         InputError: the file is no such thing, or has holes, in one sentence.
     """
     file = Path(path)
-    table = parse_table(read_content(file), file.suffix.lower(), file.name)
+    table = load(file, file.name)[0].table
     columns = []
-    for label in ("t_s", "u_V"):
+    for label in ("t_s", column):
         if label not in table.column_names:
             raise InputError(f"{file.name}: there is no column {label}, the columns are {listed(table.column_names)}")
         x = numbers(table[label], label, file.name)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ers_mj.data.columns import COLUMNS, choose_columns
+from ers_mj.data.columns import COLUMNS, Asking, choose_columns
 from ers_mj.data.tables import BLANK
 from ers_mj.errors import InputError
 
@@ -61,13 +61,14 @@ class Stream:
         columns = [column.strip(' \t"') for column in line.split(self._delimiter)]
         if twice := [c for c in columns if columns.count(c) > 1]:
             raise InputError(f"{self.name}: the column {twice[0]} stands there more than once")
-        choice = choose_columns(columns, self._mapping, self.name)
-        chosen = {
-            field: (COLUMNS[contract], columns.index(choice.columns[contract]))
-            for field, contract in choice.roles().items()
-        }
-        self._cells = [(chosen[field][1], chosen[field][0].factor, columns[chosen[field][1]]) for field in FIELDS]
-        self.units, self._width = {field: chosen[field][0].unit for field in FIELDS}, len(columns)
+        choice = choose_columns(columns, Asking(self._mapping), self.name)
+        roles, self._width = choice.roles(), len(columns)
+        sources = [choice.sources[roles[field]] for field in FIELDS]
+        for source in sources:
+            if not source.is_plain:
+                raise InputError(f"{self.name}: --map gives {source.text!r}, a stream takes single columns")
+        self._cells = [(columns.index(s.columns[0]), s.unit.factor, s.columns[0]) for s in sources]
+        self.units = {field: COLUMNS[roles[field]].unit for field in FIELDS}
 
     def _row(self, line: str) -> tuple[float, float, float]:
         cells, self._rows = line.split(self._delimiter), self._rows + 1

@@ -1,23 +1,20 @@
-"""Files and columns: CSV or Parquet to a table of named columns, cells to numbers, and text to a file that appears
-whole.
+"""Tables of named columns: which rows, cells to numbers, and text to a file that appears whole.
 
 What cannot be read is refused with one sentence (`InputError`).
 """
 
-import io
 import os
 import re
-from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.csv
 
 from ers_mj.errors import InputError
 
+ISO = re.compile(r"(\d{4}-\d\d-\d\d[T ])?\d\d:\d\d:\d\d")
 BLANK = ("", "nan", "na", "n/a", "null", "none")  # a missing value in CSV, in any case
 
 
@@ -39,86 +36,19 @@ def read_content(path: Path) -> bytes:
     return content
 
 
-def parse_table(content: bytes, suffix: str, name: str) -> pa.Table:
-    readers = {".csv": _csv, ".parquet": _parquet}
-    if suffix not in readers:
-        raise InputError(f"{name}: the file name ends in {suffix!r}, recordings end in {listed(readers)}")
-    return readers[suffix](content, name)
-
-
-def _parquet(content: bytes, name: str) -> pa.Table:
-    from pyarrow import parquet  # here alone: it takes long to import
-
-    try:
-        table = parquet.read_table(pa.BufferReader(content))
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(f"{name}: is not a readable Parquet file ({reason(error)})") from None
-    _refuse_twice(table.column_names, name)
-    return table
-
-
-def _csv(content: bytes, name: str) -> pa.Table:
-    """The cells as text, under the names of the first line; semicolons bring decimal commas."""
-    header, body = _header_and_body(content, name)
-    delimiter = max(",;\t", key=header.count)
-    columns = [column.strip(' \t"') for column in header.split(delimiter)]
-    _refuse_twice(columns, name)
-    table = _cells(body, columns, delimiter, name)
-    if delimiter == ",":
-        return table
-    return pa.table([pc.replace_substring(cells, ",", ".") for cells in table.columns], names=columns)
-
-
-def _header_and_body(content: bytes, name: str) -> tuple[str, str]:
-    try:
-        text = content.decode("utf-8-sig").lstrip()
-    except UnicodeDecodeError as error:
-        raise InputError(f"{name}: is not a text file in UTF-8 (byte {error.start} is no character)") from None
-    if "\0" in text:
-        raise InputError(f"{name}: is a binary file, CSV was expected")
-    header, *body = re.split(r"\r\n|\n|\r", text, maxsplit=1)
-    return header, "".join(body)
-
-
-def _cells(body: str, columns: list[str], delimiter: str, name: str) -> pa.Table:
-    ragged: list = []
-
-    def note(row):
-        ragged.append(row)
-        return "error"
-
-    if not body.strip():
-        raise InputError(f"{name}: has a header and no samples")
-    try:
-        return pa.csv.read_csv(
-            io.BytesIO(body.encode()),
-            read_options=pa.csv.ReadOptions(column_names=columns, use_threads=False),
-            parse_options=pa.csv.ParseOptions(delimiter=delimiter, invalid_row_handler=note),
-            convert_options=pa.csv.ConvertOptions(column_types=dict.fromkeys(columns, pa.string())),
-        )
-    except pa.ArrowException as error:
-        raise InputError(f"{name}: {_told_ragged(ragged, error)}") from None
-
-
-def _told_ragged(ragged: list, error: Exception) -> str:
-    if not ragged:
-        return f"is not a readable CSV file ({reason(error)})"
-    row = ragged[0]
-    return f"data row {row.number} has {row.actual_columns} cells, the header has {row.expected_columns}"
-
-
-def _refuse_twice(columns: list[str], name: str) -> None:
-    if twice := [column for column, count in Counter(columns).items() if count > 1]:
-        raise InputError(f"{name}: the column {listed(twice)} stands there more than once")
+RUNS = ("run", "episode_index", "episode")  # columns that tell the rows of several recordings apart
 
 
 def select_run(table: pa.Table, run: str | None, name: str) -> pa.Table:
     """The rows of one run; the whole table where it holds one and none is asked for."""
-    if "run" not in table.column_names:
+    column = next((c for c in RUNS if c in table.column_names), None)
+    if column is None:
         if run is None:
             return table
-        raise InputError(f"{name}: the file has no column run, its columns are {listed(table.column_names)}")
-    labels = _texts(table["run"])
+        raise InputError(
+            f"{name}: the file has no column {' or '.join(RUNS)}, its columns are {listed(table.column_names)}"
+        )
+    labels = _labels(table[column], column, name)
     runs = labels.unique().to_pylist()
     if run is None and len(runs) > 1:
         raise InputError(f"{name}: the file holds the runs {listed(runs)}, choose one as in {name}#run={runs[0]}")
@@ -127,9 +57,51 @@ def select_run(table: pa.Table, run: str | None, name: str) -> pa.Table:
     return table if run is None else table.filter(pc.equal(labels, run))
 
 
+def _labels(column: pa.ChunkedArray, label: str, name: str) -> pa.ChunkedArray:
+    try:
+        return _texts(column)
+    except pa.ArrowException:
+        raise InputError(f"{name}: the column {label} holds {column.type}, names or numbers were expected") from None
+
+
 def _texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """The cells as text without surrounding spaces."""
     return pc.utf8_trim_whitespace(column.cast(pa.string()))
+
+
+def element(column: pa.ChunkedArray, index: int | None, label: str, name: str) -> pa.ChunkedArray:
+    """One element of each cell of a column of lists; the column itself where none is asked for.
+
+    Raises:
+        InputError: it holds no lists, or they are shorter.
+    """
+    is_list = pa.types.is_list(column.type) or pa.types.is_large_list(column.type)
+    is_list = is_list or pa.types.is_fixed_size_list(column.type)
+    if index is None or not is_list:
+        if index is None and is_list:
+            raise InputError(f"{name}: the column {label} holds lists, choose an element as in --map NAME={label}[0]")
+        if index is not None:
+            raise InputError(f"{name}: the column {label} holds {column.type}, {label}[{index}] asks for an element")
+        return column
+    shortest = pc.min(pc.list_value_length(column)).as_py()
+    if shortest is None or index >= shortest:
+        raise InputError(f"{name}: the lists in {label} have {shortest or 0} elements, there is no {label}[{index}]")
+    return pc.list_element(column, index)
+
+
+def seconds(column: pa.ChunkedArray) -> np.ndarray | None:
+    """Dates and times of day, as ISO text or timestamps, in seconds from the first (N,); None where it holds none."""
+    if pa.types.is_timestamp(column.type):
+        stamps = column.cast(pa.timestamp("ns"), safe=False).to_numpy()
+    elif pa.types.is_string(column.type) and len(column) and ISO.match(_texts(column.slice(0, 1))[0].as_py() or ""):
+        texts = [re.sub(r"(Z|[+-]\d\d:?\d\d)$", "", x).replace(" ", "T") for x in _texts(column).to_pylist()]
+        try:
+            stamps = np.array([x if "T" in x or "-" in x else f"2000-01-01T{x}" for x in texts], "datetime64[ns]")
+        except ValueError:
+            return None
+    else:
+        return None
+    return (stamps - stamps[0]).astype(np.int64) * 1e-9
 
 
 def numbers(column: pa.ChunkedArray, label: str, name: str) -> np.ndarray:

@@ -71,8 +71,8 @@ def asked(
 
     The first that is asked for, and that one alone which leads where nothing is named yet. ``alone`` says of each offer
     whether it stands alone (see ordering.py). An impulse shows that something is missing; where the law that leads
-    explains more of it by a tie, that is named, and beside an effect a law that is asked for as well and explains not
-    much less.
+    explains more of it by a tie, that is named, and beside an effect a law that is asked for as well and explains
+    more.
     """
     wanted = [
         offer
@@ -98,9 +98,8 @@ def _beside_an_impulse(impulse: Offer, leader: Offer, others: Sequence[Offer], p
     """An impulse that is asked for, or a law in its place."""
     if leader is not impulse and leader.is_effect and leader.worth(policy) > impulse.worth(policy) + policy.tie:
         return leader, "a law explains more than the impulse that is asked for"
-    enough = impulse.worth(policy) - policy.anywhere
-    law = next((o for o in others if not o.once and o.worth(policy) > enough), None)
-    return (law, "a law explains not much less than an impulse") if law else (impulse, "no law explains an impulse")
+    law = next((o for o in others if not o.once and o.worth(policy) > impulse.worth(policy)), None)
+    return (law, "a law explains more than an impulse") if law else (impulse, "no law explains an impulse")
 
 
 def is_asked_for(offer: Offer, bar: Bar, policy: Policy = POLICY, least: float | None = None) -> bool:
@@ -119,6 +118,17 @@ def is_asked_for(offer: Offer, bar: Bar, policy: Policy = POLICY, least: float |
         return offer.gain >= (least if least > policy.least_gain else policy.near_least * least)
     lost = policy.lost_of_ample if offer.gain >= policy.ample * least else policy.lost
     return offer.gain >= least and (offer.z >= bar.z or offer.lost <= lost * offer.gain)
+
+
+def holds(gain: float, left: float, blocks: int, is_sprung: bool, policy: Policy = POLICY) -> bool:
+    """Whether a baseline with an effect in the spring's place is the better one, by its gain over so many ``blocks``.
+
+    Over one with a spring, ``is_sprung``, a rival on equal terms, by what supports a spring. Over one without it must
+    take so much of the C that is ``left`` that nothing else need be compared with it: a good part, or half of the
+    squared error nearly everywhere.
+    """
+    much = 0.0 if is_sprung else min(policy.good_part * left, -math.log(1.0 - policy.half) * blocks)
+    return gain >= max(policy.least_gain, policy.support * blocks, much)
 
 
 def is_steady(offer: Offer, policy: Policy = POLICY) -> bool:

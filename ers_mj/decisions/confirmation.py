@@ -55,17 +55,13 @@ def paired_p(won: Won, once: bool = False, alone: bool = False, policy: Policy =
 
     Blocks are not independent, and the best of many effects was taken: the p-value is never below the share of servos
     without missing physics in which as large a gain is offered, by an exponential tail (analysis/null_gains.py: of 48
-    the largest gain of a law is 1.8; stick and slip that fork offer what acts ``once`` 2.2 to 3.6 in four of them). An
-    impulse is also known by the block that it serves best: the worst one of 61 such servos is off by 3.7 to 5.8 sigma
-    in three, by more than 2 in twelve. A law whose round offers no other nearly as much, ``alone``
-    (ordering.stands_alone), has what chance offers to one only, in a share ``null_alone`` of them.
+    the largest gain of a law is 1.8; stick and slip that fork offer what acts ``once`` 2.2 to 3.6 in four of them). A
+    law whose round offers no other nearly as much, ``alone`` (ordering.stands_alone), has what chance offers to one
+    only, in a share ``null_alone`` of them.
     """
     losses = won.losses + won.blocks * policy.least_loss**2
     tail = policy.null_gain_once if once else policy.null_gain
     chance = (policy.null_alone if alone else 1.0) * math.exp(-max(won.total, 0.0) / tail)
-    if once:
-        beyond = max(won.best - math.log(policy.null_peak), 0.0)
-        chance = min(chance, math.exp(-policy.peak_tail * beyond))
     return max(chance, 0.5 * math.erfc(won.total / math.sqrt(2.0 * losses) / math.sqrt(2.0)))
 
 
@@ -86,23 +82,10 @@ def is_no_closer(held: HeldOut, policy: Policy = POLICY) -> bool:
     return held.log_ratio >= 0.0
 
 
-def is_halved(held: HeldOut, policy: Policy = POLICY) -> bool:
-    """Whether half of the squared free-run error above the noise goes, in a clear case, and the blocks speak for it on
-    balance.
-
-    An effect that one recording shows best is known less well without that recording: it helps there, and is not exact
-    to the noise.
-    """
-    after, without = held.rmse
-    above, left = without**2 - held.noise**2, after**2 - held.noise**2
-    is_clear = without > policy.clear * held.noise
-    return is_clear and left < policy.half * above and held.cost[0] < held.cost[1]
-
-
 def is_confirmed(held: HeldOut, halves_recalibrated: Callable[[], bool], policy: Policy = POLICY) -> bool:
-    """Whether an effect is confirmed: by blocks and free runs, by an error that is halved, or by one that is once gain,
-    offset and friction level of another day are known (asked for only where nothing else confirms it).
+    """Whether an effect is confirmed: by blocks and free runs, or by an error that is halved once gain, offset and
+    friction level of another day are known (asked for only where nothing else confirms it).
     """
-    if not is_doubtful(held, policy) or is_halved(held, policy):
+    if not is_doubtful(held, policy):
         return True
     return held.rmse[0] <= policy.worse * held.rmse[1] and halves_recalibrated()

@@ -32,10 +32,9 @@ class Findings(Protocol):
 
     ``names`` are the effects of the model, ``sensors`` those that show in the data itself, ``suspects`` the laws
     without a name that act here; ``explained`` is the share of the squared held-out error that goes with the names,
-    ``heldout_cost`` C without and with them, ``left_before`` and ``left`` what memory tells without and with them,
-    ``left_elsewhere`` the same in the recordings but the worst, ``free_train`` and ``free_held`` the free-run errors
-    after and ``least_astray`` the smallest of a recording before, in noise levels; ``datasheet_explains`` whether the
-    datasheet as it stands does.
+    ``left_before`` and ``left`` what memory tells without and with them, ``left_elsewhere`` the same in the recordings
+    but the worst, ``free_held`` the held-out free-run error after and ``least_astray`` the smallest of a recording
+    before, in noise levels; ``datasheet_explains`` whether the datasheet as it stands does.
     """
 
     @property
@@ -47,15 +46,11 @@ class Findings(Protocol):
     @property
     def explained(self) -> float: ...
     @property
-    def heldout_cost(self) -> tuple[float, float]: ...
-    @property
     def left_before(self) -> Left: ...
     @property
     def left(self) -> Left: ...
     @property
     def left_elsewhere(self) -> float: ...
-    @property
-    def free_train(self) -> float: ...
     @property
     def free_held(self) -> float: ...
     @property
@@ -102,39 +97,17 @@ def explained_each(shown: Sequence[Shown], left_before: Left, left: Left, policy
 
 
 def told_effects(f: Findings, policy: Policy = POLICY) -> Sequence[str]:
-    """The effects that are named: those of the model, if they account for half of what the baseline leaves, in free run
-    or, beyond doubt, in blocks or memory.
+    """The effects that are named: those of the model, if they account for half of what the baseline leaves in free
+    run.
     """
-    enough = f.explained >= policy.half or goes_in_blocks(f, policy) or goes_from_memory(f, policy)
-    return f.names if enough else ()
-
-
-def goes_in_blocks(f: Findings, policy: Policy = POLICY) -> bool:
-    """Whether nearly all of a large held-out C goes with the named effects: stick and slip that fork have lost the free
-    runs then.
-    """
-    before, after = f.heldout_cost
-    return before > policy.much and after < (1.0 - policy.nearly_gone) * before
-
-
-def goes_from_memory(f: Findings, policy: Policy = POLICY) -> bool:
-    """Whether nearly all that the output remembers of a mismatch goes with the named effects, and a ``fair`` share of
-    the free-run error.
-    """
-    before, after = (max(left["output"], 0.0) for left in (f.left_before, f.left))
-    is_gone = after < (1.0 - policy.nearly_gone) * before
-    return f.explained >= policy.fair and is_more_than_noise(f.left_before, None, policy) and is_gone
+    return f.names if f.explained >= policy.half else ()
 
 
 def is_more_missing(f: Findings, policy: Policy = POLICY) -> bool:
-    """Whether the model leaves more than noise: of the output nothing where free runs leave none, whatever forks in the
-    observer.
-    """
-    free = f.free_train < policy.free_train and f.free_held < policy.free_held
-    left = {**f.left, "output": 0.0} if free else f.left
-    if is_more_than_noise(left, f.left_before if f.names else None, policy):
+    """Whether the model leaves more than noise."""
+    if is_more_than_noise(f.left, f.left_before if f.names else None, policy):
         return True
-    return not (free or f.names) and f.left_elsewhere > policy.elsewhere
+    return not f.names and f.left_elsewhere > policy.elsewhere
 
 
 def is_a_part(f: Findings, policy: Policy = POLICY) -> bool:

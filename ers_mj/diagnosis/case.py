@@ -14,9 +14,10 @@ import numpy as np
 from ers_mj.data.prepared import Blocks
 from ers_mj.data.recording import Recording
 from ers_mj.decisions import verdict as rules
-from ers_mj.decisions.explained import cost, is_consistent
+from ers_mj.decisions.explained import is_consistent
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.mujoco_check import Rig, run_in_mujoco
+from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.initial_state import with_starts
@@ -88,12 +89,18 @@ class Case:
         """The errors before and after, as diagnosis.json has them."""
         c, base, model = self.confirmed, self.start.fit.model, self.model
         ran = f"of what was held out the MuJoCo plant ran {self._run_in_mujoco if self.search.in_mujoco else 'nothing'}"
-        train = [pooled([scored(m, t, k) for k, t in enumerate(self.start.traces)]).rmse for m in (base, model)]
+        traces = list(enumerate(self.start.traces))
+        train = [pooled([scored(m, t, k, measure=c.measure) for k, t in traces]).rmse for m in (base, model)]
+        before, after = pooled(c.before), pooled(c.after)
         return {
+            "measure": c.measure.name,
+            "window_s": c.measure.window_s,
             "train_rmse_before_rad": train[0],
             "train_rmse_after_rad": train[1],
-            "heldout_rmse_before_rad": pooled(c.before).rmse,
-            "heldout_rmse_after_rad": pooled(c.after).rmse,
+            "heldout_rmse_before_rad": before.rmse,
+            "heldout_rmse_after_rad": after.rmse,
+            "heldout_mae_before_rad": before.mae,
+            "heldout_mae_after_rad": after.mae,
             "recalibrated_rmse_before_rad": self._again[0].rmse,
             "recalibrated_rmse_after_rad": self._again[1].rmse,
             "mujoco_heldout_rmse_before_rad": self.multibody[0],
@@ -120,7 +127,7 @@ class Case:
         """The held-out scores before and after, recalibrated."""
         c = self.confirmed
         before, after = (
-            pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(models, c.parts)])
+            pooled([recalibrated(m, fold.held_out, c.measure)[0] for m, fold in zip(models, c.parts)])
             for models in (c.base_models, c.models)
         )
         return before, after
@@ -129,7 +136,8 @@ class Case:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return self.model.names
+        """The effects that may be named: none where the input never changes, which can tell no two of them apart."""
+        return () if is_unexcited(self.start.traces) else self.model.names
 
     @cached_property
     def explained(self) -> float:
@@ -153,18 +161,9 @@ class Case:
 
         return [rules.Shown(b.sure, a.sure, noise, misfit(b), misfit(a)) for b, a, noise in self.confirmed.shown]
 
-    @property
-    def heldout_cost(self) -> tuple[float, float]:
-        before, after = (pooled(scores).misfit for scores in (self.confirmed.before, self.confirmed.after))
-        return cost(before, 1.0), cost(after, 1.0)
-
     @cached_property
     def left_elsewhere(self) -> float:
         return left_elsewhere(self.model, self.start.traces)
-
-    @property
-    def free_train(self) -> float:
-        return self.fits["train_rmse_after_rad"] / self.noise
 
     @property
     def free_held(self) -> float:
@@ -247,7 +246,7 @@ class Case:
     @cached_property
     def errors(self) -> dict[tuple[str, str], tuple[float, float]]:
         """95 % intervals of every fitted number, by (owner, name)."""
-        model = replace(self.model, states=None)
+        model = self.model.of_records(range(len(self.start.traces)))
         left_out = (
             self.confirmed.models
             if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2

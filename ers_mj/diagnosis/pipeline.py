@@ -8,21 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from ers_mj.data.informative import searched
 from ers_mj.data.prepared import Trace, counted, trace_of
 from ers_mj.data.recording import Recording
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.document import Diagnosis, told
+from ers_mj.diagnosis.loop_pipeline import diagnose_loop
 from ers_mj.diagnosis.mujoco_check import Rig
+from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.effects.quantities import Symptoms
 from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes
 from ers_mj.selection.budget import SEARCH, Budget, Search
+from ers_mj.selection.comparison import Candidate
 from ers_mj.selection.confirmation import Confirmed, confirmed
 from ers_mj.selection.confounders import without_confounders
 from ers_mj.selection.stepwise import Selection, select
@@ -47,8 +52,8 @@ def diagnose(
 
     Args:
         recordings: training recordings of one rig, all of one output and input unit.
-        datasheet: what is known of the servo, or None: everything is identified.
-        holdout: recordings that are looked at only after the selection has ended.
+        datasheet: what is known of the servo, or None; a position command goes without.
+        holdout: looked at only after the selection has ended.
         seed: kept in the document; nothing here draws random numbers.
         jobs: threads; all cores by default. The result does not depend on it.
         progress: called with a text and a share of the work done.
@@ -59,39 +64,37 @@ def diagnose(
         InputError: no motion of the model resembles the recordings.
     """
     jobs = jobs or _cores()
+    recordings, holdout = searched(recordings, holdout)
     first = recordings[0]
+    if first.input_kind == "position":
+        return diagnose_loop(recordings, holdout, seed=seed, jobs=jobs, progress=progress, policy=policy)
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
     traces = [trace_of(r, inertia) for r in recordings]
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
-    sensors = symptoms(recordings, start.traces, travel, policy)
-    chosen = select(
-        start.fit,
-        start.traces,
-        anchors=start.anchors,
-        exclude=(*_ordinary(start.fit.model, policy), *SUSPECTS),
-        jobs=jobs,
-        progress=progress,
-        policy=policy,
-        budget=Budget(start.traces, search=search),
-    )
+    still = is_unexcited(start.traces)  # nothing can be told then, and nothing is named
+    sensors = {} if still else symptoms(recordings, start.traces, travel, policy)
+    known = tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS)
+    budget, begun = Budget(start.traces, search=search), None if still else start
+    grown = partial(select, jobs=jobs, progress=progress, policy=policy, budget=budget)
+    chosen = grown(start.fit, start.traces, start=begun, exclude=known)
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
-    chosen = replace(
-        chosen, base=start.fit, chosen=polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
-    )
+    best = polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
+    chosen = replace(chosen, base=start.fit, chosen=best)
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
-    named, suspects = without_confounders(selection, start.traces, jobs, policy, search)
-    if named is not selection:
-        selection, judged = confirmed(start, named, held, jobs, policy)
+    suspects: tuple[Candidate, ...] = ()
+    if not still:
+        named, suspects = without_confounders(selection, start.traces, jobs, policy, search)
+        if named is not selection:
+            selection, judged = confirmed(start, named, held, jobs, policy)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
     multibody = _in_mujoco(rig, selection, judged, jobs, progress) if search.in_mujoco else (None, None)
     progress("locating", 0.92)
     given = recordings, list(holdout), datasheet
-    case = Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search)
-    return told(case, held)
+    return told(Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search), held)
 
 
 def _in_mujoco(

@@ -8,8 +8,9 @@ from ers_mj.data.prepared import Trace
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.sentences import shown
 from ers_mj.selection.cross_validation import recalibrated
-from ers_mj.servo.model import STATES
+from ers_mj.servo.model import LOADS, STATES
 
+ONE_LOAD = 1.05  # factor within which recordings are of one load
 Ends = tuple[float | None, float | None]  # of a 95 % interval
 
 
@@ -47,11 +48,32 @@ def _differs(case: Case, name: str, values: Sequence[float], ci95: Sequence[Ends
 
 def _told(case: Case, name: str, values: Sequence[float], ci95: Sequence[Ends]) -> dict:
     unit = case.output_unit if name == "offset" else "-"
-    lowest, highest = shown(min(values), unit), shown(max(values), unit)
     return {
         "name": name,
         "unit": unit,
         "values": [float(v) for v in values],
         "ci95": [list(ends) for ends in ci95],
-        "sentence": f"{name.replace('_', ' ')} differs between the recordings: from {lowest} to {highest}",
+        "sentence": _by_groups(case, name, values) if name in LOADS else _from_to(name, values, unit),
     }
+
+
+def _from_to(name: str, values: Sequence[float], unit: str) -> str:
+    lowest, highest = shown(min(values), unit), shown(max(values), unit)
+    return f"{name.replace('_', ' ')} differs between the recordings: from {lowest} to {highest}"
+
+
+def _by_groups(case: Case, name: str, values: Sequence[float]) -> str:
+    """Which recordings are of one load, and how they differ."""
+    names = [recording.name for recording in (*case.recordings, *case.holdout)]
+    groups: list[list[int]] = []
+    for k in sorted(range(len(values)), key=lambda k: values[k]):
+        if groups and values[k] <= values[groups[-1][0]] * ONE_LOAD:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    told = "; ".join(
+        f"{', '.join(names[k] for k in sorted(group))}: {shown(sum(values[k] for k in group) / len(group), '-')}"
+        for group in groups
+    )
+    what = "inertia and gravity" if name == "load" else "gravity beyond the inertia's part"
+    return f"the recordings are of different loads, {what} over the first one's: {told}"

@@ -7,11 +7,14 @@ from collections.abc import Sequence
 
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.localisation import Place
+from ers_mj.diagnosis.unexcited import CANNOT, is_unexcited
 from ers_mj.effects import BY_NAME
 
 
 def sentence(case: Case, missing: Sequence[dict], found: Sequence[Place]) -> str:
     """One plain sentence that a mechanic would understand."""
+    if is_unexcited(case.start.traces):
+        return CANNOT
     if case.verdict == "consistent":
         return "The datasheet's model explains these recordings within their noise: nothing is missing."
     if case.verdict == "parameters_only":

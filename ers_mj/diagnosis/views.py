@@ -10,7 +10,7 @@ from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import RecordView, Rung
 from ers_mj.diagnosis.localisation import Samples, shaded
 from ers_mj.effects import BY_NAME
-from ers_mj.selection.cross_validation import free_run, pooled
+from ers_mj.selection.cross_validation import pooled
 from ers_mj.servo.model import Model
 
 
@@ -31,12 +31,11 @@ def views(case: Case, samples: Samples) -> list[RecordView]:
 
 
 def _view(case: Case, base: Model, model: Model, trace: Trace, record: int, is_held_out: bool) -> RecordView:
-    """One recording beside the free runs of both models, and of the second without each of the effects that are
-    named.
-    """
+    """One recording beside the runs of both models, and of the second without each of the effects that are named."""
+    run = case.confirmed.measure.run
     named = {name for name, _ in model.effects_of(record)}.intersection(case.told_effects)
-    without = {name: free_run(model.without_effect(name), trace, record) for name in case.told_effects if name in named}
-    runs = free_run(base, trace, record), free_run(model, trace, record)
+    without = {name: run(model.without_effect(name), trace, record) for name in case.told_effects if name in named}
+    runs = run(base, trace, record), run(model, trace, record)
     return RecordView(trace.name, is_held_out, trace.t, trace.u, trace.y, *runs, without=without)
 
 

@@ -15,21 +15,32 @@ ALIASES = {"t": "t_s"}  # short names that from_arrays takes as well
 
 
 def read(
-    path: Path, map: Mapping[str, str] | None = None, *, input: str | None = None, second: str | None = None
+    path: Path,
+    map: Mapping[str, str] | None = None,
+    *,
+    input: str | None = None,
+    second: str | None = None,
+    episode: str | int | None = None,
+    dbc: Path | None = None,
 ) -> Recording:
     """Read one recording.
 
     Args:
-        path: a CSV or Parquet file, or "FILE.parquet#run=17" for one run of a file that holds several.
-        map: contract name -> column of the file, where it uses names of its own.
+        path: a file of any format that is read (text, Parquet, MATLAB, HDF5, MF4, MCAP, ...), or "FILE#run=17" for one
+            run of a file that holds several.
+        map: contract name -> column of the file, where it uses names of its own; with a unit, a factor or arithmetic
+            where wanted, as in "Time [ms]", "enc:counts/4096", "pwm*24/255", "state[3]".
         input: the column that the servo is told, where several could be.
         second: a column to explain beside the output, such as the duty beside a position command.
+        episode: one run of a file that holds several, where the path names none.
+        dbc: what the messages of a CAN log mean.
 
     Returns:
         The recording: arrays (N,), time in s, input and output in its `input_unit` and `output_unit`.
 
     Raises:
         InputError: the file cannot be read or used, in one sentence.
+        MissingPackage: what reads such files is not installed.
 
     Examples:
         >>> import tempfile, pathlib
@@ -41,7 +52,7 @@ def read(
 
     Source: the columns are those of `ers diagnose`, with their units as suffixes.
     """
-    return read_recording(path, map, input_column=input, second=second)
+    return read_recording(path, map, input_column=input, second=second, episode=episode, dbc=dbc)
 
 
 def from_arrays(

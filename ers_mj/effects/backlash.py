@@ -33,6 +33,7 @@ class Backlash(Transmission):
         Parameter("zeta", "ratio", "contact's damping ratio", lower=0.05, upper=2.0, absent=0.2),
     )
     tries, tangible, is_play = 3, False, True
+    parts_damping = True
 
     def starts(self, scales):
         contact = min(120.0, 0.5 / scales.sample_time)

@@ -80,14 +80,20 @@ class Effect:
     follows_current: ClassVar[bool] = (
         False  # its law changes as fast as the current, or within a small angle: half the segment length
     )
+    parts_damping: ClassVar[bool] = False  # it tells the back-EMF's share of the damping from the mechanical one
     at_motor: ClassVar[bool] = (
         # its torque and memory are the motor's, at whose angle and speed they are taken where a play or a shaft parts
         # it from the rudder
         False
     )
     is_play: ClassVar[bool] = False  # a slack between motor and rudder, which a plant has once
+    holds_place: ClassVar[bool] = False  # it may stand in a baseline where others have a spring (see ``columns``)
     after_noise: ClassVar[bool] = False  # a sensor's converter or wire: it acts on what is read, noise and all
     holds: ClassVar[bool] = False  # a wire that brings an earlier reading again
+    # letters of a position loop (position_loop/model.py) that it is told by, where a firmware closes one
+    in_loop: ClassVar[tuple[str, ...]] = ()
+    loop_sentence: ClassVar[str] = ""  # what is said of it there, with the {value} of the first of these letters
+    is_weight: ClassVar[bool] = False  # its torques grow with a load's moment m l
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
@@ -134,6 +140,10 @@ class Effect:
         """
         return None
 
+    def columns(self, y: np.ndarray) -> np.ndarray:
+        """Torques (N, k) along the output y (N,) that one of each of its numbers makes, if it ``holds_place``."""
+        raise NotImplementedError
+
     def grown(self, name: str, p: np.ndarray, scales: Scales) -> list[np.ndarray]:
         """Parameter vectors (k,) near those p at which the effect ``name`` acts alike: where that one is a limit of
         this one.
@@ -161,7 +171,7 @@ class Effect:
         return c
 
     def constants(self, p: np.ndarray, c: Coefficients) -> np.ndarray:
-        """What the compiled law receives as its ``p`` (at most 7 numbers)."""
+        """What the compiled law receives as its ``p`` (at most 11 numbers)."""
         return p
 
     def is_lawful(self, p: np.ndarray) -> bool:

@@ -39,10 +39,11 @@ class Cogging(Drive):
 
     def starts(self, scales):
         travel = scales.high - scales.low
+        periods = [*(travel / order for order in ORDERS), *scales.finer_waves("torque", ORDERS[-1])]
         return [
-            np.array([0.2 * scales.acceleration, travel / order, 0.0, np.inf, np.inf])
-            for order in ORDERS
-            if travel / order <= scales.cog
+            np.array([0.2 * scales.acceleration, period, 0.0, np.inf, np.inf])
+            for period in periods
+            if period <= scales.cog
         ]
 
     def grown(self, name, p, scales):

@@ -30,6 +30,9 @@ class CurrentLimit(Drive):
         ),
     )
     needs, follows_current = (("tau_max",),), True
+    in_loop = ("most",)
+    loop_sentence = "the servo limits its current: its motor gives {value} at most"
+    parts_damping = True
 
     def starts(self, scales):
         peak = scales.drive or 4.0 * scales.acceleration

@@ -23,7 +23,8 @@ class GravityImbalance(Load):
         Parameter("g_s", "torque", "m g l cos(phase)", positive=False),
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),
     )
-    sized, tries = 2, 3
+    sized, tries, holds_place = 2, 3, True
+    is_weight = True
     redundant, curves = (
         1,
         "bias_torque",
@@ -36,6 +37,12 @@ class GravityImbalance(Load):
         size, middle = 0.2 * scales.acceleration, 0.5 * (scales.low + scales.high)
         turns = middle + np.pi / 2 * np.array([0.0, 1.0, 0.5, -0.5])
         return [size * np.array([np.cos(turn), -np.sin(turn)]) for turn in turns]
+
+    def columns(self, y):
+        return -np.column_stack([np.sin(y), np.cos(y)])
+
+    def coefficients(self, p, c):
+        return c._replace(g_s=c.g_s + p[0], g_c=c.g_c + p[1])
 
     @law
     def torque(p, theta, w, j, t):

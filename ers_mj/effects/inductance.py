@@ -33,6 +33,7 @@ class Inductance(Drive):
     absorbs = ("tau_e",)
     sized = 1
     tangible = False
+    parts_damping = True
 
     def starts(self, scales):
         return [np.array([times * scales.sample_time, np.inf]) for times in (2.0, 5.0)]

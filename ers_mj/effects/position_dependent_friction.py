@@ -44,7 +44,8 @@ class PositionDependentFriction(Friction):
             for width in (0.08, 0.25)
             for at in (0.51, 0.27, 0.74, 0.03, 0.96)
         ]
-        return places + [np.array([size, np.inf, np.inf, travel / order, 0.0]) for order in ORDERS]
+        periods = [*(travel / order for order in ORDERS), *scales.finer_waves("friction", ORDERS[-1])]
+        return places + [np.array([size, np.inf, np.inf, period, 0.0]) for period in periods]
 
     def constants(self, p, c):
         if np.isfinite(p[1]) and np.isfinite(p[3]):

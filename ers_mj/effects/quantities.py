@@ -27,6 +27,12 @@ class Coefficients(NamedTuple):
     - force over level)^``dahl`` of the rudder's speed. Of one body (rho = 0 beside two_body) the bristle's foot is the
     second one; beside a motor's side the rudder's bristle has the share 1 - phi of level, stiffness and damping.
 
+    ``g_s`` and ``g_c`` say how gravity pulls at the rudder, -g_s sin theta - g_c cos theta: a law of its own makes that
+    torque (``gravity_imbalance``), here it tells others what the gear carries.
+
+    Where ``creep`` [1/s] is not 0 friction creeps below breakaway (effect ``presliding``): it grows with the speed at
+    that rate, up to the level; segments of a motion are as short as it asks for.
+
     Where the inductance falls with the current tau_e is divided by 1 + (``fall`` j)^2, until LEAST_IRON of it is left.
     """
 
@@ -59,6 +65,9 @@ class Coefficients(NamedTuple):
     dahl: float = 1.0
     harden: float = 0.0
     fall: float = 0.0
+    g_s: float = 0.0
+    g_c: float = 0.0
+    creep: float = 0.0
 
     @property
     def has_motor_side(self) -> bool:
@@ -80,7 +89,9 @@ class Scales:
     ``quantum`` in output units, ``is_angle`` true where the output is an angle in rad, ``duration`` that of the longest
     recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
     behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of
-    one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most.
+    one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most,
+    ``waves`` the (kind, period) of what it leaves along the travel: of a "torque", a "friction" or the "reading",
+    ``is_held`` whether an effect holds the output where others have a spring.
     """
 
     position: float
@@ -100,6 +111,12 @@ class Scales:
     duration: float = 10.0
     recordings: int = 1
     hot: tuple[tuple[int, float, float], ...] = ()
+    waves: tuple[tuple[str, float], ...] = ()
+    is_held: bool = False
+
+    def finer_waves(self, kind: str, most: float) -> list[float]:
+        """The periods of the waves of a kind of which more than ``most`` lie within the travel."""
+        return [period for at, period in self.waves if at == kind and period * most < self.high - self.low]
 
 
 @dataclass(frozen=True)

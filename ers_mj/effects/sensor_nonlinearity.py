@@ -37,7 +37,8 @@ class SensorNonlinearity(Sensor):
         travel = scales.high - scales.low
         size = 0.01 * travel
         polynomial = [np.array([size / scales.position**2, size / scales.position**3, np.inf, np.inf, np.inf])]
-        return polynomial + [np.array([np.inf, np.inf, size, travel / order, 0.0]) for order in ORDERS]
+        periods = [*(travel / order for order in ORDERS), *scales.finer_waves("reading", ORDERS[-1])]
+        return polynomial + [np.array([np.inf, np.inf, size, period, 0.0]) for period in periods]
 
     def measure(self, p, t, y):
         bend, twist, amplitude, period, phase = p

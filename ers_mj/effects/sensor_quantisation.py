@@ -4,6 +4,8 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Sensor
 
+WHOLE = 0.01  # bits from a whole number, within which the step of an encoder is read from rounded numbers
+
 
 class SensorQuantisation(Sensor):
     """The output is rounded to the nearest multiple of ``step``. Found in the data itself, not by a fit."""
@@ -20,10 +22,13 @@ class SensorQuantisation(Sensor):
 
     def symptom(self, seen, policy):
         """A converter is one where it is coarse for the travel, or coarser than those of rudders' angles are and not
-        fine for the travel.
+        fine for the travel. An encoder that divides a turn by a power of two is ordinary from so many bits on.
         """
         ordinary = max(policy.ordinary_step, policy.fine_step * seen.travel)
-        is_unusual = seen.is_angle and np.median(seen.quanta) > ordinary
+        step = float(np.median(seen.quanta))
+        bits = np.log2(2.0 * np.pi / step) if step > 0.0 else 0.0
+        is_encoder = bits > policy.ordinary_bits - WHOLE and abs(bits - np.round(bits)) < WHOLE
+        is_unusual = seen.is_angle and step > ordinary and not is_encoder
         is_coarse = np.max(seen.quanta) > policy.coarse_step * seen.travel
         return np.array([np.max(seen.quanta)]) if is_coarse or is_unusual else None
 

@@ -41,6 +41,7 @@ class ShaftCompliance(Transmission):
     )
     needs = (("f_shaft",),)
     tries, tangible = 3, False
+    parts_damping = True
 
     def starts(self, scales):
         highest = 0.2 / scales.sample_time

@@ -46,6 +46,7 @@ class SupplySag(Drive):
     )
     needs = (("bridge", "whole", "measured"),)
     sized, tries = 3, 4
+    parts_damping = True
 
     def starts(self, scales):
         drawn = [
@@ -56,6 +57,12 @@ class SupplySag(Drive):
         return (
             drawn + [np.array([np.inf, np.inf, 0.5, np.inf, scales.input, scales.supply])] if scales.supply else drawn
         )
+
+    def grown(self, name, p, scales):
+        """Behind a capacitor, from a source without one."""
+        if name != self.name or np.isfinite(p[3]) or np.isfinite(p[2]):
+            return []
+        return [np.array([*p[:3], 0.02, *p[4:]])]
 
     def fed(self, p, u, supply):
         return u * (1.0 + p[2] * (supply / p[5] - 1.0)) if np.isfinite(p[2]) else u

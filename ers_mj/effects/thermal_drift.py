@@ -41,6 +41,7 @@ class ThermalDrift(Drive):
     )
     needs = (("rise",),)
     sized, tries = 1, 2
+    parts_damping = True
 
     def starts(self, scales):
         return [np.array([0.4, max(part * scales.duration, SHORTEST), scales.input]) for part in (0.3, 1.5, 0.06)]

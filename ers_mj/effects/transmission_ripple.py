@@ -57,6 +57,7 @@ class TransmissionRipple(Transmission):
 
     def starts(self, scales):
         periods = [(scales.high - scales.low) / order for order in ORDERS]
+        periods += scales.finer_waves("torque", ORDERS[-1])
         return [
             *(np.array([0.05, period, 0.0, np.inf, np.inf, np.inf]) for period in periods),
             *(

@@ -11,62 +11,41 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ers_mj.data.prepared import Trace, counted
+from ers_mj.decisions import explained
 from ers_mj.decisions.thresholds import POLICY
-from ers_mj.effects import BY_NAME
-from ers_mj.effects.quantities import Scales
 from ers_mj.errors import InputError
-from ers_mj.estimation.fit import Along, descend, fit, hopped
+from ers_mj.estimation.fit import Along, fit, hopped
 from ers_mj.estimation.initial_state import with_starts, without_spikes
-from ers_mj.estimation.objective import Fit, cost_of, run_of, tau_of
+from ers_mj.estimation.objective import Fit, run_of, tau_of
+from ers_mj.estimation.scales import ampere_in, free_in, scales_of
+from ers_mj.estimation.search import HOLDING, SPRINGS, Kinds, simplest
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.model import OBSERVER_RATE, Model
+from ers_mj.servo.model import OBSERVER_RATE, SIGNED, Model
 
 SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
-OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
-OPENING_TAU = 1e3  # and the misfit at which its cost turns to logarithms
-STARTS = 6  # guesses that are refitted
-OPENED = {
-    "preload": STARTS,
-    "spring": 2,
-    "bare": 2,
-}  # of these in a search that is only opened, in which the first has the most terms
-BEHIND = 0.25  # of C per block, by which a kind is too far behind to be finished
-SPRINGS = {"bare": (), "spring": ("a_1",), "preload": ("a_1", "c_1")}
+# first share of the back-EMF in the damping where nothing tells it, how near to none or all it begins, and standard
+# deviations of its logarithm: where the letters of a datasheet tell the back-EMF, each within some 15 %, and where not
+SHARE, LEAST_SHARE, TOLD_PRIOR, UNTOLD_PRIOR = 0.5, 0.05, 0.3, 0.7
 OVER_INERTIA, INERTIAS = (
     ("a_1", "a_2", "b", "c_1", "c_2", "ampere"),
     (0.6, 0.7, 0.8, 1.2, 1.4, 1.8),
 )  # what the inertia divides, and how it is tried beside what was found
 
 
-def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bool, tau_e: float | None) -> Scales:
-    """Typical sizes in these recordings."""
-    y = np.concatenate([t.y[t.valid] for t in traces])
-    low, high = float(y.min()), float(y.max())
-    lags = [max(1, round(0.02 / t.sample_time)) for t in traces]
-    speeds = np.concatenate([np.abs(t.y[k:] - t.y[:-k]) / (k * t.sample_time) for t, k in zip(traces, lags)])
-    peak = max(float(np.max(np.abs(t.u))) for t in traces)
-    supplies = [t.supply for t in traces if t.supply is not None]
-    return Scales(
-        position=0.5 * (high - low),
-        low=low,
-        high=high,
-        speed=float(np.nanquantile(speeds, 0.95)) + 1e-12,
-        acceleration=max(values.get("c_2", 0.0), 0.05 * abs(values["b"]) * peak),
-        input=peak,
-        sample_time=float(np.median([t.sample_time for t in traces])),
-        noise=float(np.median([t.sigma for t in traces])),
-        quantum=max(t.quantum for t in traces),
-        is_angle=is_angle,
-        tau_e_datasheet=tau_e,
-        duration=max(float(t.t[-1] - t.t[0]) for t in traces),
-        recordings=len(traces),
-        supply=float(np.median(np.concatenate(supplies))) if supplies else None,
-    )
+@dataclass(frozen=True)
+class Held:
+    """A baseline in which an effect holds the output where others have a spring, and the traces with the initial states
+    that it gives them.
+    """
+
+    fit: Fit
+    traces: Sequence[Trace]
 
 
 @dataclass(frozen=True)
 class Start:
-    """The refitted baseline, the traces with their fitted initial states, and other values that fits may start from.
+    """The refitted baseline, the traces with their fitted initial states, other values that fits may start from, and
+    the best baseline with an effect in the spring's place, where one was looked for.
 
     A refitted baseline has swallowed what it could of a missing effect; the datasheet's values, or those found under a
     scaffold, have not.
@@ -75,6 +54,7 @@ class Start:
     fit: Fit
     traces: Sequence[Trace]
     anchors: tuple[Mapping[str, float], ...] = ()
+    held: Held | None = None
 
 
 def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool, jobs: int = 1) -> Start:
@@ -85,9 +65,7 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
     """
     known = datasheet.to_lumped() if datasheet is not None else {}
     if {"a_2", "b"} <= known.keys():
-        sheet = _from_datasheet(traces, known, is_angle)
-        refitted, traces, others = _refined(sheet, traces, jobs)
-        found = Start(refitted, traces, ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others))
+        found = _from_datasheet(traces, known, is_angle, jobs)
     else:
         found = _from_scratch(traces, known, is_angle, jobs)
     if not np.isfinite(found.fit.cost):
@@ -95,24 +73,56 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
             "no motion that the reduced model can make resembles these recordings: check units and signs of input and"
             " output"
         )
-    model, gear = found.fit.model, datasheet.parameters.get("n") if datasheet is not None else None
+    held = found.held and replace(found.held, fit=_sized(found.held.fit, found.held.traces, datasheet))
+    return replace(found, fit=_sized(found.fit, found.traces, datasheet), held=held)
+
+
+def _sized(found: Fit, traces: Sequence[Trace], datasheet: Datasheet | None) -> Fit:
+    """The fit with the scales that only a fitted model and a gear tell, and a back-EMF."""
+    model = _with_back_emf(found.model, traces, datasheet.emf_damping if datasheet is not None else None)
+    gear = datasheet.parameters.get("n") if datasheet is not None else None
     # a turn of a motor: the least common multiple of its poles and slots, of which the smallest have two and three
     cogs = 3
-    drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, found.traces, OBSERVER_RATE).motions)
-    scales = replace(model.scales, drive=drive, cog=2 * np.pi / (cogs * gear) if gear else model.scales.cog)
-    return replace(found, fit=replace(found.fit, model=replace(model, scales=scales)))
+    drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, traces, OBSERVER_RATE).motions)
+    is_held = bool(model.effects)
+    scales = replace(
+        model.scales, is_held=is_held, drive=drive, cog=2 * np.pi / (cogs * gear) if gear else model.scales.cog
+    )
+    return replace(found, model=replace(model, scales=scales))
+
+
+def _with_back_emf(model: Model, traces: Sequence[Trace], damping: float | None) -> Model:
+    """The model with a first share of the back-EMF in the damping, and how well it is known, where neither a datasheet
+    nor the recordings tell it; ``damping`` [1/s] is the back-EMF's where a datasheet tells that. What is told a torque
+    or a current has none.
+    """
+    if model.values["emf_share"] > 0 or traces[0].input_kind in ("torque", "current"):
+        return model
+    share = min(max(damping / model.values["a_2"], LEAST_SHARE), 1.0 - LEAST_SHARE) if damping else SHARE
+    prior = math.log(share), TOLD_PRIOR if damping else UNTOLD_PRIOR
+    values = {**model.values, "emf_share": share}
+    return replace(model, values=values, priors={**(model.priors or {}), "emf_share": prior})
 
 
 def sharpened(start: Start, travel: float) -> Start:
     """The baseline refitted to what coarse converters tell (see quantisation.py), where some are coarse for the travel
-    [output unit]: their thresholds sharpen a fit that is near, and lead one astray that is not. The inertia, which
-    divides all of Eq. (6)'s letters but the angle, is what they tell least, so it is tried larger and smaller too.
+    [output unit].
     """
-    traces = counted(start.traces, travel)
-    if all(t.converter is None for t in traces):
-        return start
-    traces = with_starts(start.fit.model, traces)
-    found = fit(start.fit.model, traces)
+    held = start.held and Held(*_sharpened(start.held.fit, start.held.traces, travel))
+    found, traces = _sharpened(start.fit, start.traces, travel)
+    return replace(start, fit=found, traces=traces, held=held)
+
+
+def _sharpened(found: Fit, traces: Sequence[Trace], travel: float) -> tuple[Fit, Sequence[Trace]]:
+    """A fit refitted to the thresholds of coarse converters: they sharpen a fit that is near, and lead one astray that
+    is not. The inertia, which divides all of Eq. (6)'s letters but the angle, is what they tell least, so it is tried
+    larger and smaller too.
+    """
+    told = counted(traces, travel)
+    if all(t.converter is None for t in told):
+        return found, traces
+    traces = with_starts(found.model, told)
+    found = fit(found.model, traces)
     tau, values = tau_of(found.misfit), found.model.values
     inert = [
         replace(found.model, values={**values, **{name: values[name] / ratio for name in OVER_INERTIA}})
@@ -123,30 +133,7 @@ def sharpened(start: Start, travel: float) -> Start:
         key=lambda found: found.cost,
     )
     traces = with_starts(found.model, traces)
-    return replace(start, fit=fit(found.model, traces, tau=tau_of(found.misfit)), traces=traces)
-
-
-def opening(traces: Sequence[Trace], is_angle: bool) -> dict[str, float]:
-    """Eq. (6)'s letters from recordings alone, with the springs that these support: near enough for a search to begin,
-    not refined.
-
-    What was found with more terms opens the searches with fewer; a search that is far behind is not finished.
-    """
-    kinds = _Kinds.of(traces, {}, is_angle)
-    best: dict[str, Fit] = {}
-    for kind, count in OPENED.items():
-        places = [*kinds.places(kind), *(kinds.prepared(kind, found.model.values) for found in best.values())]
-        models = [Model(values, _free(values, traces), scales=kinds.scales) for values in places]
-        models.sort(key=lambda model: cost_of(model, traces, OPENING_RATES[0], OPENING_TAU))
-        tries = [descend(model, traces, OPENING_RATES[0], OPENING_TAU, 6, 1.0) for model in models[:count]]
-        best[kind] = min(tries, key=lambda found: found.cost)
-    level = min(found.cost for found in best.values()) + BEHIND * best["bare"].misfit.size
-    finished = {
-        kind: fit(found.model, traces, rate=OPENING_RATES[1], steps=10)
-        for kind, found in best.items()
-        if found.cost <= level
-    }
-    return dict(_simplest(finished).model.values)
+    return fit(found.model, traces, tau=tau_of(found.misfit)), traces
 
 
 def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Sequence[Trace], list[dict[str, float]]]:
@@ -167,45 +154,52 @@ def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Seq
     return *hopped(found, traces, tau_of(found.misfit), jobs, restart=True), others
 
 
-def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> Model:
+def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, jobs: int) -> Start:
+    """The datasheet's values refitted; where it names no spring, others may have what holds the output."""
+    sheet = _of_datasheet(traces, known, is_angle)
+    refitted, started, others = _refined(sheet, traces, jobs)
+    if explained.is_model_error(refitted.misfit) and _acts_the_other_way(traces, sheet.values["b"]):
+        turned = replace(sheet, values={**sheet.values, **{name: -sheet.values[name] for name in SIGNED}})
+        other, there, more = _refined(turned, traces, jobs)
+        if explained.cost(other.misfit, 1.0) < explained.cost(refitted.misfit, 1.0):
+            sheet, refitted, started, others = turned, other, there, more
+    anchors = ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others)
+    found = Start(refitted, started, anchors)
+    if sheet.values["a_1"] > 0 or sheet.values["c_1"] > 0 or _explains(refitted):
+        return found
+    kinds = Kinds.of(traces, {**known, **{n: sheet.values[n] for n in SIGNED if n in known}}, is_angle)
+    if "a_1" not in known:
+        found = _supported(found, _refined_springs(kinds, traces, jobs), anchors)
+    return replace(found, held=_held(kinds, traces, jobs))
+
+
+def _acts_the_other_way(traces: Sequence[Trace], b: float) -> bool:
+    """Whether a regression says that the input acts the other way than a datasheet says."""
+    from ers_mj.estimation.initial_guess import guesses  # brings scipy.signal, as in search
+
+    best = next(iter(guesses(traces)), None)
+    return best is not None and best.values["b"] * b < 0
+
+
+def _explains(found: Fit) -> bool:
+    return explained.is_near_noise(found.misfit) and explained.is_quiet(found.misfit, tau_of(found.misfit))
+
+
+def _supported(bare: Start, sprung: Start, anchors: tuple) -> Start:
+    """The start with springs where the data supports them."""
+    tau = tau_of(sprung.fit.misfit)
+    gain = explained.cost(bare.fit.misfit, tau) - explained.cost(sprung.fit.misfit, tau)
+    if gain <= POLICY.support * bare.fit.misfit.size:
+        return bare
+    return replace(sprung, anchors=(*sprung.anchors, *anchors))
+
+
+def _of_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> Model:
     values = {"a_1": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0, **known}
-    values.setdefault("ampere", _ampere(values["b"], traces))
+    values.setdefault("ampere", ampere_in(values["b"], traces))
     scales = scales_of(traces, values, is_angle, values["tau_e"] or None)
     values["c_2"] = max(values["c_2"], 1e-3 * scales.acceleration)
-    return Model(values, _free(values, traces), scales=scales, priors=_priors(values))
-
-
-def _free(values: Mapping[str, float], traces: Sequence[Trace]) -> tuple[str, ...]:
-    """What is fitted: springs only where there is one, the back-EMF's share only where current or an open circuit shows
-    it.
-    """
-    spring, preload = values["a_1"] > 0, values["c_1"] > 0
-    names = [
-        "a_2",
-        "b",
-        "c_2",
-        *(["a_1"] if spring else []),
-        *(["c_1"] if preload else []),
-        *(["theta_0"] if spring or preload else []),
-    ]
-    opened = any(t.enable is not None and not t.enable.all() for t in traces)
-    if values["tau_e"] > 0:
-        names.append("tau_e")
-    seen = any(c.kind == "current" for t in traces for c in t.channels)
-    if values["tau_e"] > 0 or opened or seen:
-        names.append("emf_share")
-    if seen:
-        names.append("ampere")
-    return tuple(names)
-
-
-def _ampere(b: float, traces: Sequence[Trace]) -> float:
-    """A first n K_t / J: b times the resistance that voltage over current makes."""
-    pairs = [(t.u, c.values) for t in traces for c in t.channels if c.kind == "current"]
-    if not pairs:
-        return b
-    u, i = (np.nan_to_num(np.concatenate(column)) for column in zip(*pairs))
-    return b * max(float(u @ i), 0.05 * float(np.linalg.norm(u) * np.linalg.norm(i))) / float(i @ i)
+    return Model(values, free_in(values, traces), scales=scales, priors=_priors(values))
 
 
 def _priors(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -217,88 +211,36 @@ def _priors(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
 
 
 def _from_scratch(traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool, jobs: int) -> Start:
-    """Several guesses, refitted as observers of falling gain; the simplest structure that the data supports.
+    """Several guesses, refitted as observers of falling gain; the simplest structure that the data supports, and the
+    best one with an effect in the spring's place.
+    """
+    kinds = Kinds.of(traces, known, is_angle)
+    found = _refined_springs(kinds, traces, jobs)
+    return found if _explains(found.fit) else replace(found, held=_held(kinds, traces, jobs))
+
+
+def _refined_springs(kinds: Kinds, traces: Sequence[Trace], jobs: int) -> Start:
+    """What the data supports of springs, refitted.
 
     What disturbs the search most (Effect.scaffold: stops, one-sided friction) is tried as a scaffold that is taken away
     at the end: a spring must beat one-sided friction to be kept, and what was found under the scaffold stays as an
     anchor for later fits.
     """
-    kinds = _Kinds.of(traces, known, is_angle)
-    chosen = _simplest({kind: _searched(traces, kinds, kind) for kind in SPRINGS})
-    scales = scales_of(traces, chosen.model.values, is_angle, None)
-    found, traces, others = _refined(replace(chosen.model, effects=(), scales=scales), traces, jobs)
-    return Start(found, traces, (*((dict(chosen.model.values),) if chosen.model.effects else ()), *others))
+    searched = {kind: kinds.searched(kind) for kind in SPRINGS}
+    chosen = simplest({kind: found for kind, found in searched.items() if found is not None})
+    scales = scales_of(traces, chosen.model.values, kinds.scales.is_angle, None)
+    found, started, others = _refined(replace(chosen.model, effects=(), scales=scales), traces, jobs)
+    return Start(found, started, (*((dict(chosen.model.values),) if chosen.model.effects else ()), *others))
 
 
-def _simplest(found: Mapping[str, Fit]) -> Fit:
-    """The fit with the fewest springs that the data supports."""
-    kinds = [kind for kind in SPRINGS if kind in found]
-    chosen = found[kinds[0]]
-    price = POLICY.support * chosen.misfit.size
-    for kind in kinds[1:]:
-        if chosen.cost - found[kind].cost > price:
-            chosen = found[kind]
-    return chosen
-
-
-@dataclass(frozen=True)
-class _Kinds:
-    """Guesses by the spring terms that they have, and the least that these may be."""
-
-    starts: Sequence[Mapping[str, float]]
-    scales: Scales
-
-    @classmethod
-    def of(cls, traces: Sequence[Trace], known: Mapping[str, float], is_angle: bool) -> _Kinds:
-        """Those of recordings, beside what is known.
-
-        Raises:
-            InputError: an input of zeros, or too little motion.
-        """
-        from ers_mj.estimation.initial_guess import (
-            guesses,  # brings scipy.signal, which takes a second to import and is needed here alone
-        )
-
-        if not any(t.u.any() for t in traces):
-            raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
-        opened = any(t.enable is not None and not t.enable.all() for t in traces)
-        shown = opened or any(c.kind == "current" for t in traces for c in t.channels)
-        starts = [
-            {"tau_e": 0.0, "emf_share": 0.5 if shown else 0.0, "ampere": _ampere(g["b"], traces), **g, **known}
-            for g in guesses(traces)
-        ]
-        if not starts:
-            raise InputError(
-                "the output nowhere moves for long enough to guess parameters from it: a longer or livelier recording,"
-                " or a datasheet, was expected"
-            )
-        return cls(starts, scales_of(traces, starts[0], is_angle, None))
-
-    def prepared(self, kind: str, values: Mapping[str, float]) -> dict[str, float]:
-        """Values with the spring terms of a kind and no others."""
-        least = {"a_1": 1e-3 * self.scales.acceleration / self.scales.position, "c_1": 0.1 * self.scales.acceleration}
-        absent = {name: 0.0 for name in least if name not in SPRINGS[kind]}
-        if kind == "bare":
-            absent["theta_0"] = 0.5 * (self.scales.low + self.scales.high)
-        return {**values, **{name: max(values[name], least[name]) for name in SPRINGS[kind]}, **absent}
-
-    def places(self, kind: str) -> list[dict[str, float]]:
-        """The most promising guesses of a kind, prepared."""
-        pool = [v for v in self.starts if (v["c_1"] > 0) == (kind == "preload")] or self.starts
-        return [self.prepared(kind, values) for values in pool[:STARTS]]
-
-
-def _searched(traces: Sequence[Trace], kinds: _Kinds, kind: str) -> Fit:
-    """The best of the guesses with these spring terms, under the scaffold that serves it best, of the two that open
-    best.
-    """
-    at = ((effect.name, effect.scaffold(kinds.scales, bool(SPRINGS[kind]))) for effect in BY_NAME.values())
-    scaffolds = [(), *(((name, start),) for name, start in at if start is not None)]
-    tries = []
-    for values in kinds.places(kind):
-        for effects in scaffolds:
-            model = Model(values, _free(values, traces), effects=effects, scales=kinds.scales)
-            tries.append(descend(model, traces, OPENING_RATES[0], OPENING_TAU, 6, 1.0))
-    tries.sort(key=lambda f: f.cost)
-    finals = [fit(f.model, traces, rate=OPENING_RATES[1], steps=10) for f in tries[:2]]
-    return min(finals, key=lambda f: f.cost)
+def _held(kinds: Kinds, traces: Sequence[Trace], jobs: int) -> Held | None:
+    """The best baseline with an effect in the spring's place, begun from guesses of its own."""
+    found = [(kinds.searched(name), name) for name in HOLDING]
+    tries = [(one.cost, one.model, name) for one, name in found if one is not None]
+    if not tries:
+        return None
+    _, model, name = min(tries, key=lambda one: one[0])
+    scales = scales_of(traces, model.values, kinds.scales.is_angle, None)
+    alone = replace(model, effects=tuple(e for e in model.effects if e[0] == name), scales=scales)
+    refitted, started, _ = _refined(alone, traces, jobs)
+    return Held(refitted, started)

@@ -2,31 +2,59 @@
 
 Weak form: Eq. (6) is multiplied by a bump that vanishes with its slope at both ends of a window, and integrated by
 parts, so that the output is never differentiated twice. What is left is linear in a_1, a_2, b, c_1, c_2 once theta_0 is
-given, and theta_0 is scanned over the travel.
+given, and theta_0 is scanned over the travel; and in the numbers of an effect that stands in a spring's place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
 from scipy.signal import savgol_filter
 
 from ers_mj.data.prepared import Trace
+from ers_mj.effects.base import Effect
 
 WINDOWS = (0.1, 0.3, 1.0)  # [s], never shorter than SHORTEST samples
 SHORTEST = 16
 EDGE = 0.02  # share of the travel next to its ends that is left out: a stop may act there
 PLACES = np.linspace(0.05, 0.95, 13)  # quantiles of the output at which theta_0 is tried
-SIGNED = [1, 3]  # columns whose coefficients may be negative: b and the constant
+VISCOUS, GAIN, DRY, CONSTANT, SPRING = range(5)  # columns of the regression
+LEAST = 0.05  # of an effect's largest number, that its others begin with: one that begins at zero has no scale
 # [1/s] acceleration by the largest input over the speeds that are met: what makes more was guessed from no input at all
 FASTEST = 1e4
 
 
-def _rows(trace: Trace, window: float, still: float):
-    """Weak-form rows of one trace: right side (W,), columns -y', u, -sgn(w), 1, -y (W, 5), and a maker of -sgn(y -
-    theta_0).
+class Guess(NamedTuple):
+    """Eq. (6)'s letters, and the effects beside them, with which a fit may begin; the ``misfit`` of the regression."""
+
+    misfit: float
+    values: Mapping[str, float]
+    effects: tuple[tuple[str, np.ndarray], ...] = ()
+
+    @property
+    def held_by(self) -> str:
+        """What holds the output at its place: an effect, "preload" or, maybe, a spring."""
+        return self.effects[0][0] if self.effects else "preload" if self.values["c_1"] > 0 else "spring"
+
+
+class Rows(NamedTuple):
+    """Weak-form rows of a trace: right side (W,), columns (W, 5) of -y', u, -sgn(w), 1, -y, and what makes one of any
+    further torque (N,) along the output, given as a function of that.
+    """
+
+    right: np.ndarray
+    columns: np.ndarray
+    of: Callable[[Callable[[np.ndarray], np.ndarray]], np.ndarray]
+
+
+def _rows(trace: Trace, window: float, still: float) -> Rows | None:
+    """The rows of one trace; None where it is too short for a window [s] or moves, faster than ``still``, too little.
+
+    The bump's slopes are differences of the sampled bump, which sum to zero exactly: else a constant output would make
+    a torque.
     """
     h = trace.sample_time
     n = max(SHORTEST, int(window / h))
@@ -48,66 +76,89 @@ def _rows(trace: Trace, window: float, still: float):
     if index.shape[0] < 8:
         return None
     take = lambda f, v: (v[index] * f).sum(axis=1) * h
-    columns = np.column_stack(
-        [
-            take(slope, y),
-            take(bump, trace.u),
-            -take(bump, sign),
-            np.full(index.shape[0], bump.sum() * h),
-            -take(bump, y),
-        ]
-    )
-    return take(bend, y), columns, lambda theta_0: -take(bump, np.sign(y - theta_0))
+    columns = [take(slope, y), take(bump, trace.u), -take(bump, sign)]
+    columns += [np.full(index.shape[0], bump.sum() * h), -take(bump, y)]
+    return Rows(take(bend, y), np.column_stack(columns), lambda torque: take(bump, torque(y)))
 
 
-def guesses(traces: Sequence[Trace]) -> list[dict[str, float]]:
-    """Starting values of Eq. (6), best regression first, with and without spring and preload; none of an absurd
-    gain.
+def guesses(traces: Sequence[Trace], holding: Sequence[Effect] = ()) -> list[Guess]:
+    """Starting values of Eq. (6), best regression first: without a spring and with one, with preload, and with each of
+    the effects ``holding`` the output in their place; none of an absurd gain.
     """
     y = np.concatenate([t.y[t.valid] for t in traces])
     speed = np.concatenate([np.abs(np.diff(savgol_filter(t.y[t.valid], 9, 2))) / t.sample_time for t in traces])
     still = max(0.02 * float(np.quantile(speed, 0.98)), 1e-12)
-    found = [one for window in WINDOWS for one in _by_window(traces, window, still, y)]
-    found.sort(key=lambda item: item[0])
+    found = [one for window in WINDOWS for one in _by_window(traces, window, still, y, holding)]
+    found.sort(key=lambda guess: guess.misfit)
     most, peak = FASTEST * float(np.quantile(speed, 0.98)), max(float(np.max(np.abs(t.u))) for t in traces)
-    return [values for _, values in found if abs(values["b"]) * peak <= most]
+    return [guess for guess in found if abs(guess.values["b"]) * peak <= most]
 
 
-def _by_window(traces: Sequence[Trace], window: float, still: float, y: np.ndarray) -> list[tuple[float, dict]]:
-    """The regressions over windows of one length [s], without spring and with one at each place, as (misfit,
-    values).
-    """
+def _by_window(
+    traces: Sequence[Trace], window: float, still: float, y: np.ndarray, holding: Sequence[Effect]
+) -> list[Guess]:
+    """The regressions over windows of one length [s]."""
     rows = [r for r in (_rows(t, window, still) for t in traces) if r is not None]
     if not rows:
         return []
-    right, columns = np.concatenate([r[0] for r in rows]), np.vstack([r[1] for r in rows])
-    places = [(None, False), (None, True), *((theta_0, True) for theta_0 in np.quantile(y, PLACES))]
+    middle = float(np.median(y))
+    joint = Joint(np.concatenate([r.right for r in rows]), np.vstack([r.columns for r in rows]), rows)
     with np.errstate(all="ignore"):  # of a constant input next to nothing follows
-        return [_solve(right, columns, rows, at, spring, float(np.median(y))) for at, spring in places]
+        sprung = [joint.sprung(at, spring, middle) for at, spring in ((None, False), (None, True))]
+        preloaded = [joint.sprung(theta_0, True, middle) for theta_0 in np.quantile(y, PLACES)]
+        return [*sprung, *preloaded, *(joint.held(effect, middle) for effect in holding)]
 
 
-def _solve(right, columns, rows, theta_0, spring, middle):
-    """(relative residual, values) of one bounded regression, reweighted towards its smaller residuals."""
-    design = columns[:, :5] if spring else columns[:, :4]
-    if theta_0 is not None:
-        design = np.column_stack([design, np.concatenate([r[2](theta_0) for r in rows])])
-    size = np.maximum(np.abs(design).max(axis=0), 1e-300)
-    signed = np.column_stack([design / size, -design[:, SIGNED] / size[SIGNED]])
-    weight = np.ones(right.size)
-    for _ in range(4):
-        x = nnls(signed * weight[:, None], right * weight)[0]
-        x[SIGNED] -= x[design.shape[1] :]
-        x = x[: design.shape[1]] / size
-        e = right - design @ x
-        weight = 1.0 / np.sqrt(1.0 + (e / (2 * np.median(np.abs(e)) + 1e-300)) ** 2)
-    a_1 = x[4] if spring else 0.0
-    rest = x[3] / a_1 if a_1 > 0 else middle
-    values = {
-        "a_1": a_1,
-        "a_2": max(x[0], 1e-3),
-        "b": x[1],
-        "c_1": x[5] if theta_0 is not None else 0.0,
-        "c_2": max(x[2], 1e-3 * abs(x[1]) * 1.0),
-        "theta_0": theta_0 if theta_0 is not None else rest,
-    }
-    return float(np.median(np.abs(e)) / np.median(np.abs(right))), values
+class Joint(NamedTuple):
+    """The rows of all traces: one regression over every law that is linear in its numbers."""
+
+    right: np.ndarray
+    columns: np.ndarray
+    rows: Sequence[Rows]
+
+    def sprung(self, theta_0: float | None, spring: bool, middle: float) -> Guess:
+        """With a preload about ``theta_0`` or without one, with a spring or without."""
+        design = self.columns[:, : SPRING + spring]
+        if theta_0 is not None:
+            design = np.column_stack([design, self._torque(lambda y: -np.sign(y - theta_0))])
+        misfit, x = self._solved(design, [GAIN, CONSTANT])
+        a_1 = x[SPRING] if spring else 0.0
+        rest = x[CONSTANT] / a_1 if a_1 > 0 else middle
+        held = {"a_1": a_1, "c_1": x[-1] if theta_0 is not None else 0.0}
+        return Guess(misfit, {**_moving(x), **held, "theta_0": theta_0 if theta_0 is not None else rest})
+
+    def held(self, effect: Effect, middle: float) -> Guess:
+        """With an effect in the spring's place."""
+        count = len(effect.parameters)
+        torques = [self._torque(lambda y, k=k: effect.columns(y)[:, k]) for k in range(count)]
+        misfit, x = self._solved(
+            np.column_stack([self.columns[:, :CONSTANT], *torques]), [GAIN, *range(CONSTANT, CONSTANT + count)]
+        )
+        p = x[CONSTANT:]
+        least = LEAST * max(float(np.max(np.abs(p))), 1e-12)
+        p = np.where(np.abs(p) < least, np.copysign(least, p), p)
+        return Guess(misfit, {**_moving(x), "a_1": 0.0, "c_1": 0.0, "theta_0": middle}, ((effect.name, p),))
+
+    def _torque(self, torque: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        return np.concatenate([r.of(torque) for r in self.rows])
+
+    def _solved(self, design: np.ndarray, signed: list[int]) -> tuple[float, np.ndarray]:
+        """(relative residual, coefficients) of one regression, reweighted towards its smaller residuals; all but the
+        ``signed`` coefficients are positive.
+        """
+        right = self.right
+        size = np.maximum(np.abs(design).max(axis=0), 1e-300)
+        both = np.column_stack([design / size, -design[:, signed] / size[signed]])
+        weight = np.ones(right.size)
+        for _ in range(4):
+            x = nnls(both * weight[:, None], right * weight)[0]
+            x[signed] -= x[design.shape[1] :]
+            x = x[: design.shape[1]] / size
+            e = right - design @ x
+            weight = 1.0 / np.sqrt(1.0 + (e / (2 * np.median(np.abs(e)) + 1e-300)) ** 2)
+        return float(np.median(np.abs(e)) / np.median(np.abs(right))), x
+
+
+def _moving(x: np.ndarray) -> dict[str, float]:
+    """What a regression says of an output that moves."""
+    return {"a_2": max(x[VISCOUS], 1e-3), "b": x[GAIN], "c_2": max(x[DRY], 1e-3 * abs(x[GAIN]))}

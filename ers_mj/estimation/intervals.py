@@ -19,7 +19,7 @@ from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.jacobian import central_jacobian
 from ers_mj.estimation.objective import residuals
-from ers_mj.servo.model import OBSERVER_RATE, Model
+from ers_mj.servo.model import OBSERVER_RATE, STATES, Model
 
 UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (decisions.policy.least_gain is what it must)
 UNSEEN = 1.0  # effects of that size that act, on average
@@ -45,7 +45,7 @@ def half_widths(
     """
     layout = model.layout()
     widths = _sandwich(model, traces, tau, slopes_of(model, traces) if jacobian is None else jacobian)
-    if len(left_out) >= FEWEST_RECORDS and not any(f.local for f in layout):
+    if len(left_out) >= FEWEST_RECORDS and not any(f.local or f.owner in STATES for f in layout):
         z = np.array([m.vector(layout) for m in left_out])
         n = len(left_out)
         widths = np.hypot(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ers_mj.data.prepared import Trace
 from ers_mj.errors import InputError
-from ers_mj.estimation.baseline import scales_of
+from ers_mj.estimation.scales import scales_of
 from ers_mj.servo.datasheet import LUMPED, Datasheet
 from ers_mj.servo.model import Model
 from ers_mj.servo.simulation import inertia_of, kernel_effects

@@ -12,6 +12,8 @@ from ers_mj.plants.state import MODES, VECTOR, F, N, has_bristle, types
 
 FALL_STEP = 0.1  # length of a segment over the electrical time constant where the inductance falls with the current
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
+SLOWEST = 1e-6  # [1/s] rate at least, of a plant without spring and damping
+CREEP_STEP = 0.7  # rate [1/s] of friction that creeps times segment length
 CONTACT_STEP = 0.8  # contact frequency [rad/s] times segment length with a second body or at a stop
 CORNER = 1e-4  # a crossing of theta_0 slower than this share of (c_1 + c_2) h ends in the corner
 BRISTLE_CORNER = 0.1  # the same for a rudder that no friction slows: share of c_1 h below which it bounces out of sight
@@ -35,7 +37,8 @@ CUTS = types.NamedTuple([VECTOR, MODES, N, F, F], Cuts)
 @inline
 def law_step(c, a_emf):
     """Length of a segment [s] at most under a law."""
-    return LAW_STEP / (max(abs(c.a_mech_plus), abs(c.a_mech_minus)) + math.sqrt(abs(c.a_1)) + a_emf)
+    rate = max(abs(c.a_mech_plus), abs(c.a_mech_minus)) + math.sqrt(abs(c.a_1)) + a_emf
+    return LAW_STEP / max(rate, SLOWEST)
 
 
 @inline
@@ -44,6 +47,8 @@ def _longest(c, h0):
     step = h0
     if c.lawful > 0:
         step = min(step, law_step(c, c.a_emf))
+    if c.creep > 0:
+        step = min(step, CREEP_STEP / c.creep)
     if c.fall > 0 and c.tau_e > 0:
         step = min(step, FALL_STEP * c.tau_e)
     if c.two_body > 0:

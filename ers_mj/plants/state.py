@@ -26,7 +26,7 @@ from ers_mj.effects.base import Coefficients
 from ers_mj.plants.compiled import inline, record_in
 
 MOST_LAWS = 40  # effects that act by laws at once
-N_CONSTANTS = 7  # of a law at most
+N_CONSTANTS = 11  # of a law at most
 MOST_PIECES, MOST_TERMS = 4, 40  # of an expansion of the flow in time
 RUNAWAY = 1e9  # [output unit, and that per second] beyond which a motion is given up (NaN)
 

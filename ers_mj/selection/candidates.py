@@ -22,7 +22,7 @@ from ers_mj.selection.finishing import Early, finished, told
 from ers_mj.selection.overlooked import refit_held_taut, refit_the_overlooked
 from ers_mj.selection.refits import Label, Refits, is_law_of_dear, is_out_of_reach, leaders
 from ers_mj.selection.screening import Begin, screen
-from ers_mj.servo.model import STATES, Model
+from ers_mj.servo.model import DRIFTS, Model
 
 
 def candidates(
@@ -79,7 +79,7 @@ class _Race(Refits):
     def _refit_the_promising(self) -> set[str]:
         """First refits, of further effects as long as a promise was none; the names of those."""
         model, records = self.base.model, len(self.bench.traces)
-        states = [s for s in STATES if records > 1 and s not in (model.states or {})]
+        states = [s for s in DRIFTS if records > 1 and s not in (model.states or {})]
         self.starts = {(s, 0): [Begin(model.with_state(s, records), {})] for s in states}
         self.best = self.quick([(label, begins[0]) for label, begins in self.starts.items()])
         failed: set[str] = set()

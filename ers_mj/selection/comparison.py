@@ -154,7 +154,7 @@ def is_clocked(name: str) -> bool:
 
 def is_dear(current: Fit) -> bool:
     """Whether the model takes many times as long to simulate as others."""
-    return any(BY_NAME[name].dear for name in current.model.names)
+    return any(BY_NAME[name].dear for name in current.model.names) and current.model.plant().bends
 
 
 def bends_and_twists(current: Fit) -> bool:

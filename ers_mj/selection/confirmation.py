@@ -20,6 +20,7 @@ from ers_mj.estimation.intervals import half_widths
 from ers_mj.estimation.objective import Fit, residuals_in
 from ers_mj.selection.comparison import stands_alone
 from ers_mj.selection.cross_validation import Fold, Score, folds, halves, pooled, recalibrated, refits, scored
+from ers_mj.selection.measure import FREE_RUN, Measure, measure_of
 from ers_mj.selection.moves import Move
 from ers_mj.selection.stepwise import Selection
 from ers_mj.servo.model import OBSERVER_RATE, Model
@@ -30,7 +31,7 @@ class Confirmed:
     """What held-out data says: scores before and after, without each effect, and the p-value of each effect.
 
     ``shown`` are the scores before and after with the noise of what was held out, by halves where an effect was judged
-    so.
+    so; ``measure`` is how all of them are taken.
     """
 
     before: list[Score]
@@ -42,6 +43,7 @@ class Confirmed:
     parts: list[Fold]
     sentence: str
     shown: list[tuple[Score, Score, float]]
+    measure: Measure = FREE_RUN
 
 
 @dataclass
@@ -65,7 +67,7 @@ def confirmed(
     while True:
         model = selection.chosen.model
         after_models = court.refits(model)
-        after = _scores(after_models, court.parts)
+        after = court.scores(after_models)
         judged = {name: court.judged(name, model, after) for name in model.names}
         failed = [n for n, one in judged.items() if not court.is_confirmed(n, one, model, after_models, after)]
         if not failed:
@@ -93,7 +95,12 @@ class Court:
     def __post_init__(self):
         self.parts, self.sentence = folds(self.start.traces, self.held)
         self.tau, rounds = self.selection.tau, self.selection.rounds
+        self.measure = measure_of(self.selection.chosen.model, self.start.traces)
         self.alone = {ranked[0].name for ranked in rounds if ranked and stands_alone(ranked[0], ranked, self.policy)}
+
+    def scores(self, models: Sequence[Model]) -> list[Score]:
+        """The score of each part by its model."""
+        return _scores(models, self.parts, self.measure)
 
     @cached_property
     def base_models(self) -> list[Model]:
@@ -115,7 +122,7 @@ class Court:
         is_lone = len(model.names) == 1
         less = self.start.fit.model if is_lone else self.without(name, model).model
         lesser_models = self.base_models if is_lone else self.refits(less)
-        lesser = _scores(lesser_models, self.parts)
+        lesser = self.scores(lesser_models)
         one = Judged(lesser_models, pooled(lesser), (after, lesser), self.p_of(name, after, lesser))
         doubtful = decisions.is_doubtful(self.numbers(one, after), self.policy)
         if doubtful and not self.held and len(self.start.traces) > 1:
@@ -150,7 +157,7 @@ class Court:
         """Whether an effect is confirmed, and is none that few samples, a converter or any remainder would show."""
         if not decisions.is_confirmed(
             self.numbers(one, after),
-            lambda: _halves_recalibrated(after_models, one.lesser_models, self.parts, self.policy),
+            lambda: _halves_recalibrated(after_models, one.lesser_models, self.parts, self.measure, self.policy),
             self.policy,
         ):
             return False
@@ -179,7 +186,7 @@ class Court:
         held = [float(np.sum(score(b.misfit, tau) - score(a.misfit, tau))) for a, b in zip(after, without, strict=True)]
         record = int(np.argmax(np.subtract(fitted, held)))
         parts = halves(traces, record)
-        within = (_scores(refits(some, parts, tau, self.jobs), parts) for some in (model, less))
+        within = (_scores(refits(some, parts, tau, self.jobs), parts, self.measure) for some in (model, less))
         with_it, without_it = (
             [*known[:record], *known[record + 1 :], *new] for known, new in zip((list(after), list(without)), within)
         )
@@ -187,7 +194,7 @@ class Court:
 
     def told(self, model: Model, after_models: list[Model], after: list[Score], judged: dict[str, Judged]) -> Confirmed:
         """What held-out data says in the end."""
-        before, traces = _scores(self.base_models, self.parts), self.start.traces
+        before, traces = self.scores(self.base_models), self.start.traces
         by_halves = {one.record for one in judged.values() if one.record is not None}
         shown = [
             (b, a, fold.held_out.sure_noise)
@@ -197,11 +204,14 @@ class Court:
         sentence = self.sentence
         for record in sorted(by_halves):
             cut = halves(traces, record)
-            ends = (_scores(refits(some, cut, self.tau, self.jobs), cut) for some in (self.start.fit.model, model))
+            some = (refits(model, cut, self.tau, self.jobs) for model in (self.start.fit.model, model))
+            ends = (_scores(models, cut, self.measure) for models in some)
             shown += [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(*ends, cut)]
             sentence += f"; {traces[record].name}, which teaches most of an effect, by halves as well"
         without, p = ({name: getattr(one, of) for name, one in judged.items()} for of in ("without", "p"))
-        return Confirmed(before, after, without, p, after_models, self.base_models, self.parts, sentence, shown)
+        return Confirmed(
+            before, after, without, p, after_models, self.base_models, self.parts, sentence, shown, self.measure
+        )
 
 
 def is_a_converters(name: str, model: Model, traces: Sequence[Trace]) -> bool:
@@ -265,7 +275,7 @@ def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:
 
 
 def _halves_recalibrated(
-    models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold], policy: Policy
+    models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold], measure: Measure, policy: Policy
 ) -> bool:
     """Whether the models halve the squared error of recordings of another day once gain, offset and friction level of
     that day are known.
@@ -273,10 +283,11 @@ def _halves_recalibrated(
     if parts[0].training is not None:
         return False
     after, before = (
-        pooled([recalibrated(m, fold.held_out)[0] for m, fold in zip(some, parts)]).rmse for some in (models, lesser)
+        pooled([recalibrated(m, fold.held_out, measure)[0] for m, fold in zip(some, parts)]).rmse
+        for some in (models, lesser)
     )
     return after**2 < policy.half * before**2
 
 
-def _scores(models: Sequence[Model], parts: Sequence[Fold]) -> list[Score]:
-    return [scored(model, fold.held_out) for model, fold in zip(models, parts)]
+def _scores(models: Sequence[Model], parts: Sequence[Fold], measure: Measure) -> list[Score]:
+    return [scored(model, fold.held_out, measure=measure) for model, fold in zip(models, parts)]

@@ -1,4 +1,4 @@
-"""The three fit numbers: free runs on the training data, on held-out data, and on held-out data after recalibration."""
+"""The three fit numbers: runs on the training data, on held-out data, and on held-out data after recalibration."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.decisions.explained import cost
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import Along, fit
-from ers_mj.estimation.initial_state import fitted_start
 from ers_mj.estimation.intervals import half_widths
 from ers_mj.estimation.jacobian import columns_of
 from ers_mj.estimation.objective import residuals, residuals_in, tau_of
+from ers_mj.selection.measure import FREE_RUN, Measure
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
@@ -27,21 +27,27 @@ LAST_PART = 0.7  # where the only recording is cut into training and held out
 
 @dataclass(frozen=True)
 class Score:
-    """Squared free-run error summed over samples, their number, and block misfits (B,) of the observer form, of all
-    channels.
+    """Squared error summed over samples, their number, and block misfits (B,) of the observer form, of all channels.
 
-    ``sure_squares`` are those of the error that no coarse converter has made (None: there is none).
+    ``absolute`` is the size of the error summed; ``sure_squares`` are those of the error that no coarse converter has
+    made (None: there is none).
     """
 
     squares: float
     samples: int
     misfit: np.ndarray
     sure_squares: float | None = None
+    absolute: float = 0.0
 
     @property
     def rmse(self) -> float:
-        """Root mean square of the free-run error [output unit]."""
+        """Root mean square of the error [output unit]."""
         return math.sqrt(self.squares / self.samples) if self.samples else math.nan
+
+    @property
+    def mae(self) -> float:
+        """Mean size of the error [output unit]."""
+        return self.absolute / self.samples if self.samples else math.nan
 
     @property
     def sure(self) -> float:
@@ -56,24 +62,23 @@ class Score:
 def pooled(scores: Sequence[Score]) -> Score:
     """One score of several recordings."""
     sure = sum(s.squares if s.sure_squares is None else s.sure_squares for s in scores)
-    return Score(
-        sum(s.squares for s in scores), sum(s.samples for s in scores), np.concatenate([s.misfit for s in scores]), sure
-    )
+    misfit = np.concatenate([s.misfit for s in scores])
+    squares, samples, absolute = (sum(getattr(s, of) for s in scores) for of in ("squares", "samples", "absolute"))
+    return Score(squares, samples, misfit, sure, absolute)
 
 
-def free_run(model: Model, trace: Trace, record: int = 0) -> np.ndarray:
-    """Simulated output (N,) of a recording from its fitted initial state, nothing corrected on the way."""
-    return model.predict(trace, record, start=fitted_start(model, trace, record))
-
-
-def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0) -> Score:
+def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0, measure: Measure = FREE_RUN) -> Score:
     """Score of a recording from sample ``begin`` on."""
-    e = np.where(trace.valid, trace.y - free_run(model, trace, record), 0.0)[begin:]
+    e = np.where(trace.valid, trace.y - measure.run(model, trace, record), 0.0)[begin:]
     e = np.nan_to_num(e, nan=10 * float(np.nanstd(trace.y)))
     local = residuals_in(model, trace, record, OBSERVER_RATE)
     sure = None if trace.converter is None else float(np.sum(trace.converter.beyond(e) ** 2))
     return Score(
-        float(e @ e), int(trace.valid[begin:].sum()), Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)), sure
+        float(e @ e),
+        int(trace.valid[begin:].sum()),
+        Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)),
+        sure,
+        float(np.sum(np.abs(e))),
     )
 
 
@@ -178,8 +183,8 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[M
         found = along(begun, fold, _beside(slopes, begun, fold, whole)) if slopes else begun
         if np.array_equal(found.vector(begun.layout()), begun.vector(begun.layout())):
             found = along(begun, fold, columns_of(begun, fold.training, OBSERVER_RATE, by_tangents=False))
-        mine = {name: rows[[fold.record]] for name, rows in (model.local or {}).items()}
-        return settled(replace(found, local=mine or None), fold.held_out, tau)
+        mine = model.of_records([fold.record])
+        return settled(replace(found, local=mine.local, states=mine.states), fold.held_out, tau)
 
     with ThreadPoolExecutor(jobs) as pool:
         return list(pool.map(one, parts))
@@ -192,7 +197,9 @@ def _beside(slopes: Columns, begun: Model, fold: Fold, traces: Sequence[Trace]) 
     return {key: slopes[whole][rows] for key, whole in keys.items()}
 
 
-def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[float, float, float]]]:
+def recalibrated(
+    model: Model, trace: Trace, measure: Measure = FREE_RUN
+) -> tuple[Score, dict[str, tuple[float, float, float]]]:
     """Gain, friction level and (where the plant feels position) offset fitted on the first 30 % of a recording; the
     score is taken on the rest. They stay neutral unless they buy their price there. Each is (value, lower, upper end of
     95 %).
@@ -203,7 +210,7 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     held = (*model.names, *(f"{name}, local" for name in known))
     pair = (
         replace(model, states=None, local=known or None, free=(), frozen=held)
-        .with_state("gain", 2)
+        .with_state("load" if "load" in (model.states or {}) else "gain", 2)
         .with_state("friction_level", 2)
     )
     if model.values["a_1"] > 0 or model.values["c_1"] > 0:
@@ -217,6 +224,6 @@ def recalibrated(model: Model, trace: Trace) -> tuple[Score, dict[str, tuple[flo
     layout = found.model.layout()
     widths = half_widths(found.model, [blank, head], (), tau)
     ends = {f.name: f.ends(q, w) for f, q, w in zip(layout, found.model.vector(layout), widths)}
-    return scored(found.model, trace, 1, cut), {
+    return scored(found.model, trace, 1, cut, measure), {
         name: (float(v[1]), *ends[name]) for name, v in found.model.states.items()
     }

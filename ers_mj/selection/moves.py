@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from ers_mj.effects import BY_NAME
 from ers_mj.estimation.objective import Fit
 from ers_mj.selection.comparison import Candidate
+from ers_mj.servo.model import Model
 
 Rounds = Sequence[Sequence[Candidate]]
 Grown = tuple[Fit, list[tuple[Candidate, ...]]]  # a model, and the rounds that lead to it
@@ -31,3 +33,10 @@ class Move:
         ways = {name: " + ".join(names) or "baseline" for name, names in (("b", self.before), ("a", self.after))}
         way = f"{ways['b']} -> {ways['a']}" if self.accepted else f"{ways['b']} stays"
         return f"{self.kind}: {way}, robust cost {-self.gain:+.2f}: {self.because}"
+
+
+def less(model: Model, name: str) -> Model:
+    """A model without an effect, or without what differs between recordings."""
+    if name in BY_NAME:
+        return model.without_effect(name)
+    return replace(model, states={k: v for k, v in (model.states or {}).items() if k != name} or None)

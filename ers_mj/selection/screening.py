@@ -16,6 +16,7 @@ from ers_mj.selection.bench import Bench
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.impulse_search import impulses
 from ers_mj.selection.secants import View, first_order, hopeful, of_each_form, promise, view_of
+from ers_mj.selection.spectrum import waves_of
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 HOTTEST, LENGTHS = 3, (0.08, 0.25)  # blocks in which an impulse is looked for, and lengths [s] from which it is fitted
@@ -113,6 +114,8 @@ class _Screening:
         """Ask the effects what they promise from one place, the likeliest to first order first."""
         is_first, sparse = view.place is self.first, view.sparse()
         scales = replace(view.place.scales, hot=hot_spans(view.run, self.bench))
+        if is_first and self.bent:
+            scales = replace(scales, waves=waves_of(view.run, self.bench.traces))
         starts = {name: BY_NAME[name].starts(scales) for name in names if is_first or not BY_NAME[name].once}
         told = {
             name: first_order(sparse if BY_NAME[name].wave else view, BY_NAME[name], some)

@@ -15,7 +15,7 @@ from ers_mj.data.prepared import Trace
 from ers_mj.decisions import acceptance, explained
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.decisions.verdict import is_more_than_noise
-from ers_mj.effects import BY_NAME
+from ers_mj.estimation.baseline import Held, Start
 from ers_mj.estimation.fit import hopped
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.objective import Fit, is_rough, tau_of
@@ -24,8 +24,10 @@ from ers_mj.selection.budget import Budget
 from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import Candidate, bends_and_twists, is_dear, stands_alone
 from ers_mj.selection.drop import pruned, reconsidered
-from ers_mj.selection.moves import Grown, Move
-from ers_mj.selection.pair import beside_a_rival, paired, plants_beside
+from ers_mj.selection.foundation import held_beside, held_instead
+from ers_mj.selection.loads import under_loads
+from ers_mj.selection.moves import Grown, Move, less
+from ers_mj.selection.pair import bending_and_twisting, beside_a_rival, paired
 from ers_mj.selection.swap import exchanged, in_its_place, other_way_round, reviewed, widened
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
 from ers_mj.selection.whiteness import is_beyond_rounding, left_by_sensor
@@ -52,7 +54,7 @@ def select(
     base: Fit,
     traces: Sequence[Trace],
     *,
-    anchors: Sequence[Mapping[str, float]] = (),
+    start: Start | None = None,
     exclude: Sequence[str] = (),
     jobs: int = 1,
     progress: Progress = lambda text, share: None,
@@ -61,6 +63,9 @@ def select(
 ) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
+    Of the ``start`` the anchors are tried as well; a baseline in which an effect is held for a spring is what it grows
+    from where that explains far more, and a candidate of the first round where not.
+
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle,
     is left out as the ``budget`` of simulation is spent, the selection's own unless one is handed in; its sizes are
     those of the search.
@@ -68,7 +73,11 @@ def select(
     budget = Budget(traces) if budget is None else budget
     base = replace(base, model=replace(base.model, effort=budget.effort))
     bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget.search, budget)
-    return _Stepwise(bench, base, anchors, progress).run()
+    growing = _Stepwise(bench, base, start.anchors if start is not None else (), progress)
+    if start is not None and start.held is not None:
+        growing.begin_with(start.held)
+    growing.tell_loads()
+    return growing.run()
 
 
 class _Stepwise:
@@ -80,6 +89,8 @@ class _Stepwise:
         self.trail: list[Move] = []
         self.tried: set[str] = set()  # of what is tried once a case
         self.mended, self.took = 0, 0.0
+        self.held: Fit | None = None  # a baseline that holds the output otherwise, as a candidate
+        self.given: tuple[str, ...] = ()  # effects of the baseline
 
     def run(self) -> Selection:
         while self._may_go_on():
@@ -115,7 +126,11 @@ class _Stepwise:
         return self.bench.budget.spent < self.bench.budget.sweeps
 
     def _taken(self) -> int:
-        return rounds_that_count(len(self.rounds), self.current.model)
+        return rounds_that_count(len(self.rounds), self.current.model) - self._given()
+
+    def _given(self) -> int:
+        """How many of the effects are the baseline's own."""
+        return sum(name in self.given for name in self.current.model.names)
 
     def _is_in_order(self) -> bool:
         """Whether a further effect may be told that takes a small part only: of few, or near the noise, or after one
@@ -125,19 +140,51 @@ class _Stepwise:
         near = explained.is_near_noise(self.current.misfit, policy)
         return self.bench.budget.spent < self.bench.budget.last and (few or near or self.took >= policy.good_part)
 
+    # -- what it stands on --------------------------------------------------------------------------------------------
+
+    def begin_with(self, held: Held) -> None:
+        """Grow from a baseline that holds the output otherwise, where it is the better one; else keep it as a
+        candidate.
+        """
+        bench, base, one = held_instead(self.bench, self.base, held)
+        if one is None:
+            self.held = replace(held.fit, model=replace(held.fit.model, effort=self.bench.budget.effort))
+            return
+        self._note("add", one.fit, one.gain, True, "it holds the output in the place of a spring")
+        self.bench, self.base, self.current, self.given = bench, base, one.fit, one.fit.model.names
+        self.rounds.append((one,))
+
+    def tell_loads(self) -> None:
+        """Give each recording a load of its own, where that is what they differ by, before anything is missed."""
+        if (found := under_loads(self.bench, self.current)) is None:
+            return
+        one, is_bare = self.bench.judged("load", found, self.current), not self.current.model.names
+        self._note("add", found, one.gain, True, "recordings fitted one by one are of different loads")
+        states = found.model.states
+        self.base = found if is_bare else self.bench.fit(replace(self.base.model, states=states), 20)
+        self.current = found
+        self.rounds.append((one,))
+
+    def _hold_otherwise(self) -> None:
+        """Stand on what holds the output otherwise, where what was found since shows it."""
+        if self.held is None or any(name in self.current.model.names for name in self.held.model.names):
+            return
+        if (found := held_beside(self.bench, self.current, self.held)) is None:
+            return
+        self._go_on("swap", found, self.current, "what was found since shows what holds the output")
+        self.given, self.held = self.held.model.names, None
+        self.rounds.insert(0, (self.bench.judged(self.given[-1], found, self.base),))
+
     # -- comparing -----------------------------------------------------------------------------------------------------
 
     def _compare(self) -> tuple[list[Candidate], acceptance.Bar] | None:
         """A round's candidates, the likeliest first, and what must be bought; None where the model itself was mended on
         the way.
         """
-        bench, current = self.bench, self.current
+        bench = self.bench
         self.progress(f"round {len(self.rounds) + 1}: comparing effects", 0.15 + 0.12 * len(self.rounds))
         bar = self._bar()
-        slow = () if self._may_sweep() else bending_and_twisting(current.model)
-        last = bench.budget.raced if is_dear(current) else math.inf
-        anchors = self.anchors if not self.rounds else ()
-        ranked = candidates(bench.without((*current.model.names, *slow)), current, anchors, bar.faint, last)
+        ranked = self._ranked(bar)
         leader, may_mend = ranked[0] if ranked else None, self.mended < self._most_mended()
         if may_mend and (again := self._way_back(ranked, bar)) is not None:
             won = self._mend(again)
@@ -152,10 +199,21 @@ class _Stepwise:
             return None
         return self._other_way_round(ranked, bar), bar
 
+    def _ranked(self, bar: acceptance.Bar) -> list[Candidate]:
+        """The promising candidates; in the first round a baseline that holds the output otherwise among them."""
+        bench, current, is_first = self.bench, self.current, not self.rounds
+        slow = () if self._may_sweep() else bending_and_twisting(current.model)
+        last = bench.budget.raced if is_dear(current) else math.inf
+        anchors = self.anchors if is_first else ()
+        ranked = candidates(bench.without((*current.model.names, *slow)), current, anchors, bar.faint, last)
+        if self.held is None or not is_first:
+            return ranked
+        return joined(ranked, [bench.judged(self.held.model.names[-1], self.held, current)])
+
     def _bar(self) -> acceptance.Bar:
         """What must be bought beside the model as it stands."""
         current, bench = self.current, self.bench
-        named, left = len(current.model.names), bench.cost(current)
+        named, left = len(current.model.names) - self._given(), bench.cost(current)
         return acceptance.bar(left, named, is_dear(current), self._is_in_order(), False, bench.policy)
 
     def _most_mended(self) -> int:
@@ -171,7 +229,7 @@ class _Stepwise:
         policy = self.bench.policy
         if not ranked or not bar.faint <= ranked[0].gain <= policy.modest:
             return None
-        again = self.bench.fit(_less(ranked[0].fit.model, ranked[0].name), 12)
+        again = self.bench.fit(less(ranked[0].fit.model, ranked[0].name), 12)
         return again if self.bench.cost(self.current) - self.bench.cost(again) > policy.local_minimum else None
 
     def _mend(self, again: Fit) -> float:
@@ -261,13 +319,17 @@ class _Stepwise:
         current, self.rounds = reconsidered(bench, self.current, self.rounds)
         self._go_on("drop", current, self.current, "it was found in a model that the newest had bent")
         tau = tau_of(self.current.misfit)
-        self.bench = replace(bench, tau=tau, traces=_restarted(self.current.model, bench.traces))
+        traces = bench.traces
+        if is_rough(traces):  # within a step a model tells where the rudder began, and a wrong one tells it wrongly
+            traces = with_starts(self.current.model, traces)
+        self.bench = replace(bench, tau=tau, traces=traces)
         self.current = self.bench.fit(self.current.model, 20)
         if (other := in_its_place(bench, self.current, before, self.rounds[-1])) is not None:
             self.rounds[-1] = other
             found = self.bench.fit(other[0].fit.model, 20)
             self._go_on("swap", found, self.current, "the refit made of it a form of another effect")
         self._refine(leader.name)
+        self._hold_otherwise()
 
     def _refine(self, newest: str) -> None:
         """Out of local minima, into wider forms, into the place of earlier rivals."""
@@ -334,24 +396,3 @@ def rounds_that_count(rounds: int, model: Model) -> int:
     """
     effects = rounds - len(model.states or {})
     return effects - (effects > len(model.names))
-
-
-def _less(model: Model, name: str) -> Model:
-    """A model without an effect, or without what differs between recordings."""
-    if name in BY_NAME:
-        return model.without_effect(name)
-    return replace(model, states={k: v for k, v in (model.states or {}).items() if k != name} or None)
-
-
-def _restarted(model: Model, traces: Sequence[Trace]) -> Sequence[Trace]:
-    """The traces with new starts where converters are coarse: within a step a model tells where the rudder began, and a
-    wrong one tells it wrongly.
-    """
-    return with_starts(model, traces) if is_rough(traces) else traces
-
-
-def bending_and_twisting(model: Model) -> list[str]:
-    """The effects that make a plant whose friction bends a bristle and whose shaft twists, which the model's has only
-    one of.
-    """
-    return [name for name, plant in plants_beside(model) if plant.bends and plant.has_motor_side]

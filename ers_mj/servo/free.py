@@ -12,7 +12,9 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Parameter
 from ers_mj.effects.quantities import Scales
 
-STATES = ("gain", "offset", "friction_level")
+DRIFTS = "gain", "offset", "friction_level"  # what may differ from one day to the next
+LOADS = "load", "weight"  # from one load to another: inertia and gravity as a factor, gravity by more than that
+STATES = (*DRIFTS, *LOADS)
 MOST_TAU = 2.0  # of a datasheet's electrical time constant, up to which the baseline's is an ordinary one
 
 
@@ -26,6 +28,7 @@ class Bounds:
     fewest_cycles: int = 3  # of a frequency within the longest recording: a slower swing bends to any drift
     # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
     state_prior: float = 0.2
+    load_prior: float = 1.0  # the same of a load
 
 
 BOUNDS = Bounds()
@@ -100,8 +103,8 @@ def of_states(states: Mapping[str, np.ndarray], scales: Scales) -> list[Free]:
 
 
 def _of_states(states: Mapping[str, np.ndarray], scales: Scales) -> Iterator[Free]:
-    spread = BOUNDS.state_prior
     for state, per_record in states.items():
+        spread = BOUNDS.load_prior if state in LOADS else BOUNDS.state_prior
         for k in range(1, len(per_record)):
             if state == "offset":
                 yield Free(state, state, k, False, scales.position, -np.inf, np.inf, (0.0, 0.1 * spread))

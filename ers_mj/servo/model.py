@@ -14,6 +14,8 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.quantities import Scales
 from ers_mj.plants.effort import Effort
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.servo.free import DRIFTS as DRIFTS
+from ers_mj.servo.free import LOADS as LOADS
 from ers_mj.servo.free import MOST_TAU as MOST_TAU
 from ers_mj.servo.free import STATES, Free, of_base, of_effects, of_recordings, of_states
 
@@ -21,6 +23,8 @@ OBSERVER_RATE = 5.0  # [1/s]
 OBSERVER_STEP = 0.005  # [s] between corrections of the observer
 BASE = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0", "tau_e", "emf_share", "ampere")
 SIGNED = ("b", "ampere")  # fitted by size, their sign kept
+PER_INERTIA = ("a_1", "a_2", "b", "c_1", "c_2")  # what falls as the inertia grows
+TORQUES = ("torque", "damping", "stiffness", "drag", "cubic")  # kinds of an effect's numbers that do
 
 
 def observer_gain(rate: float, sample_time: float) -> tuple[float, int]:
@@ -92,11 +96,18 @@ class Model:
         held = {name for effect, _ in self.effects for name in BY_NAME[effect].absorbs}
         local = self.local or {}
         return [
-            *of_base([n for n in self.free if n not in held], self.priors or {}, self.scales),
+            *of_base([n for n in (*self.free, *self._parted) if n not in held], self.priors or {}, self.scales),
             *of_effects(self.effects, self.frozen, local, self.scales),
             *of_recordings(local, self.frozen, self.scales),
             *of_states(self.states or {}, self.scales),
         ]
+
+    @property
+    def _parted(self) -> tuple[str, ...]:
+        """The back-EMF's share of the damping where it is known to be about its prior, and an effect tells it."""
+        asked = any(BY_NAME[name].parts_damping for name, _ in self.effects if name not in self.frozen)
+        unknown = "emf_share" in (self.priors or {}) and "emf_share" not in self.free
+        return ("emf_share",) if asked and unknown else ()
 
     def vector(self, layout: Sequence[Free]) -> np.ndarray:
         """The fitted numbers, transformed (logarithm of positive ones, others over their scale)."""
@@ -182,12 +193,30 @@ class Model:
         """
         if supply is None and not self.states and not self.local:
             return self._anywhere
-        c = lumped(self.values)
+        c = lumped(self._under_load(record))
         if self.states:
-            gain = self.states["gain"][record] if "gain" in self.states else 1.0
-            level = self.states["friction_level"][record] if "friction_level" in self.states else 1.0
+            gain, level = self._state("gain", record), self._state("friction_level", record)
             c = c._replace(b=c.b * gain, c_2_plus=c.c_2_plus * level, c_2_minus=c.c_2_minus * level)
         return ReducedModel(c, self.effects_of(record), supply, self.effort)
+
+    def _state(self, name: str, record: int) -> float:
+        """A factor of one recording, 1 where there is none."""
+        return float(self.states[name][record]) if self.states and name in self.states else 1.0
+
+    def _under_load(self, record: int) -> Mapping[str, float]:
+        """The baseline's values under the load of one recording: what does not grow with the inertia moves it less."""
+        load = self._state("load", record)
+        return self.values if load == 1.0 else {k: v / load if k in PER_INERTIA else v for k, v in self.values.items()}
+
+    def _loaded(self, record: int, name: str, values: np.ndarray) -> np.ndarray:
+        """An effect's values under the load of one recording: gravity grows with it and by its own ``weight``, every
+        other torque moves the inertia less.
+        """
+        effect = BY_NAME[name]
+        if effect.holds_place:
+            return values * self._state("weight", record)
+        scaled = [p.kind in TORQUES for p in effect.parameters]
+        return np.where(scaled, values / self._state("load", record), values)
 
     @cached_property
     def _anywhere(self) -> ReducedModel:
@@ -198,13 +227,16 @@ class Model:
         """The effects that act in one recording (None: in any), with their values there (in the first where they
         act).
         """
-        if not self.local:
+        loaded = any(name in (self.states or {}) for name in LOADS)
+        if not self.local and (record is None or not loaded):
             return self.effects
         out = []
         for name, values in self.effects:
-            if name in self.local:
+            if loaded and record is not None:
+                values = self._loaded(record, name, values)
+            if name in (self.local or {}):
                 values, columns = values.copy(), BY_NAME[name].local_columns
-                rows = self.local[name]
+                rows = (self.local or {})[name]
                 values[columns] = rows[np.argmin(np.isnan(rows).any(axis=1)) if record is None else record]
                 if np.isnan(values[columns]).any():
                     continue
@@ -212,9 +244,11 @@ class Model:
         return tuple(out)
 
     def of_records(self, records: Sequence[int]) -> Model:
-        """The model for some of its recordings only, without what differs between them (``states``)."""
+        """The model for some of its recordings only, without what differs between them (``states``) but their loads."""
         local = {name: rows[list(records)] for name, rows in (self.local or {}).items()}
-        return replace(self, states=None, local=local or None, scales=replace(self.scales, recordings=len(records)))
+        loads = {name: rows[list(records)] for name, rows in (self.states or {}).items() if name in LOADS}
+        scales = replace(self.scales, recordings=len(records))
+        return replace(self, states=loads or None, local=local or None, scales=scales)
 
     def offset(self, record: int) -> float:
         """Output offset of one recording."""

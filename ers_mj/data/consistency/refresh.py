@@ -97,7 +97,7 @@ def _beating(at: np.ndarray) -> np.ndarray | None:
 
 
 def _edges(u: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Rows beside the fresh ones in which an input (N,) changes: all where they are few, else the large, if few."""
+    """Rows beside the fresh ones in which an input (N,) changes: all of them, or the large ones, if these are few."""
     for least in (0.0, REFRESH.edge * float(np.ptp(u))):
         edges = 1 + np.flatnonzero(np.abs(np.diff(u)) > least)
         edges = np.setdiff1d(edges[(edges > rows[0]) & (edges < rows[-1])], rows)

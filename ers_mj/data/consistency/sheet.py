@@ -14,7 +14,8 @@ class Fault:
 
     Attributes:
         kind: held, wrap, leap, blackout, torque_off, gap, time_jump, supply, unsigned_input, constant_input, unit,
-            stuck, clipped, blank; or a mere note: jitter, limit (of an input), converter, ignored.
+            stuck, clipped, blank; or a mere note: jitter, limit (of an input), converter, ignored,
+            read.
         column: of the file.
         count: samples (or places) concerned.
         region: from the first to the last of them [s], or None.
@@ -30,7 +31,7 @@ class Fault:
     @property
     def is_note(self) -> bool:
         """Whether it is ordinary and only worth a sentence."""
-        return self.kind in ("jitter", "limit", "converter", "ignored")
+        return self.kind in ("jitter", "limit", "converter", "ignored", "read")
 
     def as_document(self, file: str) -> dict:
         """The row of diagnosis.json."""

@@ -1,0 +1,52 @@
+"""Parquet, Feather and Arrow files, as they lie; LeRobot's data sets among them."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+from ers_mj.data.formats.base import File, Loaded, refuse_twice
+from ers_mj.data.tables import reason
+from ers_mj.errors import InputError
+
+FORMAT = "Parquet or Arrow file"
+
+
+def load(file: File) -> Loaded:
+    """The table of a file."""
+    try:
+        table = _table(file)
+        names = table.column_names
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"{file.name}: is not a readable {_kind(file)} file ({reason(error)})") from None
+    except UnicodeDecodeError:
+        raise InputError(
+            f"{file.name}: the name of a column is no text in UTF-8, rename it where the file was written"
+        ) from None
+    refuse_twice(names, file.name)
+    return Loaded(table, _frames(names))
+
+
+def _table(file: File) -> pa.Table:
+    buffer = pa.BufferReader(file.content)
+    if file.path.suffix.lower() == ".parquet":
+        from pyarrow import parquet  # here alone: it takes long to import
+
+        return parquet.read_table(buffer)
+    try:
+        return pa.ipc.open_file(buffer).read_all()
+    except pa.ArrowInvalid:
+        buffer.seek(0)
+        return pa.ipc.open_stream(buffer).read_all()
+
+
+def _kind(file: File) -> str:
+    return "Parquet" if file.path.suffix.lower() == ".parquet" else "Arrow"
+
+
+def _frames(names: list[str]) -> tuple[str, ...]:
+    """What LeRobot's own columns do not say of themselves."""
+    if {"timestamp", "frame_index"} <= set(names):
+        return (
+            "timestamp looks like LeRobot's, frame / fps whatever the loop really ran at: a slow loop reads too fast",
+        )
+    return ()

@@ -1,0 +1,86 @@
+"""What a reader of files gives, and what it is asked."""
+
+from __future__ import annotations
+
+import importlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pyarrow as pa
+
+from ers_mj.data.tables import listed
+from ers_mj.errors import InputError, MissingPackage
+
+
+@dataclass(frozen=True)
+class File:
+    """What is to be read.
+
+    Attributes:
+        path: of the file, or of a folder where a format is one.
+        content: its bytes, unpacked; none of a folder.
+        name: for messages.
+        wanted: what a person has mapped, as it was given.
+        beside: further files that the format needs (a DBC).
+    """
+
+    path: Path
+    content: bytes
+    name: str
+    wanted: Mapping[str, str] = field(default_factory=dict)
+    beside: Sequence[Path] = ()
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A file as a table.
+
+    Attributes:
+        table: its columns.
+        notes: what was skipped or assumed, a sentence each.
+        units: column -> unit, where the file says one.
+    """
+
+    table: pa.Table
+    notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def library(module: str, package: str, extra: str, name: str) -> ModuleType:
+    """The library that reads a format.
+
+    Raises:
+        MissingPackage: it is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise MissingPackage(
+            f"{name}: is read by the package {package}, which is not installed: pip install 'ers-mj[{extra}]'"
+        ) from None
+
+
+def table_of(columns: Mapping[str, np.ndarray], name: str) -> pa.Table:
+    """Columns of one length as a table; arrays (N, k) become lists.
+
+    Raises:
+        InputError: there is none, or they differ in length.
+    """
+    lengths = {column: len(x) for column, x in columns.items()}
+    if not lengths:
+        raise InputError(f"{name}: holds no columns of numbers")
+    if len(set(lengths.values())) > 1:
+        told = listed(f"{column} ({count})" for column, count in lengths.items())
+        raise InputError(f"{name}: its columns differ in length: {told}")
+    arrays = {c: pa.array(list(x) if x.ndim > 1 else x) for c, x in columns.items()}
+    return pa.table(arrays)
+
+
+def refuse_twice(columns: Sequence[str], name: str) -> None:
+    """Raise InputError where a column stands there more than once."""
+    if twice := [column for column, count in Counter(columns).items() if count > 1]:
+        raise InputError(f"{name}: the column {listed(twice)} stands there more than once")
