@@ -11,6 +11,10 @@ class RateLimit(Drive):
     name = "rate_limit"
     sentence = "the servo's own reference moves no faster than {R}"
     mjcf = "none: the reference is limited before it reaches ctrl"
+    apart = (
+        "large steps become ramps of one slope, whatever the load; voltage_saturation and current_limit make a slope"
+        " that the load and the speed change"
+    )
     parameters = (Parameter("R", "speed", "largest speed of the reference", absent=np.inf),)
     in_loop = ("R",)
     loop_sentence = "the servo's own reference moves no faster than {value}"
