@@ -21,8 +21,10 @@ MAY_READ = {
     "identification": ("data", "errors", "estimation", "plants", "servo", "solvers"),
     "selection": ("data", "decisions", "effects", "estimation", "plants", "servo", "solvers"),
     "experiment_design": ("data", "effects", "errors", "estimation", "plants", "servo", "solvers"),
+    "position_loop": ("data", "decisions", "effects", "errors", "plants", "servo", "solvers"),
     "diagnosis": (
-        "data", "decisions", "effects", "estimation", "experiment_design", "plants", "selection", "servo",
+        "data", "decisions", "effects", "estimation", "experiment_design", "plants", "position_loop", "selection",
+        "servo",
     ),
     "online": ("data", "estimation", "servo", "solvers"),
     "control": ("data", "effects", "errors", "plants", "servo"),
@@ -31,8 +33,8 @@ MAY_READ = {
     "proving": ("data", "errors", "plants"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "door": (
-        "control", "data", "diagnosis", "effects", "errors", "estimation", "identification", "plants", "report",
-        "selection", "servo", "validation", "view",
+        "control", "data", "diagnosis", "effects", "errors", "estimation", "identification", "plants", "position_loop",
+        "report", "selection", "servo", "validation", "view",
     ),
     "commands": (
         "control", "data", "door", "errors", "experiment_design", "online", "plants", "proving", "report", "servo",

@@ -118,7 +118,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ers_mj.experiment_design.optimal_input import planned, reference
     from ers_mj.experiment_design.question import Question, Rig
     from ers_mj.plants.inputs import INPUTS
-    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.datasheet import read_plant
 
     if arguments.against not in INPUTS:
         raise InputError(f"--against: there is no input {arguments.against[:40]!r}; there are {', '.join(INPUTS)}")
@@ -128,7 +128,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{arguments.duration_s:g} s at {arguments.rate_hz:g} Hz are {samples:.3g} samples, {FEWEST_SAMPLES} to"
             f" {most} were expected"
         )
-    datasheet = read_datasheet(arguments.model)
+    datasheet = read_plant(arguments.model)
     rig = Rig.of(
         datasheet.to_lumped().get("theta_0", 0.0),
         arguments.umax,

@@ -73,9 +73,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Check or search, and tell; 0, or 1 where the conditions fail."""
     from ers_mj.control.controllers import parse_gains
     from ers_mj.control.gains import REMARK, conditions, search, settling_bound
-    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.datasheet import read_plant
 
-    datasheet, gains = read_datasheet(arguments.model), parse_gains(arguments.gains)
+    datasheet, gains = read_plant(arguments.model), parse_gains(arguments.gains)
     settle = _settle(datasheet, arguments)
     if arguments.settling_ms is None:
         settling = settle(gains)

@@ -64,10 +64,10 @@ def chosen_controllers(arguments: argparse.Namespace) -> list[str]:
 
 def plant_and_design(model: str, design: str | None) -> tuple[Datasheet, Datasheet]:
     """The plant's datasheet, and what the controllers know of it."""
-    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.datasheet import read_plant
 
-    datasheet = read_datasheet(model)
-    return datasheet, datasheet if design is None else read_datasheet(design)
+    datasheet = read_plant(model)
+    return datasheet, datasheet if design is None else read_plant(design)
 
 
 def conditions_of(arguments: argparse.Namespace, **others) -> Conditions:

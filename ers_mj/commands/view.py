@@ -174,7 +174,7 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
     import numpy as np
 
     from ers_mj.plants.inputs import INPUTS, RATE_HZ
-    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.datasheet import read_plant
     from ers_mj.view import model_file, replay
 
     t = np.arange(1 if name is None else max(2, round(arguments.duration * RATE_HZ) + 1)) / RATE_HZ
@@ -183,14 +183,14 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
     if _is_mjcf(arguments.model):
         return model_file.simulated_file(model_file.read_plant(Path(arguments.model)), t, u, moments)
     plant = replay.plant_of(
-        read_datasheet(arguments.model), arguments.linkage or "constant", math.radians(arguments.gap or 0.0)
+        read_plant(arguments.model), arguments.linkage or "constant", math.radians(arguments.gap or 0.0)
     )
     return replay.simulated(plant, t, u, moments)
 
 
 def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
     from ers_mj.data.prepared import trace_of
-    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.datasheet import read_plant
     from ers_mj.view import model_file, replay
 
     moments, unit = replay.moments_of(recording.t, FILM.fps, arguments.duration), recording.output_unit
@@ -198,7 +198,7 @@ def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
         return model_file.recorded_file(
             model_file.read_plant(Path(arguments.model)), trace_of(recording, None), moments, unit
         )
-    sheet = read_datasheet(arguments.model)
+    sheet = read_plant(arguments.model)
     plant = replay.plant_of(sheet, arguments.linkage or "constant", math.radians(arguments.gap or 0.0), unit)
     return replay.recorded(plant, trace_of(recording, sheet.parameters.get("J")), moments, unit)
 

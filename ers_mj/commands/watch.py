@@ -74,9 +74,9 @@ def run(arguments: argparse.Namespace) -> int:
         what = "is a folder" if Path(arguments.stream).is_dir() else "there is no such file"
         raise InputError(f"{arguments.stream}: {what}, a CSV file or - for standard input was expected")
     from ers_mj.data.streaming import Stream
-    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.datasheet import read_plant
 
-    datasheet = None if arguments.datasheet is None else read_datasheet(arguments.datasheet)
+    datasheet = None if arguments.datasheet is None else read_plant(arguments.datasheet)
     stream = Stream("standard input" if arguments.stream == "-" else Path(arguments.stream).name, chosen)
     show = _Machine() if arguments.json else _Screen(stream.name) if sys.stdout.isatty() else _Lines(arguments.every)
     try:

@@ -204,8 +204,8 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     """
     if recording.input_kind == "position":
         raise InputError(
-            f"{recording.name}: is commanded by a position, which no model takes yet; record what the drive is told"
-            " (u_V, u_duty_pct, tau_cmd_Nm or i_cmd_A)"
+            f"{recording.name}: is commanded by a position, which diagnose, identify and simulate take; record here"
+            " what the drive is told (u_V, u_duty_pct, tau_cmd_Nm or i_cmd_A)"
         )
     load = -recording.load / inertia if recording.load is not None and inertia else None
     y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)

@@ -367,8 +367,8 @@ def _array(x: Any, field: str, name: str) -> np.ndarray:
     return array
 
 
-def read_input(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Time [s] and voltage [V], each (N,), of a CSV or Parquet file with the columns t_s and u_V.
+def read_input(path: str | os.PathLike[str], column: str = "u_V") -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and input, each (N,), of a CSV or Parquet file with the columns t_s and ``column``.
 
     Raises:
         InputError: the file is no such thing, or has holes, in one sentence.
@@ -376,7 +376,7 @@ def read_input(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
     file = Path(path)
     table = load(file, file.name)[0].table
     columns = []
-    for label in ("t_s", "u_V"):
+    for label in ("t_s", column):
         if label not in table.column_names:
             raise InputError(f"{file.name}: there is no column {label}, the columns are {listed(table.column_names)}")
         x = numbers(table[label], label, file.name)

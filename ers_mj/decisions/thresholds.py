@@ -329,6 +329,21 @@ class Policy:
     ordinary_bits: int = _threshold(
         12, "bits a turn", "an ordinary encoder named", "hobby servos and small joints have 12, whatever they travel"
     )
+
+    # -- a position loop (position_loop/) ---------------------------------------------------------------------------
+    loop_gain: float = _threshold(
+        20.0, "half blocks times ln of squared errors' ratio, less Schwarz's price", "a name on a clean servo",
+        "the best rival on 15 clean servos gained 17; at 5 seven of 15 are false",
+    )  # fmt: skip
+    loop_wrong: float = _threshold(
+        3.0, "noise levels of held-out error", "a mismatch passed over beside names", "the contract"
+    )
+    loop_integral: float = _threshold(
+        0.05, "1/s, I over K", "integral action that is not there", "of 16 PD loops all refitted below 0.005"
+    )
+    loop_damping: float = _threshold(
+        0.2, "D over a_2", "a derivative term that is not there", "of 16 PI loops all refitted below"
+    )
     fewest_dropouts: int = _threshold(3, "dropouts", "a sensor blamed for one spike", "two may be chance")
 
 

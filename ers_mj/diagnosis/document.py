@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import platform
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ers_mj import __version__
+from ers_mj.data.columns import per
 from ers_mj.data.prepared import Trace
+from ers_mj.data.recording import Recording
 from ers_mj.decisions.explained import cost
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import Evidence
@@ -20,6 +23,7 @@ from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
+from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.selection.confirmation import delta_bic
 from ers_mj.selection.cross_validation import pooled
@@ -52,7 +56,7 @@ class Diagnosis:
     document: dict
     evidence: Evidence
     model: Datasheet
-    plant: MechanicalPlant
+    plant: MechanicalPlant | LoopedPlant
 
 
 def told(case: Case, held: list[Trace]) -> Diagnosis:
@@ -71,21 +75,23 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         case.input_unit,
         spectrum,
     )
+    data = data_of(case.recordings, case.holdout)
+    data["problems"] += _degrees(case)
     document = {
         "version": 1,
         "verdict": verdict,
         "sentence": sentence(case, missing, found),
-        "where": [] if verdict == "consistent" else [_place(p) for p in found],
+        "where": [] if verdict == "consistent" else [place_of(p) for p in found],
         "missing": missing,
         "remainder": remainder(case),
         "record_state": states,
         "fit": case.fits,
         "parameters": _parameters(case),
         "next_recording": _next_recording(case),
-        "data": _data(case),
+        "data": data,
         "trail": [_move(move) for move in case.selection.trail],
         "seed": case.seed,
-        "versions": _versions(),
+        "versions": versions_of(),
     }
     if verdict == "unexplained" or case.suspects:
         document["suspects"] = _suspects(case)
@@ -232,7 +238,7 @@ def _parameters(case: Case) -> dict:
     units = {
         "a_1": "1/s^2",
         "a_2": "1/s",
-        "b": f"{y}/s^2/{u}",
+        "b": f"{y}/s^2/{per(u)}",
         "c_1": f"{y}/s^2",
         "c_2": f"{y}/s^2",
         "theta_0": y,
@@ -296,7 +302,7 @@ def _move(move: Move) -> dict:
     }
 
 
-def _place(p: Place) -> dict:
+def place_of(p: Place) -> dict:
     return {
         "axis": p.axis,
         "region": list(p.region) if p.region else None,
@@ -308,16 +314,16 @@ def _place(p: Place) -> dict:
     }
 
 
-def _data(case: Case) -> dict:
-    every = [*case.recordings, *case.holdout]
-    problems = [f"{r.name}: {p}" for r in every for p in r.problems] + _degrees(case)
+def data_of(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> dict:
+    """What was read, and what was found in it."""
+    every, first = [*recordings, *holdout], recordings[0]
     return {
         "files": [r.name for r in every],
         "sha256": [r.sha256 for r in every],
-        "output_unit": case.output_unit,
-        "input_unit": case.input_unit,
-        "input_kind": case.recordings[0].input_kind,
-        "problems": problems,
+        "output_unit": first.output_unit,
+        "input_unit": {"pct": "%"}.get(first.input_unit, first.input_unit),
+        "input_kind": first.input_kind,
+        "problems": [f"{r.name}: {p}" for r in every for p in r.problems],
         "faults": [fault.as_document(r.name) for r in every for fault in r.faults],
     }
 
@@ -347,7 +353,7 @@ def _improved(case: Case) -> Datasheet:
     return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
 
 
-def _versions() -> dict:
+def versions_of() -> dict:
     import numba
     import scipy
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from ers_mj.data.prepared import Trace, smooth_speed
 from ers_mj.diagnosis.evidence import ResidualMap
 from ers_mj.diagnosis.mismatch_spectrum import Mismatch, mismatch
 from ers_mj.effects import BY_NAME
-from ers_mj.selection.comparison import Candidate
 from ers_mj.servo.model import Model
 
 LOCAL_RATE = 30.0  # [1/s]
@@ -71,6 +71,24 @@ class Place:
         return (self.share_of_error or 0.0) - (self.share_of_time or 0.0)
 
 
+class Timed(Protocol):
+    """A recording's name and times."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def t(self) -> np.ndarray: ...
+
+
+class Ranked(Protocol):
+    """A candidate's name and gain."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def gain(self) -> float: ...
+
+
 def gather(before: Model, after: Model, traces: Sequence[Trace]) -> Samples:
     """The samples that the localiser looks at."""
     parts = []
@@ -110,8 +128,8 @@ def _best_interval(values: np.ndarray, squares: np.ndarray, edges: np.ndarray):
 
 def places(
     samples: Samples,
-    traces: Sequence[Trace],
-    rounds: Sequence[Sequence[Candidate]],
+    traces: Sequence[Timed],
+    rounds: Sequence[Sequence[Ranked]],
     base_cost: float,
     named: Sequence[str],
     output_unit: str,
@@ -194,7 +212,7 @@ def _by_direction(samples: Samples) -> list[Place]:
     return out
 
 
-def _by_time(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
+def _by_time(samples: Samples, traces: Sequence[Timed]) -> list[Place]:
     """The recording, and the span in it, that holds most of the error beyond its share of time."""
     out = []
     for k, trace in enumerate(traces):
@@ -221,7 +239,7 @@ def _by_time(samples: Samples, traces: Sequence[Trace]) -> list[Place]:
     return sorted(out, key=lambda p: -p.excess)[:2]
 
 
-def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named: Sequence[str]) -> list[Place]:
+def _by_subsystem(rounds: Sequence[Sequence[Ranked]], base_cost: float, named: Sequence[str]) -> list[Place]:
     """Subsystems by what their best effect explains of the baseline's cost; those of the named effects lead, in their
     order.
     """
@@ -245,7 +263,7 @@ def _by_subsystem(rounds: Sequence[Sequence[Candidate]], base_cost: float, named
     return out
 
 
-def shaded(trace: Trace, record: int, samples: Samples) -> tuple[tuple[float, float], ...]:
+def shaded(trace: Timed, record: int, samples: Samples) -> tuple[tuple[float, float], ...]:
     """Spans of time [s] of one recording in which the local error is largest: those that hold two thirds of it, at most
     8.
     """

@@ -17,6 +17,7 @@ from ers_mj.data.recording import Recording
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.document import Diagnosis, told
+from ers_mj.diagnosis.loop_pipeline import diagnose_loop
 from ers_mj.diagnosis.mujoco_check import Rig
 from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME, SUSPECTS
@@ -49,8 +50,8 @@ def diagnose(
 
     Args:
         recordings: training recordings of one rig, all of one output and input unit.
-        datasheet: what is known of the servo, or None: everything is identified.
-        holdout: recordings that are looked at only after the selection has ended.
+        datasheet: what is known of the servo, or None; a position command goes without.
+        holdout: looked at only after the selection has ended.
         seed: kept in the document; nothing here draws random numbers.
         jobs: threads; all cores by default. The result does not depend on it.
         progress: called with a text and a share of the work done.
@@ -63,6 +64,8 @@ def diagnose(
     jobs = jobs or _cores()
     recordings, holdout = searched(recordings, holdout)
     first = recordings[0]
+    if first.input_kind == "position":
+        return diagnose_loop(recordings, holdout, seed=seed, jobs=jobs, progress=progress, policy=policy)
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
     traces = [trace_of(r, inertia) for r in recordings]
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))

@@ -10,7 +10,8 @@ from typing import Any, TypedDict, Unpack
 from threadpoolctl import threadpool_limits
 
 from ers_mj.data.recording import Recording
-from ers_mj.door.known import Known, known
+from ers_mj.diagnosis.loop_rows import improved, parameters
+from ers_mj.door.known import Known, known_plant
 from ers_mj.door.model import Model
 from ers_mj.door.reading import Given, recordings_of
 from ers_mj.door.results import Progress, Result, Writers, parameter_rows, silent
@@ -20,6 +21,8 @@ from ers_mj.errors import InputError, refuse_other
 from ers_mj.identification import estimate
 from ers_mj.identification.answer import Identified
 from ers_mj.identification.finding import BUDGET, Settings
+from ers_mj.position_loop.identified import Identified as LoopFound
+from ers_mj.position_loop.identified import identify_loop
 from ers_mj.servo.datasheet import write_model
 
 
@@ -83,6 +86,30 @@ class Identification(Result):
         }
 
 
+class LoopIdentification(Identification):
+    """What an identification of a position loop found."""
+
+    def __init__(self, found: LoopFound, recordings: Sequence[Recording], seed: int):
+        Result.__init__(self, _loop_document(found, recordings, seed))
+        self._loop, self._model = found, improved(found.fit.model)
+
+    @cached_property
+    def model(self) -> Model:
+        """The identified model."""
+        data = self._document["data"]
+        return Model(self._model, output_unit=data["output_unit"], input_unit=data["input_unit"])
+
+    def _page(self) -> str:
+        from ers_mj.report.identify_report import loop_page
+
+        return loop_page(self._document)
+
+    def _writers(self) -> Writers:
+        return report_writers("identify.json", self._document, self._page()) | {
+            "model.toml": lambda path: write_model(path, self._model)
+        }
+
+
 def identify(
     recordings: Given | Iterable[Given],
     datasheet: Known = None,
@@ -133,8 +160,12 @@ def identify(
         raise InputError("no recording was given, at least one was expected")
     refuse_twice(given, [])
     refuse_mixed_inputs(given)
+    if given[0].input_kind == "position":
+        refuse_beside_a_loop(settings, datasheet is not None)
+        with threadpool_limits(1):
+            return LoopIdentification(identify_loop(given, settings.jobs, progress), given, settings.seed)
     with threadpool_limits(1):
-        found = estimate.identify(given, known(datasheet), settings, progress)
+        found = estimate.identify(given, known_plant(datasheet), settings, progress)
     return Identification(found, given)
 
 
@@ -156,15 +187,48 @@ def _document(found: Identified, recordings: Sequence[Recording]) -> dict[str, A
             "null_space": found.structure.null,
             "singular_values": found.structure.singular,
         },
-        "data": {
-            "files": [r.name for r in recordings],
-            "sha256": [r.sha256 for r in recordings],
-            "output_unit": recordings[0].output_unit,
-            "input_unit": recordings[0].input_unit,
-            "input_kind": recordings[0].input_kind,
-            "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems],
-            "faults": [fault.as_document(r.name) for r in recordings for fault in r.faults],
-        },
+        "data": _data(recordings),
         "seed": found.settings.seed,
+        "versions": versions(),
+    }
+
+
+def _data(recordings: Sequence[Recording]) -> dict[str, Any]:
+    return {
+        "files": [r.name for r in recordings],
+        "sha256": [r.sha256 for r in recordings],
+        "output_unit": recordings[0].output_unit,
+        "input_unit": recordings[0].input_unit,
+        "input_kind": recordings[0].input_kind,
+        "problems": [f"{r.name}: {p}" for r in recordings for p in r.problems],
+        "faults": [fault.as_document(r.name) for r in recordings for fault in r.faults],
+    }
+
+
+def refuse_beside_a_loop(settings: Settings, has_datasheet: bool) -> None:
+    """Raise InputError for what the fit of a position loop does not take."""
+    asked = {"--method": settings.method != "ls", "--plant": settings.plant != "reduced", "--fix": bool(settings.fixed)}
+    asked |= {"--bounds": bool(settings.bounds), "--datasheet": has_datasheet}
+    for option, is_given in asked.items():
+        if is_given:
+            raise InputError(f"{option} does not go with a position command, which least squares fit without it")
+
+
+def _loop_document(found: LoopFound, recordings: Sequence[Recording], seed: int) -> dict[str, Any]:
+    words = "explains the recordings" if found.explains else "leaves more than noise: ask ers diagnose what is missing"
+    rows = parameters(found.intervals, recordings[0].output_unit)
+    return {
+        "method": "ls",
+        "plant": "reduced",
+        "sentence": f"A {found.fit.model.kind} position loop {words}.",
+        "parameters": {name: row | {"fixed": False} for name, row in rows.items()},
+        "fitness": found.fitness,
+        "evaluations": found.evaluations,
+        "wall_s": found.wall_s,
+        "explains": found.explains,
+        "misfit_sigma2": found.fit.misfit,
+        "warnings": [],
+        "data": _data(recordings),
+        "seed": seed,
         "versions": versions(),
     }

@@ -40,3 +40,17 @@ def known(given: Known) -> Datasheet | None:
     if not isinstance(sheet, Datasheet):
         raise InputError(f"{type(given).__name__} was given, a path, a mapping, a datasheet or a model was expected")
     return sheet
+
+
+def known_plant(given: Known) -> Datasheet | None:
+    """As ``known``, of a servo that is told a voltage.
+
+    Raises:
+        InputError: the model closes a position loop of its own.
+    """
+    sheet = known(given)
+    if sheet is not None and sheet.loop:
+        raise InputError(
+            f"{sheet.name or 'the model'}: closes a position loop of its own ([loop]), which only simulate takes here"
+        )
+    return sheet

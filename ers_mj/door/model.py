@@ -19,6 +19,7 @@ from ers_mj.door.results import frame, framed
 from ers_mj.door.saving import make_room, plain
 from ers_mj.door.simulating import Simulation, Voltage, simulate
 from ers_mj.errors import InputError, refuse_other
+from ers_mj.position_loop.saved import looped_plant
 from ers_mj.servo.datasheet import Datasheet, write_model
 from ers_mj.servo.simulation import build_plant, inertia_of
 
@@ -244,6 +245,8 @@ class Model:
         Raises:
             InputError: the datasheet cannot make a plant.
         """
+        if self._datasheet.loop:
+            return looped_plant(self._datasheet, self.output_unit == "rad").spec()
         return self._multibody().spec()
 
     def joint_lines(

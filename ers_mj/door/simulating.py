@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
@@ -16,6 +16,7 @@ from ers_mj.door.results import frame, framed
 from ers_mj.door.saving import make_room, plain, refuse_table
 from ers_mj.errors import InputError, refuse_other
 from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
+from ers_mj.position_loop.saved import simulate_loop
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import parse_effect, simulate_recording
 
@@ -51,6 +52,7 @@ class Simulation:
     u: np.ndarray
     theta: np.ndarray
     _summary: Mapping[str, Any]
+    _input: str = "u_V"
 
     @property
     def recording(self) -> Recording:
@@ -62,7 +64,7 @@ class Simulation:
         return from_columns(self._columns(), name=f"{self._summary['input']}, simulated")
 
     def _columns(self) -> dict[str, np.ndarray]:
-        return {"t_s": self.t, "u_V": self.u, "theta_rad": self.theta}
+        return {"t_s": self.t, self._input: self.u, "theta_rad": self.theta}
 
     def to_dict(self) -> dict[str, Any]:
         """What was simulated, and how far it moved: the JSON of the command, less the file."""
@@ -145,8 +147,14 @@ def simulate(
     _refuse_options(options, noise)
     sheet = known(model) or Datasheet()
     added = [parse_effect(effect) if isinstance(effect, str) else effect for effect in effects]
-    name, t, u = _signal(input, rate_hz, duration)
-    columns = simulate_recording(sheet, t, u, effects=added, noise=noise, seed=seed, **options)
+    column = "theta_ref_rad" if sheet.loop else "u_V"
+    if sheet.loop:
+        _refuse_beside_a_loop(input, added, options)
+    name, t, u = _signal(input, rate_hz, duration, column)
+    if sheet.loop:
+        columns = simulate_loop(sheet, t, u, plant=options.get("plant", "reduced"), noise=noise, seed=seed)
+    else:
+        columns = simulate_recording(sheet, t, u, effects=added, noise=noise, seed=seed, **options)
     theta = columns["theta_rad"]
     summary = {
         "plant": options.get("plant", "reduced"),
@@ -164,7 +172,7 @@ def simulate(
         "theta_min_rad": float(theta.min()),
         "theta_max_rad": float(theta.max()),
     }
-    return Simulation(columns["t_s"], columns["u_V"], theta, summary)
+    return Simulation(columns["t_s"], columns[column], theta, summary, column)
 
 
 def _refuse_options(options: PlantOptions, noise: float) -> None:
@@ -175,8 +183,19 @@ def _refuse_options(options: PlantOptions, noise: float) -> None:
         raise InputError(f"the noise is {noise:g} rad, zero or more was expected")
 
 
-def _signal(given: Voltage, rate_hz: float | None, duration: float | None) -> tuple[str, np.ndarray, np.ndarray]:
-    """Name, times [s] and voltages [V] of an input."""
+def _refuse_beside_a_loop(given: Voltage, added: Sequence[object], options: PlantOptions) -> None:
+    """Raise InputError for what no model of a position command takes."""
+    if isinstance(given, str) and given in INPUTS:
+        raise InputError(f"--input {given} is a voltage; a model with a [loop] takes a CSV t_s,theta_ref_rad")
+    for option, is_given in (("--effect", added), ("--gap", options.get("gap"))):
+        if is_given:
+            raise InputError(f"{option} is for models without a [loop], this one's effects stand in its file")
+
+
+def _signal(
+    given: Voltage, rate_hz: float | None, duration: float | None, column: str
+) -> tuple[str, np.ndarray, np.ndarray]:
+    """Name, times [s] and values of an input, of a file its ``column``."""
     if isinstance(given, str) and given in INPUTS:
         rate, seconds, most = rate_hz or RATE_HZ, duration or DURATION, 20_000_000
         if not 2 <= rate * seconds <= most:
@@ -196,7 +215,7 @@ def _signal(given: Voltage, rate_hz: float | None, duration: float | None) -> tu
             raise InputError(
                 f"--input {file}: there is no such file and no input of that name; there are {', '.join(INPUTS)}"
             )
-        return str(given), *read_input(file)
+        return str(given), *read_input(file, column)
     return "arrays", *_arrays(given)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ers_mj.door.known import Known, known
+from ers_mj.door.known import Known, known_plant
 from ers_mj.door.results import Progress, Result, Writers, silent
 from ers_mj.door.saving import report_writers, versions
 from ers_mj.errors import InputError, refuse_other
@@ -84,7 +84,7 @@ def validate(
 
     Source: Energies 2020, Eq. (5) and (6), against the linkage of its Fig. 2 in MuJoCo.
     """
-    sheet = known(datasheet)
+    sheet = known_plant(datasheet)
     if sheet is None:
         raise InputError("no datasheet was given, a path, a mapping, a datasheet or a model was expected")
     if gap is None and linkage is None and inductance is None:

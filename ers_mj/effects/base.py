@@ -90,6 +90,10 @@ class Effect:
     holds_place: ClassVar[bool] = False  # it may stand in a baseline where others have a spring (see ``columns``)
     after_noise: ClassVar[bool] = False  # a sensor's converter or wire: it acts on what is read, noise and all
     holds: ClassVar[bool] = False  # a wire that brings an earlier reading again
+    # letters of a position loop (position_loop/model.py) that it is told by, where a firmware closes one
+    in_loop: ClassVar[tuple[str, ...]] = ()
+    loop_sentence: ClassVar[str] = ""  # what is said of it there, with the {value} of the first of these letters
+    is_weight: ClassVar[bool] = False  # its torques grow with a load's moment m l
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None

@@ -30,6 +30,8 @@ class CurrentLimit(Drive):
         ),
     )
     needs, follows_current = (("tau_max",),), True
+    in_loop = ("most",)
+    loop_sentence = "the servo limits its current: its motor gives {value} at most"
     parts_damping = True
 
     def starts(self, scales):

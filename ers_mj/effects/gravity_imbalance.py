@@ -24,6 +24,7 @@ class GravityImbalance(Load):
         Parameter("g_c", "torque", "m g l sin(phase)", positive=False),
     )
     sized, tries, holds_place = 2, 3, True
+    is_weight = True
     redundant, curves = (
         1,
         "bias_torque",

@@ -18,6 +18,8 @@ class InputDelay(Drive):
     parameters = (Parameter("T_d", "time", "dead time of the command"),)
     sized = 1
     tangible = False
+    in_loop = ("tau_s", "dead_time_s")
+    loop_sentence = "the servo answers its command {value} late"
 
     def starts(self, scales):
         return [np.array([2 * scales.sample_time])]

@@ -64,6 +64,8 @@ class Presliding(Friction):
     )
     needs = (("x_s", "v_c"),)
     tries, dear, step, tangible = 2, True, 0.01, False
+    in_loop = ("creep",)
+    loop_sentence = "friction creeps below its level, like a damper of {value}"
 
     def starts(self, scales):
         least, most = 2 * scales.noise, 0.05 * scales.position

@@ -28,6 +28,8 @@ class VoltageSaturation(Drive):
         ),
     )
     needs = (("u_max",),)
+    in_loop = ("L",)
+    loop_sentence = "the servo's own loop is limited: its motor pushes with {value} at most"
     tries = 3
 
     def starts(self, scales):

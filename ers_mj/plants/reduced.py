@@ -12,7 +12,7 @@ from ers_mj.effects.base import Effect
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants import event_integrator, fixed_steps
 from ers_mj.plants.effort import Effort
-from ers_mj.plants.laws import acting, laid_out
+from ers_mj.plants.laws import Acting, acting, laid_out
 from ers_mj.plants.state import N_CONSTANTS
 from ers_mj.plants.tangents import NUDGE, prepare, tangent
 
@@ -46,6 +46,22 @@ def lumped(values: Mapping[str, float]) -> Coefficients:
         theta_0=values.get("theta_0", 0.0),
         tau_e=values.get("tau_e", 0.0),
     )
+
+
+def lowered(c: Coefficients, effects: Sequence[tuple[str, np.ndarray]]) -> tuple[np.ndarray, Acting, np.ndarray]:
+    """What laws.laid_out takes of a plant with these effects: coefficients, the laws that are on, their constants."""
+    given = {}
+    for name, values in effects:
+        c = BY_NAME[name].coefficients(values, c)
+    for name, values in effects:
+        effect = BY_NAME[name]
+        if (effect.torque or effect.friction or effect.inertia or effect.memory) and effect.is_lawful(values):
+            given[name] = effect.constants(values, c)
+    on = acting(tuple(given), c.has_motor_side)
+    p = np.zeros((len(on.rows), N_CONSTANTS))
+    for row, constants in zip(on.rows, p, strict=True):
+        constants[: len(given[EFFECTS[row].name])] = given[EFFECTS[row].name]
+    return np.array(c, float), on, p
 
 
 @dataclass(frozen=True)
@@ -102,19 +118,7 @@ class ReducedModel:
     _lowered: tuple = field(init=False, repr=False, compare=False)
 
     def __post_init__(self):
-        c = self.coefficients
-        given = {}
-        for name, values in self.effects:
-            c = BY_NAME[name].coefficients(values, c)
-        for name, values in self.effects:
-            effect = BY_NAME[name]
-            if (effect.torque or effect.friction or effect.inertia or effect.memory) and effect.is_lawful(values):
-                given[name] = effect.constants(values, c)
-        on = acting(tuple(given), c.has_motor_side)
-        p = np.zeros((len(on.rows), N_CONSTANTS))
-        for row, constants in zip(on.rows, p, strict=True):
-            constants[: len(given[EFFECTS[row].name])] = given[EFFECTS[row].name]
-        object.__setattr__(self, "_lowered", (np.array(c, float), on, p))
+        object.__setattr__(self, "_lowered", lowered(self.coefficients, self.effects))
 
     @property
     def coupled(self) -> bool:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 from ers_mj.identification.answer import Identified, Row
 from ers_mj.report import identify_figures, page
+from ers_mj.report.diagnosis_tables import parameters
 from ers_mj.report.display import NONE, pretty, shown
 from ers_mj.report.display import figure as digits
 from ers_mj.report.drawing import restart_ids
@@ -101,3 +102,13 @@ def _footer(document: Mapping) -> str:
         *(f"{name} {value}" for name, value in document["versions"].items()),
     ]
     return page.footer(told)
+
+
+def loop_page(document: Mapping) -> str:
+    """The page of a position loop's numbers."""
+    restart_ids()
+    kind = "parameters_only" if document["explains"] else "unexplained"
+    left = [("simulations", str(document["evaluations"]))]
+    head = page.header(kind, "Identified parameters", "ers identify", document["sentence"], left)
+    problems = page.section("Be careful", "", page.listed(document["data"]["problems"]) or "<p>Nothing.</p>")
+    return page.frame("Identified parameters", kind, "\n".join([head, parameters(document), problems]))

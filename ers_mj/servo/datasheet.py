@@ -43,7 +43,12 @@ TABLE_1: Mapping[str, float] = MappingProxyType(
 LUMPED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 SIGNED = ("theta_0", "b")  # may be negative: where the spring rests, and the sense of the input
 NEVER_ZERO = ("J", "R", "n", "K_t", "b", "sample_rate_hz")
-SECTIONS = ("parameters", "lumped", "recording", "baseline", "effect")
+SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect")
+KINDS, SENSORS = ("P", "PD", "PI", "PID"), ("load", "link", "motor")  # of a firmware's loop, and where its sensor sits
+LOOP = (
+    "K", "D", "I", "L", "tau_s", "dead_time_s", "R", "band", "least", "most", "creep", "heavy", "buried", "share",
+    "grease", "rotor", "hold",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,9 @@ class Datasheet:
         sample_rate_hz: of the recordings it comes with [Hz], or None.
         effects: the physics that a diagnosis added, each a name and its parameters.
         baseline: what a diagnosis refitted, by free names.
+        loop: the firmware's loop under a position command, by LOOP's letters; empty where there is none.
+        loop_kind, loop_sensor: one of KINDS, and one of SENSORS: loop and log on the load, the loop on the motor and
+            the log on the load (link), both on the motor.
         name: where it comes from.
     """
 
@@ -64,10 +72,13 @@ class Datasheet:
     sample_rate_hz: float | None = None
     effects: tuple[tuple[str, Mapping[str, float]], ...] = ()
     baseline: Mapping[str, float] = field(default_factory=dict)
+    loop: Mapping[str, float] = field(default_factory=dict)
+    loop_kind: str = "P"
+    loop_sensor: str = "load"
     name: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        for attribute in ("parameters", "lumped", "baseline"):
+        for attribute in ("parameters", "lumped", "baseline", "loop"):
             object.__setattr__(self, attribute, MappingProxyType(dict(getattr(self, attribute))))
         effects = tuple((name, MappingProxyType(dict(values))) for name, values in self.effects)
         object.__setattr__(self, "effects", effects)
@@ -76,7 +87,7 @@ class Datasheet:
         """Travel to another process as plain dictionaries."""
         effects = tuple((name, dict(values)) for name, values in self.effects)
         plain = dict(self.parameters), dict(self.lumped), self.sample_rate_hz, effects, dict(self.baseline)
-        return type(self), (*plain, self.name)
+        return type(self), (*plain, dict(self.loop), self.loop_kind, self.loop_sensor, self.name)
 
     def to_lumped(self) -> dict[str, float]:
         """Those of Eq. (6)'s parameters, of tau_e, emf_share and ampere that follow from what is given.
@@ -148,9 +159,22 @@ def datasheet_of(document: Mapping[str, Any], path: str | os.PathLike[str] = "da
         sample_rate_hz=_section(document, "recording", ["sample_rate_hz"], path).get("sample_rate_hz"),
         effects=tuple(_effect(entry, path) for entry in _entries(document, path)),
         baseline=_numbers(document.get("baseline", {}), f"{path}: [baseline]"),
+        **_loop(document.get("loop", {}), f"{path}: [loop]"),
         name=path.name,
     )
     _refuse_none_or_both(sheet, "baseline" in document, path)
+    return sheet
+
+
+def read_plant(path: str | os.PathLike[str]) -> Datasheet:
+    """As read_datasheet, of a servo that is told a voltage.
+
+    Raises:
+        InputError: the model closes a position loop of its own.
+    """
+    sheet = read_datasheet(path)
+    if sheet.loop:
+        raise InputError(f"{path}: closes a position loop of its own ([loop]), which only diagnose and simulate take")
     return sheet
 
 
@@ -180,6 +204,25 @@ def refuse_impossible(key: str, x: float, where: str) -> None:
         raise InputError(f"{where} has the negative {key} = {x:g}, zero or more was expected")
     if x == 0 and key in NEVER_ZERO:
         raise InputError(f"{where} has {key} = 0, which no servo has")
+
+
+def _loop(table: object, where: str) -> dict[str, Any]:
+    """A firmware's loop: its numbers, kind and sensor."""
+    if not isinstance(table, dict) or not table:
+        _numbers(table, where)
+        return {}
+    words = {}
+    for key, known in (("kind", KINDS), ("sensor", SENSORS)):
+        words[key] = table.get(key, known[0])
+        if words[key] not in known:
+            raise InputError(f"{where} has {key} = {words[key]!r}, one of {', '.join(known)} was expected")
+    loop = _numbers({k: v for k, v in table.items() if k not in words}, where, LOOP)
+    for key, x in loop.items():
+        if x < 0 and key not in ("D", "hold"):
+            raise InputError(f"{where} has the negative {key} = {x:g}, zero or more was expected")
+    if not loop.get("K", 0.0) > 0.0:
+        raise InputError(f"{where} has no K above zero, which every position loop has")
+    return {"loop": loop, "loop_kind": words["kind"], "loop_sensor": words["sensor"]}
 
 
 def _entries(document: Mapping[str, Any], path: Path) -> list[object]:
@@ -255,6 +298,9 @@ def write_model(path: str | os.PathLike[str], datasheet: Datasheet) -> None:
     sections = {"parameters": datasheet.parameters, "lumped": datasheet.lumped, "recording": rate}
     lines = [line for title, table in sections.items() if table for line in _lines(f"[{title}]", table)]
     lines += _lines("[baseline]", datasheet.baseline)
+    if datasheet.loop:
+        title = f'[loop]\nkind = "{datasheet.loop_kind}"\nsensor = "{datasheet.loop_sensor}"'
+        lines += _lines(title, datasheet.loop)
     for name, values in datasheet.effects:
         lines += ["[[effect]]", f"name = {_quoted(name)}", *_lines("[effect.parameters]", values)]
     write_whole(Path(path), "\n".join(lines))

@@ -104,6 +104,11 @@ def build_plant(
     Raises:
         InputError: the datasheet, the effects or the options do not make a plant.
     """
+    if datasheet.loop:
+        raise InputError(
+            f"{datasheet.name or 'the model'}: closes a position loop of its own ([loop]), a servo told a voltage was"
+            " expected"
+        )
     chosen = kernel_effects([*datasheet.effects, *effects], inertia_of(datasheet))
     c = lumped(_values(datasheet, inductance))
     if plant != "mujoco" and linkage != "constant":

@@ -11,6 +11,7 @@ import numpy as np
 
 from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.errors import InputError
+from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.staging import rig_of
 
@@ -67,7 +68,7 @@ class Frames:
     output_unit: str = "rad"
 
 
-def frames_of(plant: MechanicalPlant, evidence: Evidence) -> Frames | None:
+def frames_of(plant: MechanicalPlant | LoopedPlant, evidence: Evidence) -> Frames | None:
     """Where the model before does worst, on a held-out recording if there is one.
 
     None where no picture would help: the output is neither angle nor way, or before and after do not differ beyond
@@ -103,7 +104,9 @@ def worst_moments(view: RecordView) -> np.ndarray:
     return np.array(sorted(chosen), int)
 
 
-def _drawn(plant: MechanicalPlant, view: RecordView, chosen: np.ndarray, enlarged: int) -> tuple[Frame, ...]:
+def _drawn(
+    plant: MechanicalPlant | LoopedPlant, view: RecordView, chosen: np.ndarray, enlarged: int
+) -> tuple[Frame, ...]:
     from ers_mj.view.rendering import Painter, jpeg_bytes
     from ers_mj.view.replay import posed
 

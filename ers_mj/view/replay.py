@@ -12,6 +12,7 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 from ers_mj.errors import InputError
+from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.reduced import lumped
 from ers_mj.plants.skeletons import bodily
@@ -81,7 +82,7 @@ def plant_of(
 
 
 def posed(
-    plant: MechanicalPlant,
+    plant: MechanicalPlant | LoopedPlant,
     t: np.ndarray,
     theta: np.ndarray,
     measured: np.ndarray | None = None,

@@ -1,0 +1,204 @@
+"""What a diagnosis of a position loop tells: diagnosis.json, the evidence that the report draws, the improved model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of
+from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
+from ers_mj.diagnosis.localisation import Place, Ranked, Samples, places, residual_map, shaded
+from ers_mj.diagnosis.loop_advice import next_recording
+from ers_mj.diagnosis.loop_case import LoopCase
+from ers_mj.diagnosis.loop_rows import improved, parameters
+from ers_mj.diagnosis.sentences import shown
+from ers_mj.effects import BY_NAME
+from ers_mj.position_loop.intervals import Told
+from ers_mj.position_loop.model import LETTERS, LoopModel
+from ers_mj.position_loop.runs import Run, speed_of
+from ers_mj.servo.simulation import unit_of
+
+
+def told(case: LoopCase) -> Diagnosis:
+    """The document, the evidence, the model and the plant."""
+    samples = gather(case)
+    missing = [_effect(case, name) for name in case.told_effects]
+    found = _places(case, samples)
+    document = {
+        "version": 1,
+        "verdict": case.verdict,
+        "sentence": _sentence(case, missing, found),
+        "where": [place_of(p) for p in found],
+        "missing": missing,
+        "remainder": _remainder(case),
+        "record_state": [],
+        "fit": case.fits,
+        "parameters": parameters(case.intervals, case.output_unit),
+        "next_recording": next_recording(case),
+        "data": data_of(case.recordings, case.holdout),
+        "seed": case.seed,
+        "versions": versions_of(),
+    }
+    if case.verdict == "unexplained":
+        document["suspects"] = [{"effect": c.name, "gain": c.gain} for c in _last_round(case)[:3]]
+    evidence = Evidence(
+        tuple(_views(case, samples)),
+        tuple(_ladder(case)),
+        residual_map(samples),
+        case.noise,
+        case.output_unit,
+        case.recordings[0].input_unit,
+    )
+    model = case.model if case.told_effects or not case.names else case.base
+    return Diagnosis(document, evidence, improved(model), case.plant())
+
+
+# -- the effects ----------------------------------------------------------------------------------------------------
+
+
+def _effect(case: LoopCase, name: str) -> dict:
+    effect, entries = BY_NAME[name], _effect_parameters(case, name)
+    values = {k: shown(e["value"], e["unit"]) for k, e in entries.items()}
+    if effect.in_loop:
+        sentence = effect.loop_sentence.format(value=next(iter(values.values())))
+    else:
+        sentence = effect.describe(values)
+    left = next(x for x in case.selection.named if x.name == name)
+    less = case.confirmed.without[name]
+    return {
+        "effect": name,
+        "sentence": sentence,
+        "subsystem": effect.subsystem,
+        "parameters": entries,
+        "evidence": {
+            "heldout_rmse_without_rad": less.rmse,
+            "heldout_rmse_with_rad": case.confirmed.after.rmse,
+            "delta_bic": 2.0 * left.gain,
+            "p_value": case.confirmed.p_values[name],
+        },
+        "alternatives": _alternatives(case, name),
+    }
+
+
+def _effect_parameters(case: LoopCase, name: str) -> dict[str, dict]:
+    effect, y = BY_NAME[name], case.output_unit
+    if effect.in_loop:
+        letter = next(x for x in effect.in_loop if x in case.model.free)
+        own = letter if letter in ("L", "R") else effect.parameters[0].name
+        entry = _entry(case.intervals.told("", letter), case.model[letter], LETTERS[letter].unit.format(y=y))
+        return {own: entry | ({"meaning": "within the loop"} if letter == "dead_time_s" else {})}
+    values = dict(case.model.effects)[name]
+    return {
+        p.name: _entry(case.intervals.told(name, p.name), float(v), unit_of(p.kind, y, y, False))
+        | {"meaning": p.meaning}
+        for p, v in zip(effect.parameters, values, strict=True)
+    }
+
+
+def _entry(found: Told | None, value: float, unit: str) -> dict:
+    ends = [None, None] if found is None else [float(x) for x in found.ci95]
+    value = found.value if found is not None else value
+    return {"value": float(value) if math.isfinite(value) else None, "unit": unit, "ci95": ends}
+
+
+def _alternatives(case: LoopCase, name: str) -> list[dict]:
+    """What of the round in which the effect was found explains nearly as much."""
+    for ranked in case.selection.rounds:
+        if ranked and ranked[0].name == name:
+            weights = {c.name: math.exp(max(c.gain - ranked[0].gain, -700.0)) for c in ranked if c.name in BY_NAME}
+            total = sum(weights.values())
+            return [
+                {
+                    "effect": c.name,
+                    "probability": weights[c.name] / total,
+                    "why_not_excluded": f"explains {c.gain:.1f} where {name} explains {ranked[0].gain:.1f}",
+                }
+                for c in ranked[1:]
+                if c.name in BY_NAME and weights[c.name] / total > case.policy.tied
+            ]
+    return []
+
+
+def _last_round(case: LoopCase) -> list:
+    return [c for c in case.selection.rounds[-1] if c.name in BY_NAME] if case.selection.rounds else []
+
+
+# -- words, places, pictures ----------------------------------------------------------------------------------------
+
+
+def _sentence(case: LoopCase, missing: list[dict], found: list[Place]) -> str:
+    loop = f"a {case.model.kind} position loop"
+    if case.verdict == "parameters_only":
+        return f"{loop.capitalize()} with the numbers given explains these recordings within their noise."
+    if case.verdict == "missing_physics":
+        names = "; ".join(m["sentence"] for m in missing)
+        before, after = (shown(getattr(case.confirmed, w).rmse, case.output_unit) for w in ("before", "after"))
+        return (
+            f"Beside {loop}, friction and damping this acts: {names}. With it the held-out error falls from {before} to"
+            f" {after}."
+        )
+    place = next((p.sentence for p in found if p.axis != "subsystem"), "it is spread over the whole record")
+    return f"Something acts here that no effect of the library accounts for; {place}."
+
+
+def _remainder(case: LoopCase) -> dict:
+    words = (
+        "a mismatch is left that nothing named accounts for"
+        if case.more_is_left
+        else "nothing beyond the noise is left"
+    )
+    return {
+        "explained_share": case.explained,
+        "significant": case.more_is_left,
+        "sentence": f"{case.explained:.0%} of the squared held-out error above the noise is explained; {words}.",
+    }
+
+
+def gather(case: LoopCase) -> Samples:
+    """Errors of the free runs before and after at every scored sample, beside where the servo was."""
+    parts = []
+    for k, run in enumerate(case.runs):
+        v = run.scored
+        first, second = ((run.y - model.predicted(run))[v] for model in (case.base, case.model))
+        speed, error = speed_of(run)[v], np.abs(run.r - run.y)[v]
+        parts.append((np.full(v.sum(), k), run.t[v], run.y[v], speed, error, first**2, second**2, first))
+    return Samples(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _places(case: LoopCase, samples: Samples) -> list[Place]:
+    total = sum(x.gain for x in case.selection.named) or 1.0
+    rounds: list[Sequence[Ranked]] = [case.selection.named, *case.selection.rounds]
+    return places(samples, case.runs, rounds, total, case.told_effects, case.output_unit, case.output_unit)
+
+
+def _views(case: LoopCase, samples: Samples) -> list[RecordView]:
+    out, seen = [], set()
+    for base, model, fold in zip(
+        case.confirmed.before_models, case.confirmed.models, case.confirmed.folds, strict=True
+    ):
+        for run in fold.held:
+            out.append(_view(run, base, model, True, ()))
+            seen.add(run.name)
+    for k, run in enumerate(case.runs):
+        if run.name not in seen:
+            out.append(_view(run, case.base, case.model, False, shaded(run, k, samples)))
+    return out
+
+
+def _view(run: Run, base: LoopModel, model: LoopModel, is_held: bool, spans: tuple) -> RecordView:
+    return RecordView(run.name, is_held, run.t, run.r, run.y, base.predicted(run), model.predicted(run), spans)
+
+
+def _ladder(case: LoopCase) -> Iterator[Rung]:
+    chosen = case.selection.chosen
+    yield Rung((), 0.0, 0.0, case.confirmed.before.rmse, not case.names, "bare loop", case.confirmed.base.size)
+    for left in case.selection.named:
+        yield Rung((left.name,), left.gain, 0.0, None, False, "over the best refit without it", chosen.size)
+    if case.names:
+        gain = sum(x.gain for x in case.selection.named)
+        yield Rung(case.names, gain, 0.0, case.confirmed.after.rmse, True, "the answer", chosen.size)
+    for ranked in case.selection.rounds:
+        for c in ranked[:6]:
+            yield Rung((c.name,), c.gain, 0.0, None, False, "compared", c.fit.size)

@@ -1,0 +1,326 @@
+"""A servo with the loop of its own firmware between the commanded position and the motor: reference in, motion out.
+
+    r_R   the reference tau late, its speed within +-R
+    v     = K e + xi - D w,  e = r_R - theta (of the body that the loop's sensor sees),  xi' = I e
+    drive = v within +-L, ``dead_time`` late, its current within +-most
+    theta'' = drive - a_emf w + Eq. (6)'s forces and the laws of effects, friction set-valued
+
+Fixed steps of second order (leapfrog, dampers by the trapezium), friction and limits solved for with the speed at the
+end of a step; a reference that switches within a step enters by its mean, so that a motion moves smoothly with tau.
+All accelerations are per total inertia, in output unit / s^2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from ers_mj.plants.compiled import inline, kernel, record_in, unit
+from ers_mj.plants.laws import friction_level, remember, total_torque
+from ers_mj.plants.state import READ, READ_BOOL, RUNAWAY, TABLE, VECTOR, C, F, N, plant_in, types
+
+LONGEST = 1e-3  # [s] of a step
+STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
+PAST = 512  # steps of the drive that are kept: the longest dead time
+
+
+class LoopNumbers(NamedTuple):
+    """The firmware's numbers.
+
+    K [1/s^2], D [1/s] and I [1/s^3] of the loop, its limit L [output unit/s^2], latency tau [s] of the reference, dead
+    time [s] of the drive, R the limit of the reference's speed; ``band`` the error [output unit] within which the drive
+    sleeps and ``lost`` what is still missing outside it; ``least`` the smallest drive outside the band; ``most`` the
+    largest motor torque; ``creep`` [1/s] the speed's factor below breakaway (infinite: friction holds) and ``heavy``
+    how much slower the body answers there (MuJoCo's constraint: 10), as ``buried`` within a stop (20); ``share`` the
+    motor's of the inertia, behind which a gear rubs; ``grease`` [1/s] what drags the load along within a play;
+    ``at_motor`` 1 where the loop's sensor sits on the motor's side, ``log_at_motor`` the recording's.
+    """
+
+    K: float
+    D: float = 0.0
+    I: float = 0.0
+    L: float = np.inf
+    tau: float = 0.0
+    dead_time: float = 0.0
+    R: float = np.inf
+    band: float = 0.0
+    lost: float = 0.0
+    least: float = 0.0
+    most: float = np.inf
+    creep: float = np.inf
+    heavy: float = 1.0
+    buried: float = 1.0
+    share: float = 0.5
+    grease: float = 0.0
+    at_motor: float = 0.0
+    log_at_motor: float = 0.0
+
+
+LOOP = np.dtype((np.record, np.dtype([(name, np.float64) for name in LoopNumbers._fields], align=True)))
+loop_in = record_in(LOOP)
+Q = numba.from_dtype(LOOP)
+
+
+class Moving(NamedTuple):
+    """Angle and speed of the load and of the motor's side, the loop's integral, the limited reference, the drive, the
+    torque that the gear carried last.
+    """
+
+    theta: float
+    w: float
+    theta_m: float
+    w_m: float
+    xi: float
+    r: float
+    drive: float
+    carried: float
+
+
+M8 = types.NamedUniTuple(F, 8, Moving)
+PAIR = types.UniTuple(F, 2)
+
+
+@inline
+def _mean_reference(t, r, before, k, a, b):
+    """(mean of the held reference over a..b, the sample that holds at b), the search begun at sample k."""
+    n = r.size
+    while k + 1 < n and t[k + 1] <= a:
+        k += 1
+    total, at = 0.0, a
+    while True:
+        end = b if k + 1 >= n or t[k + 1] >= b else t[k + 1]
+        if a < t[0] and at < t[0]:
+            end = min(b, t[0])
+            total += before * (end - at)
+        else:
+            total += r[k] * (end - at)
+            if k + 1 < n and end >= t[k + 1]:
+                k += 1
+        at = end
+        if at >= b:
+            return total / (b - a), k
+
+
+@inline
+def _pushed(q, e):
+    """The error that the drive answers to."""
+    size = abs(e)
+    if q.band > 0.0:
+        if size <= q.band:
+            return 0.0
+        size = min(size - q.lost, 30.0 * (size - q.band))
+    if q.least > 0.0 and size > 0.0:
+        size = max(size, q.least / q.K)
+    return math.copysign(size, e)
+
+
+@inline
+def _slipped(gain, push, a, level, creep, heavy, w, h):
+    """Speed after h of gain w' = push - a w - friction, dampers by the trapezium.
+
+    Friction that creeps is creep w below its level, and (heavy - 1) gain w' of a body that it slows.
+    """
+    if creep < np.inf:
+        soft, mass = 0.5 * h * (a + creep), heavy * gain
+        end = ((mass - soft) * w + h * push) / (mass + soft)
+        holds = push - 0.5 * a * (end + w) - gain * (end - w) / h
+        if abs(holds) <= level:
+            return end
+        way = math.copysign(1.0, holds)
+        return ((gain - 0.5 * h * a) * w + h * (push - way * level)) / (gain + 0.5 * h * a)
+    reach = (gain - 0.5 * h * a) * w + h * push
+    if abs(reach) <= h * level:
+        return 0.0
+    return (reach - math.copysign(h * level, reach)) / (gain + 0.5 * h * a)
+
+
+@inline
+def _level(c, theta, w, carried):
+    """Friction of the whole train along the motion, per total inertia."""
+    up = w > 0.0 or (w == 0.0 and carried > 0.0)
+    level = c.c_2_plus if up else c.c_2_minus
+    if c.frictions > 0:
+        level = friction_level(c, level, theta, w, carried, 1.0 if up else -1.0)
+    return max(level, 0.0)
+
+
+@inline
+def _wall(c, theta):
+    """(acceleration of the stop that is touched, damping there)."""
+    if theta > c.upper:
+        return c.k_stop * (c.upper - theta), c.d_stop
+    if theta < c.lower:
+        return c.k_stop * (c.lower - theta), c.d_stop
+    return 0.0, 0.0
+
+
+@inline
+def _limited(q, v):
+    return min(max(v, -q.L), q.L)
+
+
+@unit(M8(C, Q, F, M8, F, F, F, F))
+def _one_body(c, q, t, x, r, fresh, late, h):
+    """The state h later under the mean reference r, where of the drive the share ``fresh`` is the present one and the
+    rest ``late``.
+    """
+    theta = x.theta + 0.5 * h * x.w
+    e = r - theta
+    hold = c.bias + c.a_1 * (c.theta_0 - theta)
+    if c.torques > 0:
+        hold += total_torque(c, theta, x.w, x.drive, t)
+    wall, d_wall = _wall(c, theta)
+    a = (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
+    level = _level(c, theta, x.w, x.carried)
+    push, ahead = hold + wall, q.K * _pushed(q, e) + x.xi
+    mass = q.buried if wall != 0.0 else 1.0
+    w = _slipped(mass, push + fresh * ahead + late, a + fresh * q.D + c.a_emf, level, q.creep, q.heavy, x.w, h)
+    v = ahead - 0.5 * q.D * (x.w + w)
+    if abs(v) > q.L:
+        drive = fresh * math.copysign(q.L, v) + late
+        w = _slipped(mass, push + drive, a + c.a_emf, level, q.creep, q.heavy, x.w, h)
+    else:
+        drive = fresh * v + late
+    current = drive - 0.5 * c.a_emf * (x.w + w)
+    if abs(current) > q.most:
+        w = _slipped(mass, push + math.copysign(q.most, current), a, level, q.creep, q.heavy, x.w, h)
+    held = wall - 0.5 * d_wall * (x.w + w) - (mass - 1.0) * (w - x.w) / h
+    if wall != 0.0 and held * wall < 0.0:
+        w = _slipped(1.0, hold + drive, a - d_wall + c.a_emf, level, q.creep, q.heavy, x.w, h)
+    xi = x.xi
+    if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
+        xi = _limited(q, xi + h * q.I * e)
+    carried = (1.0 - q.share) * (w - x.w) / h - push
+    theta += 0.5 * h * w
+    return Moving(theta, w, theta, w, xi, x.r, _limited(q, v), carried)
+
+
+@unit(M8(C, Q, F, M8, F, F, F, F))
+def _two_bodies(c, q, t, x, r, fresh, late, h):
+    """As ``_one_body``, of a motor and a load with a play or a shaft between them."""
+    theta, theta_m = x.theta + 0.5 * h * x.w, x.theta_m + 0.5 * h * x.w_m
+    e = r - (theta_m if q.at_motor > 0.0 else theta)
+    seen = x.w_m if q.at_motor > 0.0 else x.w
+    push = c.bias + c.a_1 * (c.theta_0 - theta)
+    if c.torques > 0:
+        push += total_torque(c, theta, x.w, x.drive, t)
+    wall, d_wall = _wall(c, theta)
+    twist = theta_m - theta
+    touch, d = 0.0, q.grease
+    if abs(twist) > c.gap:
+        touch, d = c.k_twist * (twist - math.copysign(c.gap, twist)), c.d_twist + q.grease
+        if (touch + d * (x.w_m - x.w)) * touch < 0.0:
+            d = -touch / (x.w_m - x.w)
+    a = (1.0 - c.beta) * (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
+    a_m = c.beta * (c.a_mech_plus if x.w_m > 0.0 else c.a_mech_minus) + c.a_emf
+    level, level_m = _level(c, theta, x.w, x.drive), _level(c, theta, x.w_m, x.drive)
+    ahead = q.K * _pushed(q, e) + x.xi
+    w, w_m = x.w, x.w_m
+    v = ahead - q.D * seen
+    for _ in range(3):
+        w = _slipped(
+            1.0 - c.rho,
+            push + wall + touch + 0.5 * d * (x.w_m + w_m),
+            a + d,
+            (1.0 - c.phi) * level,
+            q.creep,
+            q.heavy,
+            x.w,
+            h,
+        )
+        between = -touch + 0.5 * d * (x.w + w)
+        if q.at_motor > 0.0:
+            w_m = _slipped(
+                c.rho,
+                fresh * ahead + late + between,
+                a_m + fresh * q.D + d,
+                c.phi * level_m,
+                q.creep,
+                q.heavy,
+                x.w_m,
+                h,
+            )
+            v = ahead - 0.5 * q.D * (x.w_m + w_m)
+        else:
+            v = ahead - 0.5 * q.D * (x.w + w)
+        if q.at_motor == 0.0 or abs(v) > q.L:
+            w_m = _slipped(
+                c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, q.heavy, x.w_m, h
+            )
+    xi = x.xi
+    if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
+        xi = _limited(q, xi + h * q.I * e)
+    theta, theta_m = theta + 0.5 * h * w, theta_m + 0.5 * h * w_m
+    return Moving(theta, w, theta_m, w_m, xi, x.r, _limited(q, v), touch)
+
+
+@inline
+def _step_length(c):
+    """[s] of a step at most."""
+    stiffest = max(c.k_stop, c.k_twist / max(min(c.rho, 1.0 - c.rho), 1e-3) if c.two_body > 0 else 0.0)
+    return min(LONGEST, STIFF / math.sqrt(stiffest)) if stiffest > 0.0 else LONGEST
+
+
+@inline
+def _late_drive(q, past, k, h):
+    """(share of the drive that is the present one, the rest of it) at step k, of drives that were a step h apart."""
+    if q.dead_time <= 0.0:
+        return 1.0, 0.0
+    back = min(q.dead_time / h, PAST - 2.0)
+    whole = int(back)
+    part = back - whole
+    older = past[(k - whole - 1) % PAST]
+    if whole == 0:
+        return 1.0 - part, part * older
+    return 0.0, (1.0 - part) * past[(k - whole) % PAST] + part * older
+
+
+@inline
+def _started(c, q, theta, w, r):
+    """The state at the beginning: both bodies together, an integral that holds it there."""
+    hold = c.bias + c.a_1 * (c.theta_0 - theta)
+    if c.torques > 0:
+        hold += total_torque(c, theta, 0.0, 0.0, 0.0)
+    v = q.K * (r - theta)
+    xi = _limited(q, -hold) - v if q.I > 0.0 else 0.0
+    return Moving(theta, w, theta, w, xi, r, _limited(q, v + xi - q.D * w), 0.0)
+
+
+@kernel(types.void(READ, READ, READ_BOOL, VECTOR, VECTOR, F, F, F, N, TABLE))
+def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
+    """Fill out (N, 4) with the load's angle and speed, the motor side's angle and the drive at the times t (N,), from
+    (theta, w) and under the reference r (N,), which was ``before`` until t[0].
+
+    ``plant`` as laws.laid_out makes it, ``loop`` the numbers of LoopNumbers; a motion that runs away becomes NaN.
+    """
+    c, q = plant_in(plant), loop_in(loop)
+    longest, n = _step_length(c) / refine, t.size
+    x = _started(c, q, theta, w, before)
+    past = np.full(PAST, x.drive)
+    k, step = 0, 0
+    for i in range(n):
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = x.theta, x.w, x.theta_m, x.drive
+        if i == n - 1:
+            break
+        steps = int(math.ceil((t[i + 1] - t[i]) / longest - 1e-9))
+        h = (t[i + 1] - t[i]) / steps
+        remember(c, x.theta, x.w, x.drive, x.theta_m, x.w_m, t[i + 1] - t[i])
+        for s in range(steps):
+            at = t[i] + s * h
+            asked, k = _mean_reference(t, r, before, k, at - q.tau, at - q.tau + h)
+            now = x.r + min(max(asked - x.r, -q.R * h), q.R * h)
+            mean = 0.5 * (x.r + now) if q.R < np.inf else asked
+            fresh, late = _late_drive(q, past, step, h) if enable[i] else (0.0, 0.0)
+            x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, now, x.drive, x.carried)
+            if c.two_body > 0:
+                x = _two_bodies(c, q, at, x, mean, fresh, late, h)
+            else:
+                x = _one_body(c, q, at, x, mean, fresh, late, h)
+            past[step % PAST] = x.drive
+            step += 1
+        if not (abs(x.theta) < RUNAWAY and abs(x.w) < RUNAWAY):
+            out[i + 1 :, :] = np.nan
+            return

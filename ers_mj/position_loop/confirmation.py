@@ -1,0 +1,173 @@
+"""Does data that no fit has seen confirm what was found? Every named effect against the best refit without it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, paired_p
+from ers_mj.decisions.explained import cost, score
+from ers_mj.decisions.thresholds import Policy
+from ers_mj.position_loop.fit import Data, Fit, fitted
+from ers_mj.position_loop.model import LoopModel
+from ers_mj.position_loop.runs import Run
+from ers_mj.position_loop.selection import Selection, Selector
+from ers_mj.position_loop.terms import without
+
+FIRST, LAST = 0.7, 0.3  # shares of the only recording that are fitted and held out; the last that is recalibrated on
+COARSER = 3  # blocks of a run that are judged as one
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Runs that are fitted (None: all, the rest being held out of everything) and those held out."""
+
+    training: tuple[Run, ...] | None
+    held: tuple[Run, ...]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors of free runs on held-out samples: rmse and mae [output unit], mean squared error of each block (B,) in
+    noise variances.
+    """
+
+    rmse: float
+    mae: float
+    misfit: np.ndarray
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """What held-out runs say: scores before (without any named effect) and after, and without each name; the models of
+    each fold, before and after, and a sentence of where the held-out data comes from.
+    """
+
+    folds: tuple[Fold, ...]
+    before: Score
+    after: Score
+    without: dict[str, Score]
+    p_values: dict[str, float]
+    before_models: tuple[LoopModel, ...]
+    models: tuple[LoopModel, ...]
+    base: Fit
+    sentence: str
+
+
+def folds_of(runs: Sequence[Run], held: Sequence[Run]) -> tuple[list[Fold], str]:
+    """Recordings of their own, else each one left out in turn, else the end of the only one."""
+    if held:
+        return [Fold(None, tuple(held))], "recordings that were opened after the selection had ended"
+    if len(runs) > 1:
+        folds = [Fold(tuple(r for r in runs if r is not out), (out,)) for out in runs]
+        return folds, "each recording left out in turn; the structure was chosen on all"
+    only = runs[0]
+    return [Fold((only.only(0.0, FIRST),), (only.only(FIRST, 1.0),))], "the last 30 % of the only recording"
+
+
+def scored(models: Sequence[LoopModel], folds: Sequence[Fold]) -> Score:
+    """The held-out score of a model of each fold."""
+    errors, misfit = [], []
+    for model, fold in zip(models, folds, strict=True):
+        for run in fold.held:
+            e = (run.y - model.predicted(run))[run.scored]
+            block = run.block[run.scored] // COARSER
+            counts = np.bincount(block - block[0])
+            sums = np.bincount(block - block[0], (e / run.sigma) ** 2)
+            errors.append(e)
+            misfit.append(sums[counts > 0] / counts[counts > 0])
+    e = np.concatenate(errors)
+    return Score(math.sqrt(float(np.mean(e**2))), float(np.mean(np.abs(e))), np.concatenate(misfit))
+
+
+def bare_fit(selector: Selector, selection: Selection) -> Fit:
+    """The best refit without any named effect, from the answer and from what leaving out the strongest left."""
+    bare = selection.chosen.model
+    for left in selection.named:
+        bare = without(bare, left.name)
+    starts = [bare]
+    for left in selection.left:
+        model = left.fit.model
+        for other in selection.named:
+            model = without(model, other.name)
+        starts.append(replace(model, free=bare.free) if set(model.free) == set(bare.free) else bare)
+    tried = [fitted(model, selector.data, 12) for model in starts]
+    return fitted(min(tried, key=lambda fit: fit.cost).model, selector.data)
+
+
+def confirmed(
+    selector: Selector, selection: Selection, held: Sequence[Run], policy: Policy
+) -> tuple[Selection, Confirmed]:
+    """The selection without what held-out data does not confirm, and what it says of the rest."""
+    folds, sentence = folds_of(selector.runs, held)
+    while True:
+        found = _judged(selector, selection, folds, sentence, policy)
+        doubtful = [x for x in selection.named if not _holds(found, x.name, selector.runs, policy)]
+        if not doubtful:
+            return selection, found
+        weakest = min(doubtful, key=lambda x: x.gain)
+        lesser = fitted(weakest.fit.model, selector.data)
+        selection = selector.pruned(replace(selection, chosen=lesser, left=()))
+
+
+def _judged(
+    selector: Selector, selection: Selection, folds: Sequence[Fold], sentence: str, policy: Policy
+) -> Confirmed:
+    base = bare_fit(selector, selection) if selection.named else selection.chosen
+    models = _refitted(selection.chosen.model, folds)
+    bare = _refitted(base.model, folds) if selection.named else models
+    after = scored(models, folds)
+    lesser = {x.name: scored(_refitted(x.fit.model, folds), folds) for x in selection.named}
+    p = {name: _p_value(after, less, policy) for name, less in lesser.items()}
+    return Confirmed(tuple(folds), scored(bare, folds), after, lesser, p, tuple(bare), tuple(models), base, sentence)
+
+
+def _refitted(model: LoopModel, folds: Sequence[Fold]) -> list[LoopModel]:
+    return [model if f.training is None else fitted(model, Data.of(f.training), 12).model for f in folds]
+
+
+def _p_value(after: Score, less: Score, policy: Policy) -> float:
+    return paired_p(Won.of(score(less.misfit, 1.0) - score(after.misfit, 1.0)), policy=policy)
+
+
+def _holds(found: Confirmed, name: str, runs: Sequence[Run], policy: Policy) -> bool:
+    after, less = found.after, found.without[name]
+    noise = math.sqrt(float(np.mean([run.sigma**2 for run in runs])))
+    ratio = after.rmse / max(less.rmse, 1e-300)
+    costs = cost(after.misfit, 1.0), cost(less.misfit, 1.0)
+    held = HeldOut(found.p_values[name], (after.rmse, less.rmse), noise, costs, ratio, math.log(ratio))
+    return is_confirmed(held, lambda: False, policy)
+
+
+# -- what a day changes ---------------------------------------------------------------------------------------------
+
+
+def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
+    """Pooled error [output unit] of the rest of each held-out run, once gain, offset and friction level are fitted to
+    its first 30 %.
+    """
+    squares, count = 0.0, 0
+    for model, fold in zip(models, folds, strict=True):
+        for run in fold.held:
+            seen = run.t[run.scored]
+            share = (seen[0] + LAST * (seen[-1] - seen[0])) / run.t[-1]
+            state = replace(model.having(hold=model["hold"]), free=("K", "hold", "c_2"))
+            again = fitted(_OnlyLetters.made_of(state), Data.of([run.only(0.0, share)]), 8).model
+            rest = run.only(share, 1.0)
+            e = (rest.y - again.predicted(rest))[rest.scored]
+            squares, count = squares + float(e @ e), count + e.size
+    return math.sqrt(squares / max(count, 1))
+
+
+class _OnlyLetters(LoopModel):
+    """A model of which no effect's numbers are fitted."""
+
+    @staticmethod
+    def made_of(model: LoopModel) -> _OnlyLetters:
+        return _OnlyLetters(model.values, model.free, model.effects, model.side, model.scales)
+
+    def layout(self):
+        return [f for f in super().layout() if not f.owner]

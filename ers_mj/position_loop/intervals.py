@@ -1,0 +1,118 @@
+"""Intervals of a loop's numbers and of what only a sum or a ratio of them can tell: a sandwich over blocks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from ers_mj.position_loop.fit import Data, Fit, fitted, jacobian
+from ers_mj.position_loop.model import Free, LoopModel
+
+RUN = 5  # neighbouring blocks that are taken as one
+FEWEST = 3  # left-out refits from which they count
+TOLD = 0.7  # half width of a logarithm up to which a number is told
+INEXACT, CLOCK = 0.0025, 0.00025  # standard deviations of what firmware and simulation do in steps: relative, and [s]
+COMBINED = ("a_2+D", "c_2/K", "(a_2+D)/K", "L/K", "I/K")
+
+
+@dataclass(frozen=True)
+class Told:
+    """A number with its 95 % interval, and whether the recordings tell it."""
+
+    value: float
+    ci95: tuple[float, float]
+    identifiable: bool
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """The model whose numbers are told, and the covariance of its transformed numbers with the factor that makes 95 %
+    of a standard deviation.
+    """
+
+    model: LoopModel
+    layout: tuple[Free, ...]
+    covariance: np.ndarray
+    factor: float
+
+    @staticmethod
+    def of(fit: Fit, data: Data, left_out: Sequence[LoopModel] = ()) -> Intervals:
+        """``left_out`` are refits without each recording in turn; three or more widen what scatters between them."""
+        model = fit.model
+        if "L" in model.free and "D" not in model.free:  # a term that was left out leaves doubt in what it moves
+            model = fitted(model.having(D=0.0), data, 8).model
+        layout = model.layout()
+        j = jacobian(model, data)
+        e = data.residuals(model)
+        groups = data.block // RUN
+        slopes = np.array([np.bincount(groups, j[:, k] * e) for k in range(len(layout))]).T
+        hessian = j.T @ j
+        size = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
+        inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-10) / np.outer(size, size)
+        n = slopes.shape[0]
+        spread = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
+        spread += inverse * float(np.mean(e * e))
+        if len(left_out) >= FEWEST and set(left_out[0].free) == set(fit.model.free):
+            spread += _jackknife(fit.model, layout, left_out)
+        spread += np.diag([_inexact(f, q) ** 2 for f, q in zip(layout, model.vector(layout), strict=True)])
+        return Intervals(model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
+
+    def told(self, owner: str, name: str) -> Told | None:
+        """A fitted number."""
+        z = self.model.vector(self.layout)
+        for k, f in enumerate(self.layout):
+            if (f.owner, f.name) == (owner, name):
+                half = self.factor * math.sqrt(max(self.covariance[k, k], 0.0))
+                low, high = f.ends(z[k], half)
+                known = half < TOLD if f.positive else True
+                return Told(f.inside(z[k]), (low, high), known)
+        return None
+
+    def combined(self, name: str) -> Told | None:
+        """One of COMBINED; None where a part of it is not in the model."""
+        rule = {
+            "a_2+D": lambda m: m["a_2"] + m["D"],
+            "c_2/K": lambda m: m["c_2"] / m["K"],
+            "(a_2+D)/K": lambda m: (m["a_2"] + m["D"]) / m["K"],
+            "L/K": lambda m: m["L"] / m["K"],
+            "I/K": lambda m: m["I"] / m["K"],
+        }[name]
+        value, z = rule(self.model), self.model.vector(self.layout)
+        if not math.isfinite(value) or value <= 0.0:
+            return None
+        slope = np.zeros(z.size)
+        for k in range(z.size):
+            ends = []
+            for way in (1e-4, -1e-4):
+                moved = z.copy()
+                moved[k] += way
+                ends.append(math.log(max(rule(self.model.at(self.layout, moved)), 1e-300)))
+            slope[k] = (ends[0] - ends[1]) / 2e-4
+        half = self.factor * math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
+        half = min(half, 50.0)
+        return Told(value, (value * math.exp(-half), value * math.exp(half)), half < TOLD)
+
+
+def _inexact(f: Free, z: float) -> float:
+    """Standard deviation of a transformed number by what steps leave untold."""
+    if f.name in ("tau_s", "dead_time_s"):
+        return CLOCK / f.size
+    return INEXACT * (1.0 if f.positive else abs(z))
+
+
+def _jackknife(model: LoopModel, layout: Sequence[Free], left_out: Sequence[LoopModel]) -> np.ndarray:
+    """Covariance by the refits without each recording in turn; nothing of what they do not have free."""
+    own = model.layout()
+    z = np.array([m.vector(own) for m in left_out])
+    n = len(left_out)
+    spread = (n - 1) / n * (z - z.mean(axis=0)).T @ (z - z.mean(axis=0))
+    place = [next((i for i, f in enumerate(own) if (f.owner, f.name) == (g.owner, g.name)), -1) for g in layout]
+    out = np.zeros((len(layout), len(layout)))
+    for a, i in enumerate(place):
+        for b, k in enumerate(place):
+            out[a, b] = spread[i, k] if i >= 0 and k >= 0 else 0.0
+    return out

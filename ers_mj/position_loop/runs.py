@@ -1,0 +1,185 @@
+"""Recordings of a position command as a fit sees them: noise, blocks, the state before the first sample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ers_mj.data.prepared import start_seen
+from ers_mj.data.recording import Recording
+from ers_mj.data.sensor_faults import spikes
+from ers_mj.effects.quantities import Scales
+
+BLOCK = 0.1  # [s] that a servo's errors hang together
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the noise and the beginning of a run are read."""
+
+    window: int = 20  # samples over which the noise is taken
+    quiet: float = 0.1  # quantile of the windows: the rest is motion
+    share: float = 0.7  # of the noise that this quantile of windows of noise alone shows
+    settled: float = 0.02  # of the travel: a reference so near the output stood there before
+    start: float = 0.05  # [s] over which the first speed is taken,
+    samples: int = 10  # or so many samples
+    rest: float = 0.1  # [s] within which an output that has been commanded away leaves its place
+    sure: float = 4.0  # standard deviations by which it must do so
+
+
+READING = Reading()
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One recording: time, reference and output (N,), the samples that are scored, whether the drive was on, noise
+    sigma [output unit] and the converter's quantum, (angle, speed) at the start, and the reference before it.
+
+    ``gain`` is the firmware's gain over that of the first run, ``inertia`` and ``pull`` the load's m l^2 and m l over
+    those of the first; ``second`` (N,) a drive signal recorded beside, NaN where missing, or None.
+    """
+
+    name: str
+    t: np.ndarray
+    r: np.ndarray
+    y: np.ndarray
+    scored: np.ndarray
+    enable: np.ndarray
+    sigma: float
+    quantum: float
+    start: tuple[float, float]
+    before: float
+    gain: float = 1.0
+    inertia: float = 1.0
+    pull: float = 1.0
+    second: np.ndarray | None = field(default=None, repr=False)
+
+    @property
+    def sample_time(self) -> float:
+        """Median step [s]."""
+        return float(np.median(np.diff(self.t)))
+
+    @property
+    def block(self) -> np.ndarray:
+        """Block (N,) of each sample."""
+        return ((self.t - self.t[0]) / BLOCK).astype(np.int64)
+
+    def only(self, begin: float, end: float) -> Run:
+        """The run, of which only the samples between these shares of its time are scored."""
+        share = (self.t - self.t[0]) / (self.t[-1] - self.t[0])
+        return replace(self, scored=self.scored & (share >= begin) & (share <= end))
+
+
+def runs_of(recordings: Sequence[Recording], first: Recording | None = None) -> list[Run]:
+    """Recordings of one servo as runs; gains and loads are told over those of the ``first`` one."""
+    first = recordings[0] if first is None else first
+    return [_run(r, first) for r in recordings]
+
+
+def _run(recording: Recording, first: Recording) -> Run:
+    t = recording.t - recording.t[0]
+    sigma = noise_of(recording.y, recording.quantum)
+    y = np.where(recording.valid, recording.y, np.nan)
+    for span in spikes(y, sigma):
+        y[span] = np.nan
+    enable = np.ones(t.size, bool) if recording.enable is None else np.asarray(recording.enable, bool)
+    start, travel = started(t, y, sigma), float(np.nanmax(y) - np.nanmin(y))
+    is_settled = stood(t, recording.u, y, sigma, travel)
+    inertia, pull = _load(recording, first)
+    return Run(
+        recording.name,
+        t,
+        np.ascontiguousarray(recording.u, float),
+        y,
+        np.isfinite(y) & _driven(enable),
+        enable,
+        sigma,
+        recording.quantum,
+        start if is_settled else (start[0], 0.0),
+        float(recording.u[0]) if is_settled else start[0],
+        gain=recording.kp / first.kp if recording.kp and first.kp else 1.0,
+        inertia=inertia,
+        pull=pull,
+        second=recording.second,
+    )
+
+
+def _driven(enable: np.ndarray) -> np.ndarray:
+    """Samples (N,) before the drive is first switched off, of a recording that begins with it on."""
+    if not enable[0]:
+        return enable
+    return np.cumsum(~enable) == 0
+
+
+def _load(recording: Recording, first: Recording) -> tuple[float, float]:
+    """(m l^2, m l) of a recording's load over those of the first one; 1 where either is not known."""
+    m, m_1 = recording.load_kg or 0.0, first.load_kg or 0.0
+    length, length_1 = recording.arm_m or 1.0, first.arm_m or 1.0
+    if not (m and m_1):
+        return 1.0, 1.0
+    return m * length**2 / (m_1 * length_1**2), m * length / (m_1 * length_1)
+
+
+def noise_of(y: np.ndarray, quantum: float) -> float:
+    """Noise of a record (N,): third differences over sqrt(20) in its quieter windows, at least q / sqrt(12)."""
+    d = np.diff(y, 3)
+    d = d[np.isfinite(d)]
+    least = max(quantum / math.sqrt(12.0), 1e-9 * float(np.nanstd(y)) + 1e-300)
+    windows = d[: d.size // READING.window * READING.window].reshape(-1, READING.window)
+    if not windows.size:
+        return least
+    rms = np.sqrt(np.mean(windows**2, axis=1) / 20.0)
+    moving = rms[rms > 0.5 * quantum / math.sqrt(12.0)] if quantum > 0 else rms
+    return max(float(np.quantile(moving, READING.quiet)) / READING.share if moving.size else 0.0, least)
+
+
+def started(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float]:
+    """(angle, speed) at the first sample: at rest where the first samples allow it."""
+    n = max(READING.samples, int(np.searchsorted(t, READING.start)))
+    low, high = start_seen(t[:n], y[:n], sigma)
+    return float(y[np.isfinite(y)][0]), 0.5 * (low + high)
+
+
+def stood(t: np.ndarray, r: np.ndarray, y: np.ndarray, sigma: float, travel: float) -> bool:
+    """Whether the reference had stood at its first value before: the output is near it, or does not leave its place
+    while the reference keeps its own.
+    """
+    if abs(r[0] - y[np.isfinite(y)][0]) < READING.settled * travel:
+        return True
+    held = t < min(READING.rest, float(t[int(np.argmax(r != r[0]))]) if np.any(r != r[0]) else np.inf)
+    first = y[held & np.isfinite(y)]
+    return first.size > 2 and float(np.ptp(first)) < READING.sure * sigma
+
+
+def scales_of(runs: Sequence[Run], is_angle: bool, friction: float, drive: float) -> Scales:
+    """The sizes from which effects take their starts; ``friction`` and ``drive`` [output unit/s^2] as fitted."""
+    low = min(float(np.nanmin(run.y)) for run in runs)
+    high = max(float(np.nanmax(run.y)) for run in runs)
+    speed = max(float(np.quantile(np.abs(speed_of(run)), 0.95)) for run in runs)
+    return Scales(
+        position=0.5 * (high - low),
+        low=low,
+        high=high,
+        speed=speed,
+        acceleration=max(friction, 0.02 * drive, 1e-9),
+        input=max(float(np.max(np.abs(run.r - np.nan_to_num(run.y, nan=0.0)))) for run in runs),
+        sample_time=max(run.sample_time for run in runs),
+        noise=max(run.sigma for run in runs),
+        quantum=max(run.quantum for run in runs),
+        is_angle=is_angle,
+        drive=drive,
+        duration=max(float(run.t[-1]) for run in runs),
+        recordings=len(runs),
+    )
+
+
+def speed_of(run: Run, width: float = 0.02) -> np.ndarray:
+    """Speed (N,) [output unit/s] by differences over +-``width`` [s]."""
+    k = max(1, round(width / run.sample_time))
+    known = np.isfinite(run.y)
+    y = np.interp(run.t, run.t[known], run.y[known])
+    i, j = np.clip(np.arange(y.size) - k, 0, None), np.clip(np.arange(y.size) + k, None, y.size - 1)
+    return (y[j] - y[i]) / np.maximum(run.t[j] - run.t[i], 1e-12)

@@ -1,0 +1,55 @@
+"""A servo with its loop from a model.toml, and recordings simulated with it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ers_mj.errors import InputError
+from ers_mj.plants.looped_mujoco import LoopedPlant
+from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.position_loop.model import LETTERS, LoopModel
+from ers_mj.position_loop.runs import Run
+from ers_mj.servo.datasheet import Datasheet
+from ers_mj.servo.simulation import kernel_effects
+
+MUJOCO_STEP = 2.5e-4  # [s]
+
+
+def model_of(datasheet: Datasheet) -> LoopModel:
+    """The servo of a model.toml with a [loop].
+
+    Raises:
+        InputError: it has none, or an effect in it that does not exist.
+    """
+    if not datasheet.loop:
+        raise InputError(f"{datasheet.name}: has no [loop], a model of a position command was expected")
+    lumped = {k: v for k, v in datasheet.lumped.items() if k in LETTERS}
+    return LoopModel({**lumped, **datasheet.loop}, (), kernel_effects(datasheet.effects), datasheet.loop_sensor)
+
+
+def looped_plant(datasheet: Datasheet, is_angle: bool = True) -> LoopedPlant:
+    """The servo in MuJoCo, its loop around one joint of inertia 1."""
+    model, still = model_of(datasheet), np.zeros(2)
+    run = Run("still", np.array([0.0, 1.0]), still, still, still > 0, still < 1, 1.0, 0.0, (0.0, 0.0), 0.0)
+    return LoopedPlant(MechanicalPlant(*model.plant_of(run), is_angle=is_angle, timestep=MUJOCO_STEP), model.of(run)[0])
+
+
+def simulate_loop(
+    datasheet: Datasheet, t: np.ndarray, r: np.ndarray, *, plant: str = "reduced", noise: float = 0.0, seed: int = 0
+) -> dict[str, np.ndarray]:
+    """Columns t_s, theta_ref_rad, theta_rad, each (N,), of a servo that rests at the first reference.
+
+    Args:
+        datasheet: a model.toml with a [loop].
+        t, r: time [s] and reference [rad].
+        plant: "reduced", or "mujoco": a stepped controller around the MuJoCo plant.
+        noise, seed: standard deviation [rad] of the sensor's noise, and its seed.
+    """
+    model, still = model_of(datasheet), np.ones(t.size, bool)
+    run = Run("simulated", t - t[0], np.ascontiguousarray(r, float), r, still, still, 1.0, 0.0, (r[0], 0.0), r[0])
+    if plant == "mujoco":
+        theta = looped_plant(datasheet).simulate(run.t, run.r, run.start, run.before)
+    else:
+        theta = model.predicted(run)
+    theta = theta + noise * np.random.default_rng(seed).standard_normal(t.size)
+    return {"t_s": t, "theta_ref_rad": r, "theta_rad": theta}

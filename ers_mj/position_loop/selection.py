@@ -1,0 +1,289 @@
+"""Which effects does a position loop's recording ask for? The bare loop first, then one effect at a time.
+
+closed form -> base (gain, limit, latency, load) -> compare all candidates -> add the best -> ... -> leave out
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from ers_mj.decisions.thresholds import POLICY, Policy
+from ers_mj.effects.end_stop import EndStop
+from ers_mj.effects.gravity_imbalance import GravityImbalance
+from ers_mj.effects.rate_limit import RateLimit
+from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain, jacobian
+from ers_mj.position_loop.model import LoopModel
+from ers_mj.position_loop.runs import Run, scales_of
+from ers_mj.position_loop.terms import (
+    CONSTANT,
+    DERIVATIVE,
+    INTEGRAL,
+    SPRING,
+    Term,
+    delayed_within,
+    is_there,
+    other_shares,
+    present,
+    stops,
+    terms,
+    top_speed,
+    without,
+)
+from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
+
+Progress = Callable[[str, float], None]
+GRAVITY = GravityImbalance.name
+FIRST = (RateLimit.name, INTEGRAL)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How far a search goes."""
+
+    rounds: int = 6
+    several: Halving = Halving(looked=6, first=10, kept=3)  # starts of the bare loop
+    parted: Halving = Halving(looked=5, first=6, kept=2)  # starts of two bodies
+    far: int = 25  # steps of their best ones
+    tried: int = 10  # steps of a candidate's best starts
+    promise: float = 0.3  # of what is asked for, from which a law is refitted
+    finalists: int = 3  # candidates that are refitted to the end
+    enough: float = 1.15  # noise levels of error that one body may leave before two are tried
+    speeds: tuple[float, ...] = (0.9, 1.0, 1.15)  # of the largest seen, to which the reference is limited
+    inset: float = 0.06  # of the travel, beyond which a stop may act
+    full: int = 40  # steps of a fit to the end
+
+
+EFFORT = Effort()
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A candidate of a round: its gain over the model at hand after everything was refitted."""
+
+    name: str
+    fit: Fit
+    gain: float
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a term of the answer buys: its gain over the best refit without it."""
+
+    name: str
+    gain: float
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The bare loop, the answer, each round's candidates (the best first), and what each term of the answer buys."""
+
+    base: Fit
+    chosen: Fit
+    rounds: tuple[tuple[Compared, ...], ...]
+    left: tuple[Left, ...] = ()
+    loads: tuple[tuple[str, Fit], ...] = field(default=(), repr=False)
+
+    @property
+    def named(self) -> tuple[Left, ...]:
+        """The named effects, the one that buys most first."""
+        names = present(self.chosen.model)
+        return tuple(sorted((x for x in self.left if x.name in names), key=lambda x: -x.gain))
+
+
+class Selector:
+    """A selection under way on some runs."""
+
+    def __init__(self, runs: Sequence[Run], is_angle: bool, jobs: int = 1, policy: Policy = POLICY):
+        self.data, self.is_angle, self.jobs, self.policy = Data.of(runs), is_angle, jobs, policy
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        return self.data.runs
+
+    def run(self, progress: Progress = lambda text, share: None) -> Selection:
+        """Base, rounds, and what can be left out again."""
+        progress("fitting the loop", 0.05)
+        current = base = self.base()
+        rounds: list[tuple[Compared, ...]] = []
+        for name in FIRST:  # what bends all the rest, before anything that could stand for it
+            if self._may_gain(current):
+                tried = [self._finished(current, self._tried(current, t)) for t in self._terms(current, (name,))]
+                rounds += [(c,) for c in tried if self._takes_most(current, c)]
+                current = rounds[-1][0].fit if rounds else current
+        while len(rounds) < EFFORT.rounds and self._may_gain(current):
+            progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
+            ranked = self.compared(current)
+            rounds.append(tuple(ranked))
+            if not ranked or ranked[0].gain < self.policy.loop_gain:
+                break
+            current = ranked[0].fit
+        progress("leaving out what is not needed", 0.65)
+        return self.pruned(Selection(base, current, tuple(rounds)))
+
+    def _takes_most(self, current: Fit, candidate: Compared) -> bool:
+        """Whether a candidate may be taken before others are looked at."""
+        return candidate.gain >= self.policy.loop_gain and candidate.fit.misfit < 0.5 * current.misfit
+
+    # -- the bare loop -------------------------------------------------------------------------------------------------
+
+    def base(self) -> Fit:
+        """The loop with a limit and without, under gravity (or a spring where the output is no angle)."""
+        loads = ("hold", "sin", "cos") if self.is_angle else ("hold", "a_1")
+        roughs = [rough for width in SCAN.widths for rough in rough_starts(self.runs, loads, width)]
+        starts = [self.begun(rough) for rough in roughs]
+        first = min(roughs, key=lambda rough: rough.left)
+        if "L" in first.values:
+            values = {**first.values, "K": 1.5 * first.values["K"], "L": 1.3 * first.values["L"]}
+            starts.append(self.begun(Rough(values, first.left)))
+        found = best(starts, self.data, EFFORT.full, EFFORT.several)
+        within = best(delayed_within(found.model), self.data, EFFORT.full)
+        return self.unburdened(within if gain(found, within) > 0.0 else found)
+
+    def unburdened(self, fit: Fit) -> Fit:
+        """The fit without those loads that do not pay."""
+        for name in (CONSTANT, SPRING, GRAVITY):
+            if is_there(fit.model, name):
+                bare = fitted(without(fit.model, name), self.data, EFFORT.full)
+                fit = bare if gain(bare, fit) < self.policy.loop_gain else fit
+        return fit
+
+    def begun(self, rough: Rough, **more: float) -> LoopModel:
+        """A model as a regression has it; a derivative term is free where a limit tells it apart."""
+        values = {k: v for k, v in {**rough.values, **more}.items() if k not in ("sin", "cos")}
+        drive = values.get("L", values["K"] * 0.5 * float(np.nanmax(np.abs(self.runs[0].r - self.runs[0].y))))
+        model = LoopModel(values, tuple(values), scales=scales_of(self.runs, self.is_angle, values["c_2"], drive))
+        if "sin" in rough.values:
+            model = model.with_effect(GRAVITY, np.array([rough.values["sin"], rough.values["cos"]]))
+        return model.having(D=0.0) if "L" in values else model
+
+    # -- comparing -----------------------------------------------------------------------------------------------------
+
+    def _may_gain(self, fit: Fit) -> bool:
+        """Whether noise alone leaves so much less that an effect could be asked for."""
+        return 0.5 * fit.blocks * math.log(max(fit.misfit, 1e-9)) > self.policy.loop_gain
+
+    def _error(self, fit: Fit) -> float:
+        """What a fit leaves [output unit]."""
+        return math.sqrt(fit.misfit) * float(np.sqrt(np.mean([run.sigma**2 for run in self.runs])))
+
+    def compared(self, current: Fit) -> list[Compared]:
+        """The candidates beside a model, the one that buys most first: two bodies only where one leaves too much."""
+        every = self._terms(current)
+        ranked = self._ranked(current, self._promising(current, [t for t in every if not t.is_far]))
+        if ranked and ranked[0].fit.misfit < EFFORT.enough**2:
+            return ranked
+        return sorted([*self._ranked(current, [t for t in every if t.is_far]), *ranked], key=lambda c: -c.gain)
+
+    def _terms(self, current: Fit, names: Sequence[str] = ()) -> list[Term]:
+        """The candidates beside a model, or those of these names."""
+        found = terms(current.model, self.runs, self._error(current))
+        return [self._with_closed_form(term, current.model) for term in found if not names or term.name in names]
+
+    def _ranked(self, current: Fit, candidates: Sequence[Term]) -> list[Compared]:
+        quick = sorted(self._map(partial(self._tried, current), candidates), key=lambda c: -c.gain)
+        ready = [c for c in quick[: EFFORT.finalists] if c.gain > 0.0]
+        full = list(self._map(partial(self._finished, current), ready))
+        return sorted([*full, *quick[len(ready) :]], key=lambda c: -c.gain)
+
+    def _promising(self, current: Fit, candidates: Sequence[Term]) -> list[Term]:
+        """The candidates without those laws of which no start, in any size and beside any other numbers of the model,
+        takes away what could be asked for.
+        """
+        slopes = jacobian(current.model, self.data)
+        basis = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((current.errors.size, 0))
+        e = current.errors - basis @ (basis.T @ current.errors)
+
+        def promise(model: LoopModel) -> float:
+            d = self.data.residuals(model) - current.errors
+            d = d - basis @ (basis.T @ d)
+            took = float(e @ d) ** 2 / max(float(d @ d), 1e-300) if np.isfinite(d).all() else 0.0
+            return -0.5 * current.blocks * math.log(max(1.0 - took / float(e @ e), 1e-9))
+
+        least = EFFORT.promise * self.policy.loop_gain
+        return [term for term in candidates if not term.is_law or max(map(promise, term.starts)) > least]
+
+    def _tried(self, current: Fit, term: Term) -> Compared:
+        if term.is_bent:
+            fit = best(term.starts, self.data, EFFORT.far, EFFORT.several)
+        elif term.is_far:
+            fit = best(term.starts, self.data, EFFORT.far, EFFORT.parted)
+        else:
+            fit = best(term.starts, self.data, EFFORT.tried)
+        return Compared(term.name, fit, gain(current, fit))
+
+    def _finished(self, current: Fit, candidate: Compared) -> Compared:
+        fit = best(other_shares(candidate.fit.model), self.data, EFFORT.full, EFFORT.several)
+        return replace(candidate, fit=fit, gain=gain(current, fit))
+
+    def _with_closed_form(self, term: Term, model: LoopModel) -> Term:
+        """The term with starts from a regression that has it in, for what bends the rest of the model most."""
+        if term.name == EndStop.name:
+            return replace(term, starts=(*term.starts, *self._stopped(model)))
+        if term.name not in (RateLimit.name, INTEGRAL):
+            return term
+        loads = ("hold", "sin", "cos") if GRAVITY in model.names else ("hold",)
+        is_rate = term.name == RateLimit.name
+        speeds = [x * top_speed(self.runs) for x in EFFORT.speeds] if is_rate else [np.inf]
+        begun = []
+        for speed in speeds:
+            for width in SCAN.widths:
+                roughs = rough_starts(self.runs, loads, width, speed, not is_rate)
+                begun += [self.begun(rough, **({"R": speed} if is_rate else {})) for rough in roughs]
+        for name, values in model.effects:
+            if name != GRAVITY:
+                begun = [m.with_effect(name, values) for m in begun]
+        return replace(term, starts=(*term.starts, *(replace(m, side=model.side) for m in begun)), is_bent=True)
+
+    def _stopped(self, model: LoopModel) -> list[LoopModel]:
+        """Stops at the ends of the travel, beside what a regression makes of the rest of it."""
+        loads = ("hold", "sin", "cos") if self.is_angle else ("hold",)
+        low, high = model.scales.low, model.scales.high
+        inset = EFFORT.inset * (high - low)
+        found = []
+        for lower, upper in ((-np.inf, high), (low, np.inf), (low, high)):
+            within = (lower + inset, upper - inset)
+            for rough in rough_starts(self.runs, loads, SCAN.widths[0], within=within):
+                found += stops(self.begun(rough), lower + 0.3 * inset, upper - 0.3 * inset)
+        return found
+
+    def _map(self, call: Callable, items: Sequence):
+        if self.jobs == 1:
+            return map(call, items)
+        with ThreadPoolExecutor(self.jobs) as pool:
+            return list(pool.map(call, items))
+
+    # -- leaving out ---------------------------------------------------------------------------------------------------
+
+    def pruned(self, selection: Selection) -> Selection:
+        """The selection with what buys too little taken out again, and with what the rest buys."""
+        current = selection.chosen
+        while True:
+            left = [self._left_out(current, name) for name in self._parts(current.model)]
+            weakest = min(left, key=lambda x: x.gain - self._least(x, current.model), default=None)
+            if weakest is None or weakest.gain >= self._least(weakest, current.model):
+                return replace(selection, chosen=current, left=tuple(left))
+            current = weakest.fit
+
+    def _least(self, left: Left, model: LoopModel) -> float:
+        """What a term must buy; one whose size says that it is not there, everything."""
+        if left.name == INTEGRAL and model["I"] < self.policy.loop_integral * model["K"]:
+            return math.inf
+        if left.name == DERIVATIVE and abs(model["D"]) < self.policy.loop_damping * model["a_2"]:
+            return math.inf
+        return self.policy.loop_gain
+
+    def _parts(self, model: LoopModel) -> list[str]:
+        return [*present(model), *(name for name in (INTEGRAL, DERIVATIVE, SPRING, CONSTANT) if is_there(model, name))]
+
+    def _left_out(self, current: Fit, name: str) -> Left:
+        """The best refit without a term, from where the answer stands and from its own closed form."""
+        bare = without(current.model, name)
+        fit = best([bare], self.data, EFFORT.full)
+        return Left(name, gain(fit, current), fit)

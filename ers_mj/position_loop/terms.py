@@ -1,0 +1,199 @@
+"""What may act in a servo that closes its own loop, beside its bare loop and plant: every candidate with its starts.
+
+A limit or an effect is begun from a start of its own; where one changes what the rest of the model came to without it
+(a limit of the reference's speed, integral action), also from a closed form that has it in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ers_mj.effects import BY_NAME
+from ers_mj.effects.asymmetric_friction import AsymmetricFriction
+from ers_mj.effects.backlash import Backlash
+from ers_mj.effects.cogging import Cogging
+from ers_mj.effects.current_limit import CurrentLimit
+from ers_mj.effects.drive_dead_zone import DriveDeadZone
+from ers_mj.effects.end_stop import EndStop
+from ers_mj.effects.gravity_imbalance import GravityImbalance
+from ers_mj.effects.input_delay import InputDelay
+from ers_mj.effects.load_dependent_friction import LoadDependentFriction
+from ers_mj.effects.presliding import Presliding
+from ers_mj.effects.quadratic_drag import QuadraticDrag
+from ers_mj.effects.rate_limit import RateLimit
+from ers_mj.effects.shaft_compliance import ShaftCompliance
+from ers_mj.effects.stribeck import Stribeck
+from ers_mj.effects.voltage_saturation import VoltageSaturation
+from ers_mj.position_loop.model import SIDES, LoopModel
+from ers_mj.position_loop.runs import Run, speed_of
+
+INTEGRAL, DERIVATIVE, WITHIN = "integral action", "derivative action", "dead time within the loop"
+SPRING, CONSTANT = "spring", "constant load"  # the second may as well be an offset of the sensor: it has no name
+BURIED = 20.0  # of MuJoCo's default constraint, that of a limit
+LAWS = (GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, EndStop, Cogging)
+
+
+OWN = {
+    INTEGRAL: ("I",),
+    DERIVATIVE: ("D",),
+    WITHIN: ("dead_time_s",),
+    SPRING: ("a_1",),
+    CONSTANT: ("hold",),
+}  # letters without an effect
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """From where candidates are begun."""
+
+    integrals: tuple[float, ...] = (0.5, 3.0)  # [1/s] of K
+    creeps: tuple[tuple[float, float], ...] = ((947.0, 10.0), (947.0, 1.0), (150.0, 1.0))  # [1/s], and how heavy:
+    # MuJoCo's own constraint first
+    dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
+    bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K
+    currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
+    speeds: tuple[float, ...] = (1.0, 0.8)  # of the largest speed that is seen
+    gaps: tuple[float, ...] = (0.4, 1.5)  # of the error that is left
+    shares: tuple[float, ...] = (0.3,)  # of the inertia that the motor's side bears
+    parted: float = 1.3  # noise levels of error from which a second body is tried
+    periods: tuple[int, ...] = (2, 4, 8, 16)  # of cogging within the travel
+
+
+SIZES = Sizes()
+
+
+@dataclass(frozen=True)
+class Term:
+    """A candidate: its name, models from which it is begun, and whether it is an effect with a name."""
+
+    name: str
+    starts: tuple[LoopModel, ...]
+    is_far: bool = False  # whether the way from its starts is long
+    is_bent: bool = False  # whether the rest of the model is another with it
+    is_law: bool = False  # whether it adds to the forces in proportion to its size, so that a secant shows it
+
+
+def top_speed(runs: Sequence[Run]) -> float:
+    """98 % quantile of the speed over 50 ms: what a limited reference moves at."""
+    return float(np.quantile(np.concatenate([np.abs(speed_of(run, 0.025)) for run in runs]), 0.98))
+
+
+def is_there(model: LoopModel, name: str) -> bool:
+    """Whether a model has a term."""
+    if name in model.names:
+        return True
+    letters = OWN.get(name) or (BY_NAME[name].in_loop if name in BY_NAME else ())
+    return any(letter in model.free for letter in letters)
+
+
+def present(model: LoopModel) -> list[str]:
+    """The effects with a name that are in a model."""
+    return [name for name in BY_NAME if is_there(model, name)]
+
+
+def without(model: LoopModel, name: str) -> LoopModel:
+    """The model without one term; a play takes the side of its sensors along, a limit what only it tells apart."""
+    if name == EndStop.name:
+        return model.without_effect(name).lacking("buried")
+    if name in model.names:
+        gone = model.without_effect(name).lacking("grease")
+        return replace(gone, side=SIDES[0]) if BY_NAME[name].subsystem == "transmission" else gone
+    if name in (INTEGRAL, SPRING, CONSTANT):
+        return model.lacking(*OWN[name])
+    if name == DERIVATIVE:
+        return model.having(a_2=model["a_2"] + max(model["D"], 0.0)).lacking("D")
+    gone = model.lacking(*BY_NAME[name].in_loop)
+    if name == VoltageSaturation.name and gone["dead_time_s"] == 0.0:
+        gone = gone.having(a_2=max(model["a_2"] + model["D"], 1e-3)).lacking("D")
+    return gone
+
+
+def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
+    """The candidates beside a model that leaves so large an error [output unit], each from its own starts; what needs a
+    closed form is in selection.py.
+    """
+    drive = model.scales.drive or 4.0 * model.scales.acceleration
+    found = [
+        Term(INTEGRAL, tuple(model.having(I=x * model["K"]) for x in SIZES.integrals)),
+        Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds)),
+        Term(InputDelay.name, (model.having(tau_s=0.01),)),
+        Term(WITHIN, delayed_within(model)),
+        Term(Presliding.name, tuple(model.fixed(heavy=y).having(creep=x) for x, y in SIZES.creeps)),
+        Term(DriveDeadZone.name, tuple(model.having(band=x * model["c_2"] / model["K"]) for x in SIZES.bands)),
+        Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
+        Term(CONSTANT, (model.having(hold=0.0),)),
+        Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
+        *_transmissions(model, error),
+        *(Term(law.name, tuple(_begun(model, law.name)), is_law=law is not EndStop) for law in LAWS),
+    ]
+    if "L" in model.free:
+        found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
+    plain = error < SIZES.parted * max(run.sigma for run in runs)
+    found = [term for term in found if term.starts and not (term.is_far and plain)]
+    return [term for term in found if not is_there(model, term.name)]
+
+
+def delayed_within(model: LoopModel) -> tuple[LoopModel, ...]:
+    """The delay within the loop and not in its reference: it takes damping away, which the loop's own had to bring."""
+    total, found = max(model["a_2"] + model["D"], 1e-2), []
+    for late in {max(model["tau_s"], x) for x in SIZES.dead_times}:
+        for share, gain in ((0.9, 1.0), (0.9, 0.75), (0.1, 1.0)):
+            plain = model.lacking("tau_s")
+            found.append(
+                plain.having(dead_time_s=late, D=share * total, a_2=(1.0 - share) * total, K=gain * model["K"])
+            )
+    return tuple(found)
+
+
+def _begun(model: LoopModel, name: str) -> list[LoopModel]:
+    """Starts of an effect with a law of its own."""
+    scales = model.scales
+    if name == Cogging.name:
+        travel = scales.high - scales.low
+        starts = [np.array([0.3 * scales.acceleration, travel / n, 0.0, np.inf, np.inf]) for n in SIZES.periods]
+    else:
+        starts = BY_NAME[name].starts(scales)
+    if name == EndStop.name:
+        return [stop for low, high, _, _ in starts for stop in stops(model, low, high)]
+    if name == LoadDependentFriction.name:
+        return [model.with_effect(name, np.array([mu, np.inf])) for mu in (0.05, 0.3)]
+    return [model.with_effect(name, start) for start in starts]
+
+
+def stops(model: LoopModel, low: float, high: float) -> list[LoopModel]:
+    """A model with stops there: springs, and MuJoCo's constraint."""
+    spring, sunk = np.array([low, high, 40.0, 0.3]), np.array([low, high, 36.0, 4.0])
+    return [model.with_effect(EndStop.name, spring), model.fixed(buried=BURIED).with_effect(EndStop.name, sunk)]
+
+
+def _transmissions(model: LoopModel, error: float) -> list[Term]:
+    """A play or a shaft, with the loop's sensor and the log's on either side; of a loop on the motor's side friction is
+    partly the load's.
+    """
+    if any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+        return []
+    contact = min(60.0, 0.35 / model.scales.sample_time)
+    play = [np.array([x * error, rho, 0.8, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]
+    shaft = [np.array([15.0, 0.1, 0.6, 0.3, np.inf])]
+    found = []
+    for name, starts in ((Backlash.name, play), (ShaftCompliance.name, shaft)):
+        models = []
+        slick = model.having(grease=0.1) if BY_NAME[name].is_play else model
+        for side in SIDES:
+            held = slick if side == SIDES[0] else slick.having(c_2=0.7 * model["c_2"])
+            models += [replace(held.with_effect(name, start), side=side) for start in starts]
+        found.append(Term(name, tuple(models), is_far=True))
+    return found
+
+
+def other_shares(model: LoopModel) -> list[LoopModel]:
+    """A model with a play, and others whose bodies share inertia, friction and contact differently."""
+    play = next((e for e in model.effects if BY_NAME[e[0]].is_play), None)
+    if play is None:
+        return [model]
+    gap, rho, phi, f, zeta = play[1]
+    others = [(rho, phi, 1.0), (rho, 1.0, 1.0), (rho, 1.0, zeta), (0.2, 0.9, 1.0), (0.5, 0.9, 1.0), (0.8, 1.0, 1.0)]
+    return [model, *(model.with_effect(play[0], np.array([gap, r, p, f, z])) for r, p, z in others)]

@@ -1,0 +1,190 @@
+"""A servo that closes its own loop: simulated, identified, diagnosed, written and read again."""
+
+import numpy as np
+import pytest
+
+from ers_mj.cli import main
+from ers_mj.data.recording import from_arrays, write_recording
+from ers_mj.diagnosis.pipeline import diagnose
+from ers_mj.effects.backlash import Backlash
+from ers_mj.effects.gravity_imbalance import GravityImbalance
+from ers_mj.effects.input_delay import InputDelay
+from ers_mj.effects.rate_limit import RateLimit
+from ers_mj.effects.voltage_saturation import VoltageSaturation
+from ers_mj.errors import InputError
+from ers_mj.position_loop.identified import identify_loop
+from ers_mj.position_loop.model import LoopModel
+from ers_mj.position_loop.runs import Run, runs_of
+from ers_mj.position_loop.saved import model_of, simulate_loop
+from ers_mj.position_loop.weak_form import rough_starts
+from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+
+LIMITED = {"K": 900.0, "L": 150.0, "a_2": 20.0, "c_2": 8.0, "tau_s": 0.012}
+
+
+def steps_of(seed: int, seconds: float = 4.0, rate: float = 100.0, size: float = 0.6) -> tuple[np.ndarray, np.ndarray]:
+    """Steps of mixed size, at rest at first."""
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    levels = np.concatenate([[0.0], np.random.default_rng(seed).uniform(-size, size, 12)])
+    return t, levels[np.minimum((t / (seconds / 13)).astype(int), 12)]
+
+
+def run_of(t: np.ndarray, r: np.ndarray, start: float = 0.0) -> Run:
+    yes = np.ones(t.size, bool)
+    return Run("run", t, np.ascontiguousarray(r, float), r, yes, yes, 1e-4, 0.0, (start, 0.0), float(r[0]))
+
+
+def recorded(values: dict, seeds=(1, 2), noise: float = 3e-4, effects=(), side: str = "load"):
+    model, out = LoopModel(values, (), effects, side), []
+    for seed in seeds:
+        t, r = steps_of(seed)
+        y = model.predicted(run_of(t, r)) + noise * np.random.default_rng(seed + 50).standard_normal(t.size)
+        out.append(from_arrays(t, r, y, name=f"steps {seed}", input_unit="rad"))
+    return out
+
+
+def test_a_loop_without_friction_follows_its_transfer_function():
+    from scipy.signal import lsim
+
+    t = np.arange(0.0, 1.0, 0.002)
+    motion = LoopModel({"K": 400.0, "D": 12.0, "a_2": 8.0}, ()).predicted(run_of(t, np.where(t < 0.1, 0.0, 0.5)))
+    fine = np.arange(0.0, 1.0, 1e-4)
+    _, y, _ = lsim(([400.0], [1.0, 20.0, 400.0]), np.where(fine < 0.1 - 1e-9, 0.0, 0.5), fine, interp=False)
+    assert np.max(np.abs(motion - np.interp(t, fine, y))) < 2e-4
+
+
+def test_friction_holds_within_its_width():
+    t = np.arange(0.0, 1.0, 0.01)
+    model = LoopModel({"K": 400.0, "a_2": 8.0, "c_2": 10.0}, ())
+    assert np.ptp(model.predicted(run_of(t, np.where(t < 0.1, 0.0, 0.024)))) == 0.0
+    assert np.ptp(model.predicted(run_of(t, np.where(t < 0.1, 0.0, 0.026)))) > 0.0
+
+
+def test_a_latency_moves_the_answer_smoothly():
+    t, r = steps_of(3)
+    of = [LoopModel({**LIMITED, "tau_s": tau}, ()).predicted(run_of(t, r)) for tau in (0.0100, 0.0101, 0.0102)]
+    first, second = of[1] - of[0], of[2] - of[1]
+    assert 0.0 < np.linalg.norm(first) < 0.1
+    assert np.linalg.norm(second - first) < 0.2 * np.linalg.norm(first)
+
+
+@pytest.mark.parametrize("letter", ["tau_s", "dead_time_s"])
+def test_a_delay_is_as_long_as_it_says(letter):
+    t = np.arange(0.0, 1.0, 0.001)
+    r = np.where(t < 0.2, 0.0, 1.0)
+    free = {"K": 100.0, "a_2": 20.0}
+    late = LoopModel({**free, letter: 0.05}, ()).predicted(run_of(t, r))
+    prompt = LoopModel(free, ()).predicted(run_of(t, r))
+    assert np.all(late[t < 0.249] == 0.0)
+    early = (t > 0.2) & (t < 0.22)
+    shifted = np.interp(t[early], t - 0.05, late)
+    assert np.max(np.abs(shifted - prompt[early])) < 2e-3
+
+
+def test_the_reference_moves_no_faster_than_its_limit():
+    t = np.arange(0.0, 2.0, 0.01)
+    motion = LoopModel({"K": 4000.0, "D": 120.0, "R": 1.5}, ()).motion(run_of(t, np.where(t < 0.2, 0.0, 2.0)))
+    assert np.max(np.abs(motion[:, 1])) == pytest.approx(1.5, rel=0.02)
+
+
+def test_the_closed_form_is_near():
+    rough = rough_starts(runs_of(recorded(LIMITED)), ("hold", "sin", "cos"), 0.03)[0].values
+    assert rough["K"] == pytest.approx(900.0, rel=0.5)
+    assert rough["L"] == pytest.approx(150.0, rel=0.3)
+    assert rough["tau_s"] == pytest.approx(0.012, abs=0.008)
+
+
+def test_a_bare_loop_is_identified():
+    found = identify_loop(recorded(LIMITED))
+    assert found.explains
+    for letter in ("K", "L", "a_2", "c_2", "tau_s"):
+        low, high = found.intervals.told("", letter).ci95
+        assert low <= LIMITED[letter] <= high, letter
+
+
+def test_a_limit_and_gravity_are_named_and_nothing_else():
+    effects = ((GravityImbalance.name, np.array([12.0, 0.0])),)
+    document = diagnose(recorded(LIMITED, effects=effects), None, jobs=1).document
+    named = [m["effect"] for m in document["missing"]]
+    assert set(named) == {VoltageSaturation.name, GravityImbalance.name, InputDelay.name}
+    row = document["parameters"]["L"]
+    assert row["identifiable"]
+    assert row["ci95"][0] <= 150.0 <= row["ci95"][1]
+    assert document["data"]["input_kind"] == "position"
+    assert not document["remainder"]["significant"]
+    assert document["fit"]["measure"] == "free_run"
+
+
+def test_a_loop_that_is_never_at_its_limit_tells_sums_only():
+    recordings = recorded({"K": 900.0, "a_2": 40.0, "c_2": 4.0}, seeds=(4, 5))
+    document = diagnose(recordings, None, jobs=1).document
+    rows = document["parameters"]
+    assert document["verdict"] == "parameters_only"
+    assert rows["L"]["value"] is None
+    assert rows["a_2"]["value"] is None
+    assert rows["a_2+D"]["ci95"][0] <= 40.0 <= rows["a_2+D"]["ci95"][1]
+    assert "saturat" in document["next_recording"]["sentence"] or "limit" in document["next_recording"]["sentence"]
+
+
+def test_a_speed_limit_of_the_reference_is_named():
+    document = diagnose(recorded({**LIMITED, "L": 400.0, "R": 2.0}), None, jobs=1).document
+    found = {m["effect"]: m for m in document["missing"]}
+    assert found[RateLimit.name]["parameters"]["R"]["value"] == pytest.approx(2.0, rel=0.03)
+
+
+def test_a_model_is_written_and_read_again(tmp_path):
+    sheet = Datasheet(
+        lumped={"a_2": 20.0, "c_2": 8.0},
+        effects=((GravityImbalance.name, {"g_s": 5.0, "g_c": 1.0}),),
+        loop={"K": 900.0, "L": 150.0, "tau_s": 0.01},
+        loop_kind="P",
+    )
+    write_model(tmp_path / "model.toml", sheet)
+    assert read_datasheet(tmp_path / "model.toml") == sheet
+    model = model_of(sheet)
+    assert model["K"] == 900.0
+    assert model.names == (GravityImbalance.name,)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('[lumped]\na_2 = 1\n[loop]\nkind = "PX"\nK = 1\n', "one of P, PD"),
+        ("[lumped]\na_2 = 1\n[loop]\nK = 0\n", "no K above zero"),
+        ("[lumped]\na_2 = 1\n[loop]\nK = 1\nKd = 1\n", "there is no key 'Kd'"),
+        ("[lumped]\na_2 = 1\n[loop]\nK = 1\nL = -1\n", "negative L"),
+    ],
+)
+def test_a_loop_that_no_servo_has_is_refused(tmp_path, text, told):
+    (tmp_path / "model.toml").write_text(text)
+    with pytest.raises(InputError, match=told):
+        read_datasheet(tmp_path / "model.toml")
+
+
+@pytest.mark.parametrize("side", ["load", "link"])
+def test_the_mujoco_twin_follows_the_reduced_servo(side):
+    play = ((Backlash.name, np.array([0.01, 0.5, 0.8, 60.0, 0.5])),) if side == "link" else ()
+    effects = tuple((name, {p.name: v for p, v in zip(Backlash.parameters, x, strict=True)}) for name, x in play)
+    sheet = Datasheet(
+        lumped={"a_2": 20.0, "c_2": 8.0}, effects=effects, loop={**LIMITED, "D": 2.0}, loop_sensor=side, name="model"
+    )
+    t, r = steps_of(6, 2.0)
+    y = [simulate_loop(sheet, t, r, plant=plant)["theta_rad"] for plant in ("reduced", "mujoco")]
+    assert np.sqrt(np.mean((y[0] - y[1]) ** 2)) < 0.01
+
+
+def test_commands_take_a_model_with_a_loop_or_refuse_it(tmp_path, capsys):
+    sheet = Datasheet(lumped={"a_2": 20.0, "c_2": 8.0}, loop={"K": 900.0, "L": 150.0}, name="model.toml")
+    model, out = str(tmp_path / "model.toml"), str(tmp_path / "rec.csv")
+    write_model(model, sheet)
+    t, r = steps_of(7)
+    write_recording(tmp_path / "ref.csv", {"t_s": t, "theta_ref_rad": r})
+    assert main(["simulate", model, "--input", str(tmp_path / "ref.csv"), "--out", out]) == 0
+    assert main(["identify", out, "--out", str(tmp_path / "found"), "--jobs", "1"]) == 0
+    assert "[loop]" in (tmp_path / "found" / "model.toml").read_text()
+    capsys.readouterr()
+    assert main(["simulate", model, "--input", "steps", "--out", out, "--force"]) == 2
+    assert "theta_ref_rad" in capsys.readouterr().err
+    assert main(["view", model, "--render", str(tmp_path / "a.png")]) == 2
+    assert "position loop" in capsys.readouterr().err
+    assert main(["identify", out, "--method", "ga", "--out", str(tmp_path / "other")]) == 2
