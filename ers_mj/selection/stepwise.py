@@ -25,7 +25,7 @@ from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import Candidate, bends_and_twists, is_dear, stands_alone
 from ers_mj.selection.drop import pruned, reconsidered
 from ers_mj.selection.foundation import held_beside, held_instead
-from ers_mj.selection.loads import under_loads
+from ers_mj.selection.loads import still_loaded, under_loads
 from ers_mj.selection.moves import Grown, Move, less
 from ers_mj.selection.pair import bending_and_twisting, beside_a_rival, paired
 from ers_mj.selection.swap import exchanged, in_its_place, other_way_round, reviewed, widened
@@ -330,6 +330,8 @@ class _Stepwise:
             self._go_on("swap", found, self.current, "the refit made of it a form of another effect")
         self._refine(leader.name)
         self._hold_otherwise()
+        found = still_loaded(self.bench, self.current)
+        self._go_on("drop", found, self.current, "beside what was named the recordings are of one load")
 
     def _refine(self, newest: str) -> None:
         """Out of local minima, into wider forms, into the place of earlier rivals."""
