@@ -39,7 +39,10 @@ def values(effect):
     return np.array(SIZES[effect.name]) if effect.name in SIZES else effect.starts(SCALES)[0]
 
 
-@pytest.mark.parametrize("effect", [e for e in EFFECTS if e.starts(SCALES)], ids=lambda e: e.name)  # not a loop's own
+OPEN = [e for e in EFFECTS if e.starts(SCALES)]  # not those of a position loop alone
+
+
+@pytest.mark.parametrize("effect", OPEN, ids=lambda e: e.name)
 @pytest.mark.parametrize("road", ["rudder", "lumped"])
 def test_law_and_twin_agree(effect, road):
     assert effect.mjcf, "how a MuJoCo model shows the effect"
