@@ -125,8 +125,8 @@ def plain_form(name, p):
     ],
 )
 def test_another_form_agrees(name, p):
-    """What the last number given, absent in the plain form, makes of an effect, is in the twin as well: a bristle's exponent,
-    what flows beyond a limit.
+    """What the last number given, absent in the plain form, makes of an effect, is in the twin as well: a bristle's
+    exponent, what flows beyond a limit.
     """
     u = INPUTS["multisine"](T)
     law, plain = (ReducedModel(EQ_5, [(name, np.array(some))]).simulate(T, u) for some in (p, plain_form(name, p)))
