@@ -39,7 +39,7 @@ def values(effect):
     return np.array(SIZES[effect.name]) if effect.name in SIZES else effect.starts(SCALES)[0]
 
 
-OPEN = [e for e in EFFECTS if e.starts(SCALES)]  # not those of a position loop alone
+OPEN = [e for e in EFFECTS if not e.loop_only]
 
 
 @pytest.mark.parametrize("effect", OPEN, ids=lambda e: e.name)

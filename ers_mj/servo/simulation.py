@@ -110,6 +110,8 @@ def build_plant(
             " expected"
         )
     chosen = kernel_effects([*datasheet.effects, *effects], inertia_of(datasheet))
+    if alone := [name for name, _ in chosen if BY_NAME[name].loop_only]:
+        raise InputError(f"{alone[0]} acts within a position loop, which a servo that is told a voltage has not")
     c = lumped(_values(datasheet, inductance))
     if plant != "mujoco" and linkage != "constant":
         raise InputError(f"the reduced model has the constant linkage only, a {linkage} linkage needs --plant mujoco")
