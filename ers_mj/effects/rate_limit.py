@@ -12,7 +12,8 @@ class RateLimit(Drive):
     sentence = "the servo's own reference moves no faster than {R}"
     mjcf = "none: the reference is limited before it reaches ctrl"
     parameters = (Parameter("R", "speed", "largest speed of the reference", absent=np.inf),)
-    in_loop = ("R",)
+    apart = "the answer to a step is a ramp of one slope, whatever its size; a limit of the drive bends it at the start"
+    in_loop, only_in_loop = ("R",), True
     loop_sentence = "the servo's own reference moves no faster than {value}"
 
     def starts(self, scales):

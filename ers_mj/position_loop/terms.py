@@ -159,7 +159,8 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
     if name == EndStop.name:
         return [stop for low, high, _, _ in starts for stop in stops(model, low, high)]
     if name == LoadDependentFriction.name:
-        return [model.with_effect(name, np.array([mu, np.inf])) for mu in (0.05, 0.3)]
+        rest = starts[0][1:]  # the torque that the gear carries is the integrator's own
+        return [model.with_effect(name, np.array([mu, *rest])) for mu in (0.05, 0.3)]
     return [model.with_effect(name, start) for start in starts]
 
 
