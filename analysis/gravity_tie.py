@@ -37,7 +37,7 @@ def costs(folder: Path) -> dict[str, float]:
     sheet = read_datasheet(str(folder / "datasheet.toml"))
     traces = [trace_of(r, sheet.parameters.get("J")) for r in recordings]
     start = sharpened(baseline(traces, sheet, True, 1), float(np.ptp(np.concatenate([t.y[t.valid] for t in traces]))))
-    found = select(start.fit, start.traces, anchors=start.anchors, exclude=("inductance", *SUSPECTS))
+    found = select(start.fit, start.traces, start=start, exclude=("inductance", *SUSPECTS))
     model = found.chosen.model
     selected = next((name for name in model.names if name in TIED), None)
     if selected is None:

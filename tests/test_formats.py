@@ -1,5 +1,6 @@
 """Files of all kinds, each made by its ecosystem's own writer (or after its published format), and their faults."""
 
+import contextlib
 import gc
 import io
 import json
@@ -390,3 +391,34 @@ def test_packed_arrays_and_packed_logs(tmp_path):
     checked(tmp_path / "rec.npz.gz")
     (tmp_path / "rec.asc.gz").write_bytes(gzip.compress(b"date"))
     assert "is packed, unpack it first" in refusal(tmp_path / "rec.asc.gz")
+
+
+def made(tmp_path):
+    """A file of each of some kinds, with its mapping."""
+    np.savez(tmp_path / "rec.npz", **COLUMNS)
+    yield tmp_path / "rec.npz", None
+    (tmp_path / "rec.json").write_text(json.dumps({k: x.tolist() for k, x in COLUMNS.items()}))
+    yield tmp_path / "rec.json", None
+    feather.write_feather(pa.table(COLUMNS), tmp_path / "rec.feather")
+    yield tmp_path / "rec.feather", None
+    (tmp_path / "rec.ulg").write_bytes(ulog(("drive", (T, U)), ("encoder", (T, THETA))))
+    yield tmp_path / "rec.ulg", {"u_V": "drive.value", "theta_rad": "encoder.value"}
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "rec.h5", "w") as root:
+        root.update(COLUMNS)
+    yield tmp_path / "rec.h5", None
+
+
+@pytest.mark.filterwarnings("ignore")  # what libraries say of what they cannot read is theirs
+def test_damaged_files_are_read_or_refused_in_one_sentence(tmp_path, capsys):
+    rng = np.random.default_rng(11)
+    for path, mapping in made(tmp_path):
+        whole = path.read_bytes()
+        for trial in range(16):
+            damaged = bytearray(whole[: int(len(whole) * rng.uniform())] if trial < 6 else whole)
+            for place in rng.integers(0, min(len(damaged), 600) or 1, 12 if damaged and trial >= 6 else 0):
+                damaged[place] = int(rng.integers(0, 256))
+            path.write_bytes(bytes(damaged))
+            with contextlib.suppress(ErsError):
+                read_recording(path, mapping)
+    assert capsys.readouterr().out == ""

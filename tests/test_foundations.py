@@ -170,3 +170,10 @@ def test_windows_leave_the_noise_where_the_model_is_right():
     wrong = replace(model, values={**model.values, "b": 1.01 * model.values["b"]})
     windows, run = (scored(wrong, trace, measure=one).rmse for one in (measure, FREE_RUN))
     assert 2.0 * NOISE < windows < run
+
+
+def test_a_dead_zone_that_is_wider_one_way():
+    """It ends at shift + d and shift - d, and is as it was where it is not shifted."""
+    effect, u = BY_NAME["drive_dead_zone"], np.array([-0.4, -0.25, 0.0, 0.15, 0.4])
+    assert effect.command(np.array([0.2, np.inf, 0.1]), u) == pytest.approx([-0.3, -0.15, 0.0, 0.0, 0.1])
+    assert effect.command(np.array([0.2, np.inf, np.inf]), u) == pytest.approx([-0.2, -0.05, 0.0, 0.0, 0.2])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ers_mj import cli
+from ers_mj.data.columns import per
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays, read_recording, write_recording
 from ers_mj.errors import InputError
@@ -124,6 +125,10 @@ def test_kinds_of_input_are_not_mixed(rig, put, capsys):
     volts, torques = put("a.csv", **rig, u_V=command(rig)), put("b.csv", **rig, tau_cmd_Nm=command(rig))
     assert cli.main(["diagnose", volts, torques, "--json"]) == 2
     assert "b.csv: its input is a torque and that of a.csv a voltage" in capsys.readouterr().err
+
+
+def test_a_product_below_a_stroke_stands_in_brackets():
+    assert [per(unit) for unit in ("V", "N m")] == ["V", "(N m)"]
 
 
 def test_arrays_tell_their_kind_by_the_unit(rig):

@@ -9,8 +9,7 @@ from servo import SPARSE, all_but, alone, bench_of, having, recorded, started
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
 from ers_mj.selection.comparison import judged
-from ers_mj.selection.pair import beside_a_rival, paired
-from ers_mj.selection.stepwise import bending_and_twisting
+from ers_mj.selection.pair import bending_and_twisting, beside_a_rival, paired
 
 
 def test_two_rivals_take_the_place_of_what_does_much_of_what_both_do():

@@ -54,7 +54,7 @@ def test_the_trail_tells_every_move(dragged):
     last = found.trail[-1]
     assert (last.kind, last.accepted, last.before) == ("add", False, last.after) and "no effect" in last.because
     assert all(move.because and move.kind in str(move) for move in found.trail)
-    assert str(added[0]).startswith("add: baseline -> quadratic_drag, +") and " stays, " in str(last)
+    assert str(added[0]).startswith("add: baseline -> quadratic_drag, robust cost -") and " stays, " in str(last)
     assert [text for text, _ in progress] == [f"round {k}: comparing effects" for k in range(1, len(found.rounds) + 1)]
 
 

@@ -34,5 +34,6 @@ def test_the_advice_moves_as_far_as_what_was_held():
 def test_a_diagnosis_names_nothing_and_says_why():
     document = diagnose([released(5.0, 0), released(5.0, 1)], None, jobs=1).document
     assert document["missing"] == []
+    assert document["verdict"] != "missing_physics"
     assert "a gain cannot be told from a load" in document["sentence"]
     assert [fault["kind"] for fault in document["data"]["faults"]] == ["constant_input"] * 2

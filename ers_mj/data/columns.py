@@ -215,6 +215,11 @@ def input_name(unit: str) -> str:
     return contract or f"u_{unit}"
 
 
+def per(unit: str) -> str:
+    """A unit as it stands below a stroke: in brackets where it is a product."""
+    return f"({unit})" if " " in unit else unit
+
+
 def kind_of(unit: str) -> str:
     """The kind of an input in this unit: a torque's is N m, a position's rad or m."""
     return INPUTS[input_name(unit)]

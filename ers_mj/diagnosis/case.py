@@ -17,6 +17,7 @@ from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.explained import is_consistent
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.mujoco_check import Rig, run_in_mujoco
+from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.initial_state import with_starts
@@ -135,7 +136,8 @@ class Case:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return self.model.names
+        """The effects that may be named: none where the input never changes, which can tell no two of them apart."""
+        return () if is_unexcited(self.start.traces) else self.model.names
 
     @cached_property
     def explained(self) -> float:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj import __version__
+from ers_mj.data.columns import per
 from ers_mj.data.prepared import Trace
 from ers_mj.data.recording import Recording
 from ers_mj.decisions.explained import cost
@@ -237,7 +238,7 @@ def _parameters(case: Case) -> dict:
     units = {
         "a_1": "1/s^2",
         "a_2": "1/s",
-        "b": f"{y}/s^2/{u}",
+        "b": f"{y}/s^2/{per(u)}",
         "c_1": f"{y}/s^2",
         "c_2": f"{y}/s^2",
         "theta_0": y,

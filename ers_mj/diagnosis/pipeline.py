@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from ers_mj.estimation.baseline import baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes
 from ers_mj.selection.budget import SEARCH, Budget, Search
+from ers_mj.selection.comparison import Candidate
 from ers_mj.selection.confirmation import Confirmed, confirmed
 from ers_mj.selection.confounders import without_confounders
 from ers_mj.selection.stepwise import Selection, select
@@ -73,32 +75,26 @@ def diagnose(
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
     still = is_unexcited(start.traces)  # nothing can be told then, and nothing is named
     sensors = {} if still else symptoms(recordings, start.traces, travel, policy)
-    chosen = select(
-        start.fit,
-        start.traces,
-        anchors=start.anchors,
-        held=start.held,
-        exclude=tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS),
-        jobs=jobs,
-        progress=progress,
-        policy=policy,
-        budget=Budget(start.traces, search=search),
-    )
+    known = tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS)
+    budget, begun = Budget(start.traces, search=search), None if still else start
+    grown = partial(select, jobs=jobs, progress=progress, policy=policy, budget=budget)
+    chosen = grown(start.fit, start.traces, start=begun, exclude=known)
     start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
     best = polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
     chosen = replace(chosen, base=start.fit, chosen=best)
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
-    named, suspects = (selection, ()) if still else without_confounders(selection, start.traces, jobs, policy, search)
-    if named is not selection:
-        selection, judged = confirmed(start, named, held, jobs, policy)
+    suspects: tuple[Candidate, ...] = ()
+    if not still:
+        named, suspects = without_confounders(selection, start.traces, jobs, policy, search)
+        if named is not selection:
+            selection, judged = confirmed(start, named, held, jobs, policy)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
     multibody = _in_mujoco(rig, selection, judged, jobs, progress) if search.in_mujoco else (None, None)
     progress("locating", 0.92)
     given = recordings, list(holdout), datasheet
-    case = Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search)
-    return told(case, held)
+    return told(Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search), held)
 
 
 def _in_mujoco(

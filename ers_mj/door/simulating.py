@@ -155,24 +155,26 @@ def simulate(
         columns = simulate_loop(sheet, t, u, plant=options.get("plant", "reduced"), noise=noise, seed=seed)
     else:
         columns = simulate_recording(sheet, t, u, effects=added, noise=noise, seed=seed, **options)
+    asked = {"input": name, "noise_rad": noise, "seed": seed, "effects": [*sheet.effects, *added]}
     theta = columns["theta_rad"]
-    summary = {
+    return Simulation(columns["t_s"], columns[column], theta, _summary(t, theta, asked, options), column)
+
+
+def _summary(t: np.ndarray, theta: np.ndarray, asked: dict[str, Any], options: PlantOptions) -> dict[str, Any]:
+    """What was simulated, and its course in three numbers."""
+    return asked | {
         "plant": options.get("plant", "reduced"),
         "linkage": options.get("linkage", "constant"),
-        "input": name,
         "inductance": options.get("inductance", False),
         "gap_rad": options.get("gap", 0.0),
         "play": options.get("play", "gap"),
         "samples": int(t.size),
         "duration_s": float(t[-1] - t[0]),
-        "noise_rad": noise,
-        "seed": seed,
-        "effects": [{"name": name, "parameters": dict(values)} for name, values in [*sheet.effects, *added]],
+        "effects": [{"name": name, "parameters": dict(values)} for name, values in asked["effects"]],
         "theta_rms_rad": float(theta.std()),
         "theta_min_rad": float(theta.min()),
         "theta_max_rad": float(theta.max()),
     }
-    return Simulation(columns["t_s"], columns[column], theta, summary, column)
 
 
 def _refuse_options(options: PlantOptions, noise: float) -> None:

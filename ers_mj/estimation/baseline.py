@@ -160,9 +160,9 @@ def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angl
     refitted, started, others = _refined(sheet, traces, jobs)
     if explained.is_model_error(refitted.misfit) and _acts_the_other_way(traces, sheet.values["b"]):
         turned = replace(sheet, values={**sheet.values, **{name: -sheet.values[name] for name in SIGNED}})
-        other, *more = _refined(turned, traces, jobs)
+        other, there, more = _refined(turned, traces, jobs)
         if explained.cost(other.misfit, 1.0) < explained.cost(refitted.misfit, 1.0):
-            sheet, refitted, (started, others) = turned, other, more
+            sheet, refitted, started, others = turned, other, there, more
     anchors = ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others)
     found = Start(refitted, started, anchors)
     if sheet.values["a_1"] > 0 or sheet.values["c_1"] > 0 or _explains(refitted):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ers_mj.data.columns import per
 from ers_mj.data.prepared import Trace
 from ers_mj.errors import InputError
 from ers_mj.estimation.search import opening
@@ -39,7 +40,7 @@ def unit_of_letter(name: str, y: str, u: str) -> str:
     lumped = {
         "a_1": "1/s^2",
         "a_2": "1/s",
-        "b": f"{y}/s^2/{u}",
+        "b": f"{y}/s^2/{per(u)}",
         "c_1": f"{y}/s^2",
         "c_2": f"{y}/s^2",
         "theta_0": y,

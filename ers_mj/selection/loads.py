@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ers_mj.decisions import acceptance, explained
+from ers_mj.decisions import explained
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
 from ers_mj.estimation.objective import Fit
 from ers_mj.selection.bench import Bench
-from ers_mj.servo.model import Model
+from ers_mj.servo.model import LOADS, Model
 
 STEPS = 12  # of a recording's own fit
 RIVALS: tuple[tuple[str, ...], ...] = (("gain",), ("friction_level",), ("gain", "friction_level"))
@@ -42,9 +43,20 @@ def _shows_current(bench: Bench) -> bool:
 
 
 def _pays(bench: Bench, base: Fit, misfit: np.ndarray) -> bool:
-    """Whether misfits (B,) take so much of what a base leaves that nothing else need be compared with it."""
+    """Whether misfits (B,) leave less than half of the squared error of a base nearly everywhere: what is missing makes
+    recordings differ as well, but not so much.
+    """
     gain = bench.cost(base) - explained.cost(misfit, bench.tau)
-    return acceptance.holds(gain, bench.cost(base), misfit.size, False, bench.policy)
+    return gain >= max(bench.policy.least_gain, -math.log(1.0 - bench.policy.half) * misfit.size)
+
+
+def still_loaded(bench: Bench, current: Fit) -> Fit:
+    """The model without its loads, where what was named since makes them needless."""
+    states = {name: values for name, values in (current.model.states or {}).items() if name not in LOADS}
+    if len(states) == len(current.model.states or {}):
+        return current
+    less = bench.fit(replace(current.model, states=states or None), STEPS)
+    return less if bench.priced(less) < bench.priced(current) + bench.policy.least_gain else current
 
 
 def _one_by_one(bench: Bench, base: Fit) -> list[Fit]:

@@ -123,3 +123,10 @@ def plants_beside(model: Model) -> list[tuple[str, ReducedModel]]:
         if name not in model.names
         for start in some
     ]
+
+
+def bending_and_twisting(model: Model) -> list[str]:
+    """The effects that make a plant whose friction bends a bristle and whose shaft twists, which the model's has only
+    one of.
+    """
+    return [name for name, plant in plants_beside(model) if plant.bends and plant.has_motor_side]

@@ -15,7 +15,7 @@ from ers_mj.data.prepared import Trace
 from ers_mj.decisions import acceptance, explained
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.decisions.verdict import is_more_than_noise
-from ers_mj.estimation.baseline import Held
+from ers_mj.estimation.baseline import Held, Start
 from ers_mj.estimation.fit import hopped
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.objective import Fit, is_rough, tau_of
@@ -25,9 +25,9 @@ from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import Candidate, bends_and_twists, is_dear, stands_alone
 from ers_mj.selection.drop import pruned, reconsidered
 from ers_mj.selection.foundation import held_beside, held_instead
-from ers_mj.selection.loads import under_loads
+from ers_mj.selection.loads import still_loaded, under_loads
 from ers_mj.selection.moves import Grown, Move, less
-from ers_mj.selection.pair import beside_a_rival, paired, plants_beside
+from ers_mj.selection.pair import bending_and_twisting, beside_a_rival, paired
 from ers_mj.selection.swap import exchanged, in_its_place, other_way_round, reviewed, widened
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
 from ers_mj.selection.whiteness import is_beyond_rounding, left_by_sensor
@@ -54,8 +54,7 @@ def select(
     base: Fit,
     traces: Sequence[Trace],
     *,
-    anchors: Sequence[Mapping[str, float]] = (),
-    held: Held | None = None,
+    start: Start | None = None,
     exclude: Sequence[str] = (),
     jobs: int = 1,
     progress: Progress = lambda text, share: None,
@@ -64,8 +63,8 @@ def select(
 ) -> Selection:
     """Grow the model while the data asks for it, dropping what later additions make needless.
 
-    A baseline in which an effect is ``held`` for a spring is what it grows from where that explains far more, and a
-    candidate of the first round where not.
+    Of the ``start`` the anchors are tried as well; a baseline in which an effect is held for a spring is what it grows
+    from where that explains far more, and a candidate of the first round where not.
 
     What takes longest, the sweeps, what is begun once more the other way round, and a shaft or a play beside a bristle,
     is left out as the ``budget`` of simulation is spent, the selection's own unless one is handed in; its sizes are
@@ -74,9 +73,9 @@ def select(
     budget = Budget(traces) if budget is None else budget
     base = replace(base, model=replace(base.model, effort=budget.effort))
     bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget.search, budget)
-    growing = _Stepwise(bench, base, anchors, progress)
-    if held is not None:
-        growing.begin_with(held)
+    growing = _Stepwise(bench, base, start.anchors if start is not None else (), progress)
+    if start is not None and start.held is not None:
+        growing.begin_with(start.held)
     growing.tell_loads()
     return growing.run()
 
@@ -182,15 +181,10 @@ class _Stepwise:
         """A round's candidates, the likeliest first, and what must be bought; None where the model itself was mended on
         the way.
         """
-        bench, current = self.bench, self.current
+        bench = self.bench
         self.progress(f"round {len(self.rounds) + 1}: comparing effects", 0.15 + 0.12 * len(self.rounds))
         bar = self._bar()
-        slow = () if self._may_sweep() else bending_and_twisting(current.model)
-        last = bench.budget.raced if is_dear(current) else math.inf
-        anchors = self.anchors if not self.rounds else ()
-        ranked = candidates(bench.without((*current.model.names, *slow)), current, anchors, bar.faint, last)
-        if self.held is not None and not self.rounds:
-            ranked = joined(ranked, [bench.judged(self.held.model.names[-1], self.held, current)])
+        ranked = self._ranked(bar)
         leader, may_mend = ranked[0] if ranked else None, self.mended < self._most_mended()
         if may_mend and (again := self._way_back(ranked, bar)) is not None:
             won = self._mend(again)
@@ -204,6 +198,17 @@ class _Stepwise:
             self._mend(again)
             return None
         return self._other_way_round(ranked, bar), bar
+
+    def _ranked(self, bar: acceptance.Bar) -> list[Candidate]:
+        """The promising candidates; in the first round a baseline that holds the output otherwise among them."""
+        bench, current, is_first = self.bench, self.current, not self.rounds
+        slow = () if self._may_sweep() else bending_and_twisting(current.model)
+        last = bench.budget.raced if is_dear(current) else math.inf
+        anchors = self.anchors if is_first else ()
+        ranked = candidates(bench.without((*current.model.names, *slow)), current, anchors, bar.faint, last)
+        if self.held is None or not is_first:
+            return ranked
+        return joined(ranked, [bench.judged(self.held.model.names[-1], self.held, current)])
 
     def _bar(self) -> acceptance.Bar:
         """What must be bought beside the model as it stands."""
@@ -325,6 +330,8 @@ class _Stepwise:
             self._go_on("swap", found, self.current, "the refit made of it a form of another effect")
         self._refine(leader.name)
         self._hold_otherwise()
+        found = still_loaded(self.bench, self.current)
+        self._go_on("drop", found, self.current, "beside what was named the recordings are of one load")
 
     def _refine(self, newest: str) -> None:
         """Out of local minima, into wider forms, into the place of earlier rivals."""
@@ -391,10 +398,3 @@ def rounds_that_count(rounds: int, model: Model) -> int:
     """
     effects = rounds - len(model.states or {})
     return effects - (effects > len(model.names))
-
-
-def bending_and_twisting(model: Model) -> list[str]:
-    """The effects that make a plant whose friction bends a bristle and whose shaft twists, which the model's has only
-    one of.
-    """
-    return [name for name, plant in plants_beside(model) if plant.bends and plant.has_motor_side]

@@ -227,16 +227,16 @@ class Model:
         """The effects that act in one recording (None: in any), with their values there (in the first where they
         act).
         """
-        loaded = record is not None and any(name in (self.states or {}) for name in LOADS)
-        if not self.local and not loaded:
+        loaded = any(name in (self.states or {}) for name in LOADS)
+        if not self.local and (record is None or not loaded):
             return self.effects
         out = []
         for name, values in self.effects:
-            if loaded:
+            if loaded and record is not None:
                 values = self._loaded(record, name, values)
             if name in (self.local or {}):
                 values, columns = values.copy(), BY_NAME[name].local_columns
-                rows = self.local[name]
+                rows = (self.local or {})[name]
                 values[columns] = rows[np.argmin(np.isnan(rows).any(axis=1)) if record is None else record]
                 if np.isnan(values[columns]).any():
                     continue
@@ -246,7 +246,7 @@ class Model:
     def of_records(self, records: Sequence[int]) -> Model:
         """The model for some of its recordings only, without what differs between them (``states``) but their loads."""
         local = {name: rows[list(records)] for name, rows in (self.local or {}).items()}
-        loads = {name: self.states[name][list(records)] for name in LOADS if self.states and name in self.states}
+        loads = {name: rows[list(records)] for name, rows in (self.states or {}).items() if name in LOADS}
         scales = replace(self.scales, recordings=len(records))
         return replace(self, states=loads or None, local=local or None, scales=scales)
 

@@ -1,22 +1,24 @@
 """Files to tables, one file a format family; what reads it is imported when such a file comes.
 
-Each member has `load(file: File) -> Loaded`. A format whose reader is an optional extra names it where it is missing.
+Each member has `load(file: File) -> Loaded` and says in FORMAT what it reads. A format whose reader is an optional
+extra names it where it is missing.
 """
 
 from __future__ import annotations
 
+import contextlib
 import gzip
 import hashlib
 import importlib
+import io
 import os
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
 
 from ers_mj.data.formats.base import File, Loaded
-from ers_mj.data.tables import listed, read_content
-from ers_mj.errors import InputError
+from ers_mj.data.tables import listed, read_content, reason
+from ers_mj.errors import ErsError, InputError
 
 READERS = {
     **dict.fromkeys((".csv", ".tsv", ".txt", ".dat"), "csv_text"),
@@ -46,8 +48,7 @@ def load(
     """
     if os.path.isfile(path / "metadata.yaml"):  # a bag of ROS 2
         whole = b"".join(p.read_bytes() for p in sorted(path.iterdir()) if p.is_file())
-        file = File(path, b"", name, wanted or {}, beside)
-        return _reader("ros").load(file), hashlib.sha256(whole).hexdigest()
+        return _read("ros", File(path, b"", name, wanted or {}, beside)), hashlib.sha256(whole).hexdigest()
     packed = read_content(path)
     content, inner = (_unpacked(packed, name), path.with_suffix("")) if path.suffix.lower() == ".gz" else (packed, path)
     suffix = inner.suffix.lower()
@@ -55,12 +56,22 @@ def load(
         raise InputError(f"{name}: the file name ends in {suffix!r}, recordings end in {listed(READERS)}")
     if packed is not content and READERS[suffix] in ON_DISK:
         raise InputError(f"{name}: is packed, unpack it first")
-    file = File(inner, content, name, wanted or {}, beside)
-    return _reader(READERS[suffix]).load(file), hashlib.sha256(packed).hexdigest()
+    loaded = _read(READERS[suffix], File(inner, content, name, wanted or {}, beside))
+    return loaded, hashlib.sha256(packed).hexdigest()
 
 
-def _reader(module: str) -> ModuleType:
-    return importlib.import_module(f"ers_mj.data.formats.{module}")
+def _read(module: str, file: File) -> Loaded:
+    """The file by this reader; what its library prints is not for our output, and what it raises, it raises at
+    whatever its parser met.
+    """
+    reader = importlib.import_module(f"ers_mj.data.formats.{module}")
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            return reader.load(file)
+    except ErsError:
+        raise
+    except Exception as error:
+        raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({reason(error)})") from None
 
 
 def _unpacked(content: bytes, name: str) -> bytes:

@@ -11,10 +11,10 @@ import numpy as np
 
 from ers_mj.data.formats.base import File, Loaded, library
 from ers_mj.data.formats.clocks import Signal, on_one_clock
-from ers_mj.data.tables import reason
 from ers_mj.data.units import is_unit
 from ers_mj.errors import InputError
 
+FORMAT = "log of ArduPilot"
 MICRO = 1e-6
 PREFIXES = {"d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "k": 1e3}
 ABOUT = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "FILE", "MODE")
@@ -25,16 +25,12 @@ def load(file: File) -> Loaded:
     reading = library("pymavlink.DFReader", "pymavlink", "ardupilot", file.name)
     if file.content[:2] != b"\xa3\x95":
         raise InputError(f"{file.name}: is no log of ArduPilot (it does not begin as one)")
-    log = None
+    log = reading.DFReader_binary(str(file.path), zero_time_base=True)
     try:
-        log = reading.DFReader_binary(str(file.path), zero_time_base=True)
         rows, units = _rows(log)
-    except Exception as error:  # pymavlink raises what its parsers meet
-        raise InputError(f"{file.name}: is not a readable log of ArduPilot ({reason(error)})") from None
     finally:
-        if log is not None:
-            log.data_map.close()
-            log.filehandle.close()
+        log.data_map.close()
+        log.filehandle.close()
     signals = [Signal(name, np.array(t), np.array(x), units.get(name, "")) for name, (t, x) in rows.items()]
     return on_one_clock(signals, file.wanted, file.name)
 

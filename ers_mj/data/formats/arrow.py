@@ -8,6 +8,8 @@ from ers_mj.data.formats.base import File, Loaded, refuse_twice
 from ers_mj.data.tables import reason
 from ers_mj.errors import InputError
 
+FORMAT = "Parquet or Arrow file"
+
 
 def load(file: File) -> Loaded:
     """The table of a file."""

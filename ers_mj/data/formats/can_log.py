@@ -12,6 +12,8 @@ from ers_mj.data.formats.clocks import Signal, on_one_clock
 from ers_mj.data.tables import listed, reason
 from ers_mj.errors import InputError
 
+FORMAT = "CAN log"
+
 
 def load(file: File) -> Loaded:
     """The signals of the messages that the DBC knows."""
@@ -26,12 +28,9 @@ def load(file: File) -> Loaded:
     rows: dict[str, tuple[list[float], list[float]]] = {}
     short: Counter[str] = Counter()
     strange: Counter[str] = Counter()
-    try:
-        with can.LogReader(file.path) as reader:
-            for message in reader:
-                _take(message, base, rows, short, strange)
-    except Exception as error:  # python-can raises what its readers meet
-        raise InputError(f"{file.name}: is not a readable CAN log ({reason(error)})") from None
+    with can.LogReader(file.path) as reader:
+        for message in reader:
+            _take(message, base, rows, short, strange)
     if not rows:
         told = f", its identifiers are {listed(strange)}" if strange else ""
         raise InputError(f"{file.name}: holds no message that {file.beside[0].name} knows{told}")

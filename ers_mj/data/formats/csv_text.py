@@ -17,6 +17,7 @@ from ers_mj.data.tables import reason
 from ers_mj.data.units import is_unit
 from ers_mj.errors import InputError
 
+FORMAT = "CSV file"
 DELIMITERS = ",;\t|"
 COMMENT = re.compile(r"\s*(#|%|//)")
 TOP = 60  # lines within which a header is looked for

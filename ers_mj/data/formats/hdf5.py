@@ -9,9 +9,8 @@ import numpy as np
 
 from ers_mj.data.formats import arrays
 from ers_mj.data.formats.base import File, Loaded, library
-from ers_mj.data.tables import reason
-from ers_mj.errors import InputError
 
+FORMAT = "HDF5 file"
 UNITS = ("units", "unit", "Units", "Unit")
 
 
@@ -29,9 +28,6 @@ def load(file: File) -> Loaded:
         if said is not None:
             units[path] = said.decode() if isinstance(said, bytes) else str(said)
 
-    try:
-        with h5py.File(io.BytesIO(file.content), "r") as root:
-            root.visititems(visit)
-    except OSError as error:
-        raise InputError(f"{file.name}: is not a readable HDF5 file ({reason(error)})") from None
+    with h5py.File(io.BytesIO(file.content), "r") as root:
+        root.visititems(visit)
     return arrays.loaded(found, file.name, units=units)

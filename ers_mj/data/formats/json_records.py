@@ -12,6 +12,8 @@ from ers_mj.data.formats.base import File, Loaded
 from ers_mj.data.tables import reason
 from ers_mj.errors import InputError
 
+FORMAT = "JSON file"
+
 
 def load(file: File) -> Loaded:
     """The records as columns; what a record lacks is missing there."""

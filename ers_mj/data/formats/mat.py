@@ -10,9 +10,9 @@ import numpy as np
 
 from ers_mj.data.formats import arrays
 from ers_mj.data.formats.base import File, Loaded, library
-from ers_mj.data.tables import reason
 from ers_mj.errors import InputError
 
+FORMAT = "MAT file"
 HOW = "save its numbers instead, as in t_s = ts.Time; theta_rad = ts.Data; save('rec.mat', 't_s', 'theta_rad')"
 
 
@@ -26,10 +26,7 @@ def load(file: File) -> Loaded:
 def _of_v5(file: File) -> dict[str, np.ndarray]:
     from scipy.io import loadmat, matlab  # here alone: it takes long to import
 
-    try:
-        found = loadmat(io.BytesIO(file.content), simplify_cells=True)
-    except (ValueError, TypeError, OSError, NotImplementedError, matlab.MatReadError) as error:
-        raise InputError(f"{file.name}: is not a readable MAT file ({reason(error)})") from None
+    found = loadmat(io.BytesIO(file.content), simplify_cells=True)
     for name, value in found.items():
         if isinstance(value, matlab.MatlabOpaque) or name == "__function_workspace__":
             raise InputError(f"{file.name}: holds an object of MATLAB (a timeseries?), {HOW}")
@@ -38,11 +35,8 @@ def _of_v5(file: File) -> dict[str, np.ndarray]:
 
 def _of_v73(file: File) -> dict[str, np.ndarray]:
     h5py = library("h5py", "h5py", "hdf5", file.name)
-    try:
-        with h5py.File(io.BytesIO(file.content), "r") as root:
-            return dict(_variables(root, "", h5py, file.name))
-    except OSError as error:
-        raise InputError(f"{file.name}: is not a readable MAT file of v7.3 ({reason(error)})") from None
+    with h5py.File(io.BytesIO(file.content), "r") as root:
+        return dict(_variables(root, "", h5py, file.name))
 
 
 def _variables(group: Any, path: str, h5py: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:

@@ -8,8 +8,9 @@ import numpy as np
 
 from ers_mj.data.formats.base import File, Loaded, library
 from ers_mj.data.formats.clocks import Signal, on_one_clock
-from ers_mj.data.tables import reason
-from ers_mj.errors import ErsError, InputError
+from ers_mj.errors import InputError
+
+FORMAT = "MDF file"
 
 
 def load(file: File) -> Loaded:
@@ -17,13 +18,8 @@ def load(file: File) -> Loaded:
     asammdf = library("asammdf", "asammdf", "mf4", file.name)
     if not file.content.startswith((b"MDF ", b"UnFinMF ")):
         raise InputError(f"{file.name}: is no MDF file (it does not begin as one)")
-    try:
-        with asammdf.MDF(io.BytesIO(file.content)) as mdf:
-            return on_one_clock(_signals(mdf), file.wanted, file.name)
-    except ErsError:
-        raise
-    except Exception as error:  # asammdf raises what its parsers meet
-        raise InputError(f"{file.name}: is not a readable MDF file ({reason(error)})") from None
+    with asammdf.MDF(io.BytesIO(file.content)) as mdf:
+        return on_one_clock(_signals(mdf), file.wanted, file.name)
 
 
 def _signals(mdf) -> list[Signal]:

@@ -15,9 +15,9 @@ import numpy as np
 
 from ers_mj.data.formats.base import File, Loaded, library
 from ers_mj.data.formats.clocks import Signal, on_one_clock
-from ers_mj.data.tables import reason
-from ers_mj.errors import ErsError, InputError
+from ers_mj.errors import InputError
 
+FORMAT = "log of messages"
 NANO = 1e-9
 APART = 5.0  # [s] between a header's stamp and the log's, from which they are of different clocks
 LONGEST = 64  # elements of an array that become signals: an image has more
@@ -99,12 +99,7 @@ def _stamp(message: Any) -> int | None:
 def load(file: File) -> Loaded:
     """The topics of a file, or of a folder that is a bag."""
     topics = Topics()
-    try:
-        notes = _bag(file, topics) if file.path.suffix.lower() != ".mcap" or not file.content else _mcap(file, topics)
-    except ErsError:
-        raise
-    except Exception as error:  # readers raise what they meet
-        raise InputError(f"{file.name}: is not a readable log of messages ({reason(error)})") from None
+    notes = _bag(file, topics) if file.path.suffix.lower() != ".mcap" or not file.content else _mcap(file, topics)
     signals, told = topics.signals()
     return on_one_clock(signals, file.wanted, file.name, [*notes, *told])
 

@@ -10,21 +10,17 @@ import numpy as np
 from ers_mj.data.formats import arrays
 from ers_mj.data.formats.base import File, Loaded, library
 from ers_mj.data.formats.clocks import Signal, on_one_clock
-from ers_mj.data.tables import reason
-from ers_mj.errors import InputError
 
+FORMAT = "TDMS file"
 STEP, OFFSET, START, UNIT = "wf_increment", "wf_start_offset", "wf_start_time", "unit_string"
 
 
 def load(file: File) -> Loaded:
     """The channels of a file."""
     nptdms = library("nptdms", "npTDMS", "tdms", file.name)
-    try:
-        found = nptdms.TdmsFile.read(io.BytesIO(file.content))
-        channels = [channel for group in found.groups() for channel in group.channels()]
-        values = {f"{c.group_name}/{c.name}": np.asarray(c[:]) for c in channels}
-    except Exception as error:  # npTDMS raises what its parsers meet
-        raise InputError(f"{file.name}: is not a readable TDMS file ({reason(error)})") from None
+    found = nptdms.TdmsFile.read(io.BytesIO(file.content))
+    channels = [channel for group in found.groups() for channel in group.channels()]
+    values = {f"{c.group_name}/{c.name}": np.asarray(c[:]) for c in channels}
     one_group = len({c.group_name for c in channels}) == 1
     named = [(c.name if one_group else key, c, x) for c, (key, x) in zip(channels, values.items())]
     units = {name: str(c.properties[UNIT]) for name, c, _ in named if c.properties.get(UNIT)}

@@ -1,0 +1,116 @@
+"""What a diagnosis takes, this checkout beside an older commit, and how it grows with a recording's length.
+
+    python analysis/speed.py                       # cases of ../shared/concealed, both checkouts in turn: ratios
+    python analysis/speed.py --growth 1 4 16 60    # minutes at 1 kHz: diagnose, identify, frequency, this checkout
+
+Seconds are a processor's in user mode, one thread, kernels compiled beforehand; of several rounds the least counts,
+since other work on a machine only adds. Seconds belong to a machine, ratios hold.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from cold_start import BEFORE, ROOT, unpacked
+
+CONCEALED = ROOT.parent / "shared/concealed"
+CASES = ("case-001", "case-010", "case-032", "case-053")  # three with one effect, one with two
+MOST = 1.0 / 3.0  # the bar: share of the older commit's time
+
+
+def taken(checkout: Path, cache: Path, arguments: list[str]) -> tuple[float, float]:
+    """(processor time in user mode [s], largest memory [MiB]) of `ers` from a checkout with a cache of its own."""
+    cache.mkdir(mode=0o700, exist_ok=True)
+    environment = {**os.environ, "PYTHONPATH": str(checkout), "XDG_CACHE_HOME": str(cache), "OPENBLAS_NUM_THREADS": "1"}
+    started = subprocess.Popen(
+        [sys.executable, "-m", "ers_mj", *arguments], env=environment, cwd=cache, stdout=subprocess.DEVNULL
+    )
+    _, status, usage = os.wait4(started.pid, 0)
+    if status:
+        raise SystemExit(f"ers {' '.join(arguments)} ended with {os.waitstatus_to_exitcode(status)}")
+    return usage.ru_utime, usage.ru_maxrss / 1024
+
+
+def case_arguments(case: Path, out: Path) -> list[str]:
+    sheet = case / "datasheet.toml"
+    known = ["--datasheet", str(sheet)] if sheet.exists() else []
+    return ["diagnose", *map(str, sorted(case.glob("rec*.csv"))), *known, "--jobs", "1", "--out", str(out), "--force"]
+
+
+def compare(cases: list[str], before: str, rounds: int) -> int:
+    """Print what each case takes on both sides, and the ratio; 1 where the median misses the bar."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        sides = {"before": unpacked(before, folder / "checkout"), "now": ROOT}
+        ratios = []
+        print(f"{'case':12}{'before':>10}{'now':>10}{'share':>8}   (bar: {MOST:.2f}, median)")
+        for name in cases:
+            least = dict.fromkeys(sides, np.inf)
+            for k in range(rounds + 1):  # the first round compiles
+                for side, checkout in sides.items():
+                    spent, _ = taken(checkout, folder / side, case_arguments(CONCEALED / name, folder / f"{side}-out"))
+                    least[side] = min(least[side], spent) if k else np.inf
+            ratios.append(least["now"] / least["before"])
+            print(f"{name:12}{least['before']:8.1f} s{least['now']:8.1f} s{ratios[-1]:8.3f}", flush=True)
+    print(f"{'median':12}{'':20}{statistics.median(ratios):8.3f}")
+    return 0 if statistics.median(ratios) <= MOST else 1
+
+
+def recorded(minutes: float, path: Path) -> None:
+    """A recording of Table 1's servo with friction that falls with speed, under a multisine, at 1 kHz."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.servo.simulation import simulate_recording
+
+    generator, t = np.random.default_rng(3), 1e-3 * np.arange(int(60_000 * minutes))
+    u = np.zeros(t.size)
+    for f in np.geomspace(0.1, 6.0, 40):
+        u += 0.27 * generator.standard_normal() * np.sin(2 * np.pi * f * t + generator.uniform(0, 2 * np.pi))
+    effects = [("stribeck", {"dF_s": 0.05, "v_s": 0.2})]
+    columns = simulate_recording(read_datasheet("table1"), t, u, effects=effects, noise=2e-4, seed=1)
+    pq.write_table(pa.table(columns), path)
+
+
+def grow(minutes: list[float]) -> int:
+    """Print what each length takes, beside its multiple of the first."""
+    first: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        print(f"{'command':12}{'minutes':>9}{'processor':>12}{'memory':>11}{'per minute of the first':>26}")
+        for length in minutes:
+            path = folder / f"{length:g}min.parquet"
+            recorded(length, path)
+            commands = {
+                "diagnose": ["diagnose", str(path), "--datasheet", "table1", "--jobs", "1"],
+                "identify": ["identify", str(path), "--datasheet", "table1", "--method", "ls", "--jobs", "1"],
+                "frequency": ["frequency", str(path)],
+            }
+            for name, arguments in commands.items():
+                spent, memory = taken(ROOT, folder / "cache", [*arguments, "--out", str(folder / name), "--force"])
+                first.setdefault(name, spent / length)
+                share = spent / length / first[name]
+                print(f"{name:12}{length:9g}{spent:10.1f} s{memory:7.0f} MiB{share:26.2f}", flush=True)
+    return 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", nargs="+", default=list(CASES), metavar="CASE")
+    parser.add_argument("--before", default=BEFORE, help="the older commit (default: %(default)s)")
+    parser.add_argument("--rounds", type=int, default=2)
+    parser.add_argument("--growth", nargs="+", type=float, metavar="MINUTES")
+    chosen = parser.parse_args()
+    return grow(chosen.growth) if chosen.growth else compare(chosen.cases, chosen.before, chosen.rounds)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
