@@ -57,7 +57,7 @@ def main() -> None:
     selector = Selector(runs_of(train), True, parser.parse_args().jobs)
     chosen = selector.run(lambda text, share: print(f"{time.time() - begun:.0f} s {text}", flush=True))
     for ranked in chosen.rounds:
-        print("round", [(c.name, round(c.gain, 1)) for c in ranked[:6]])
+        print("round", [(c.name, round(c.gain, 1), round(c.fit.misfit, 1)) for c in ranked[:6]])
     model = chosen.chosen.model
     print("left out", [(x.name, round(x.gain, 1)) for x in chosen.left])
     print({k: round(float(v), 4) for k, v in model.values.items() if k in model.free}, model.effects)

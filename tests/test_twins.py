@@ -39,7 +39,7 @@ def values(effect):
     return np.array(SIZES[effect.name]) if effect.name in SIZES else effect.starts(SCALES)[0]
 
 
-OPEN = [e for e in EFFECTS if not e.loop_only]
+OPEN = [e for e in EFFECTS if not e.only_in_loop]
 
 
 @pytest.mark.parametrize("effect", OPEN, ids=lambda e: e.name)

@@ -86,7 +86,7 @@ def _effect_parameters(case: LoopCase, name: str) -> dict[str, dict]:
     effect, y = BY_NAME[name], case.output_unit
     if effect.in_loop:
         letter = next(x for x in effect.in_loop if x in case.model.free)
-        own = letter if letter in ("L", "R") else effect.parameters[0].name
+        own = letter if letter in ("L", "R", "creep") else effect.parameters[0].name
         entry = _entry(case.intervals.told("", letter), case.model[letter], LETTERS[letter].unit.format(y=y))
         return {own: entry | ({"meaning": "within the loop"} if letter == "dead_time_s" else {})}
     values = dict(case.model.effects)[name]

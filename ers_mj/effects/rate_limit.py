@@ -16,7 +16,7 @@ class RateLimit(Drive):
         " that the load and the speed change"
     )
     parameters = (Parameter("R", "speed", "largest speed of the reference", absent=np.inf),)
-    in_loop, loop_only = ("R",), True
+    in_loop, only_in_loop = ("R",), True
     loop_sentence = "the servo's own reference moves no faster than {value}"
 
     def starts(self, scales):

@@ -47,6 +47,7 @@ class Effort:
     """How far a search goes."""
 
     rounds: int = 6
+    screened: float = 50.0  # [s] of recordings on which starts are compared
     several: Halving = Halving(looked=6, first=10, kept=3)  # starts of the bare loop
     parted: Halving = Halving(looked=5, first=6, kept=2)  # starts of two bodies
     far: int = 25  # steps of their best ones
@@ -97,11 +98,22 @@ class Selection:
         return tuple(sorted((x for x in self.left if x.name in names), key=lambda x: -x.gain))
 
 
+def spread_out(runs: Sequence[Run], seconds: float) -> list[Run]:
+    """Runs evenly picked of many, of so many seconds together; at least four."""
+    total = sum(float(run.t[-1]) for run in runs)
+    count = max(4, round(len(runs) * seconds / total))
+    if count >= len(runs):
+        return list(runs)
+    return [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, count).round().astype(int))]
+
+
 class Selector:
     """A selection under way on some runs."""
 
     def __init__(self, runs: Sequence[Run], is_angle: bool, jobs: int = 1, policy: Policy = POLICY):
         self.data, self.is_angle, self.jobs, self.policy = Data.of(runs), is_angle, jobs, policy
+        some = spread_out(runs, EFFORT.screened)
+        self.screen = self.data if len(some) == len(runs) else Data.of(some)
 
     @property
     def runs(self) -> tuple[Run, ...]:
@@ -114,18 +126,25 @@ class Selector:
         rounds: list[tuple[Compared, ...]] = []
         for name in FIRST:  # what bends all the rest, before anything that could stand for it
             if self._may_gain(current):
-                tried = [self._finished(current, self._tried(current, t)) for t in self._terms(current, (name,))]
+                tried = self._ranked(current, self._terms(current, (name,)))
                 rounds += [(c,) for c in tried if self._takes_most(current, c)]
                 current = rounds[-1][0].fit if rounds else current
         while len(rounds) < EFFORT.rounds and self._may_gain(current):
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
             ranked = self.compared(current)
             rounds.append(tuple(ranked))
-            if not ranked or ranked[0].gain < self.policy.loop_gain:
+            if not ranked or ranked[0].gain < self.policy.loop_gain or not self._pays(current, ranked[0].fit):
                 break
             current = ranked[0].fit
         progress("leaving out what is not needed", 0.65)
         return self.pruned(Selection(base, current, tuple(rounds)))
+
+    def _pays(self, without: Fit, after: Fit) -> bool:
+        """Whether an effect takes its share of the squared error above the noise: of a model that stays wrong blocks
+        hang together, and nearly anything gains.
+        """
+        above = max(without.misfit - 1.0, 0.0)
+        return without.misfit - after.misfit >= self.policy.least_share * above
 
     def _takes_most(self, current: Fit, candidate: Compared) -> bool:
         """Whether a candidate may be taken before others are looked at."""
@@ -142,9 +161,13 @@ class Selector:
         if "L" in first.values:
             values = {**first.values, "K": 1.5 * first.values["K"], "L": 1.3 * first.values["L"]}
             starts.append(self.begun(Rough(values, first.left)))
-        found = best(starts, self.data, EFFORT.full, EFFORT.several)
-        within = best(delayed_within(found.model), self.data, EFFORT.full)
+        found = self._whole(best(starts, self.screen, EFFORT.full, EFFORT.several))
+        within = self._whole(best(delayed_within(found.model), self.screen, EFFORT.full))
         return self.unburdened(within if gain(found, within) > 0.0 else found)
+
+    def _whole(self, fit: Fit) -> Fit:
+        """A fit to some of the runs refitted to all."""
+        return fit if self.screen is self.data else fitted(fit.model, self.data, EFFORT.full)
 
     def unburdened(self, fit: Fit) -> Fit:
         """The fit without those loads that do not pay."""
@@ -187,7 +210,8 @@ class Selector:
         return [self._with_closed_form(term, current.model) for term in found if not names or term.name in names]
 
     def _ranked(self, current: Fit, candidates: Sequence[Term]) -> list[Compared]:
-        quick = sorted(self._map(partial(self._tried, current), candidates), key=lambda c: -c.gain)
+        seen = current if self.screen is self.data else fitted(current.model, self.screen, EFFORT.tried)
+        quick = sorted(self._map(partial(self._tried, seen), candidates), key=lambda c: -c.gain)
         ready = [c for c in quick[: EFFORT.finalists] if c.gain > 0.0]
         full = list(self._map(partial(self._finished, current), ready))
         return sorted([*full, *quick[len(ready) :]], key=lambda c: -c.gain)
@@ -211,11 +235,11 @@ class Selector:
 
     def _tried(self, current: Fit, term: Term) -> Compared:
         if term.is_bent:
-            fit = best(term.starts, self.data, EFFORT.far, EFFORT.several)
+            fit = best(term.starts, self.screen, EFFORT.far, EFFORT.several)
         elif term.is_far:
-            fit = best(term.starts, self.data, EFFORT.far, EFFORT.parted)
+            fit = best(term.starts, self.screen, EFFORT.far, EFFORT.parted)
         else:
-            fit = best(term.starts, self.data, EFFORT.tried)
+            fit = best(term.starts, self.screen, EFFORT.tried)
         return Compared(term.name, fit, gain(current, fit))
 
     def _finished(self, current: Fit, candidate: Compared) -> Compared:
@@ -266,13 +290,16 @@ class Selector:
         current = selection.chosen
         while True:
             left = [self._left_out(current, name) for name in self._parts(current.model)]
-            weakest = min(left, key=lambda x: x.gain - self._least(x, current.model), default=None)
-            if weakest is None or weakest.gain >= self._least(weakest, current.model):
+            weakest = min(left, key=lambda x: x.gain - self._least(x, current), default=None)
+            if weakest is None or weakest.gain >= self._least(weakest, current):
                 return replace(selection, chosen=current, left=tuple(left))
             current = weakest.fit
 
-    def _least(self, left: Left, model: LoopModel) -> float:
-        """What a term must buy; one whose size says that it is not there, everything."""
+    def _least(self, left: Left, current: Fit) -> float:
+        """What a term must buy; one whose size says that it is not there, or that takes no share, everything."""
+        model = current.model
+        if not self._pays(left.fit, current):
+            return math.inf
         if left.name == INTEGRAL and model["I"] < self.policy.loop_integral * model["K"]:
             return math.inf
         if left.name == DERIVATIVE and abs(model["D"]) < self.policy.loop_damping * model["a_2"]:

@@ -115,25 +115,33 @@ def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
     """The candidates beside a model that leaves so large an error [output unit], each from its own starts; what needs a
     closed form is in selection.py.
     """
+    found = [
+        *_of_the_loop(model, runs),
+        Term(Presliding.name, tuple(model.fixed(heavy=y).having(creep=x) for x, y in SIZES.creeps)),
+        Term(CONSTANT, (model.having(hold=0.0),)),
+        Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
+        *_transmissions(model, error),
+        *(Term(law.name, tuple(_begun(model, law.name)), is_law=law is not EndStop) for law in LAWS),
+    ]
+    plain = error < SIZES.parted * max(run.sigma for run in runs)
+    found = [term for term in found if term.starts and not (term.is_far and plain)]
+    return [term for term in found if not is_there(model, term.name)]
+
+
+def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
+    """What the firmware itself may do."""
     drive = model.scales.drive or 4.0 * model.scales.acceleration
     found = [
         Term(INTEGRAL, tuple(model.having(I=x * model["K"]) for x in SIZES.integrals)),
         Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds)),
         Term(InputDelay.name, (model.having(tau_s=0.01),)),
         Term(WITHIN, delayed_within(model)),
-        Term(Presliding.name, tuple(model.fixed(heavy=y).having(creep=x) for x, y in SIZES.creeps)),
         Term(DriveDeadZone.name, tuple(model.having(band=x * model["c_2"] / model["K"]) for x in SIZES.bands)),
         Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
-        Term(CONSTANT, (model.having(hold=0.0),)),
-        Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
-        *_transmissions(model, error),
-        *(Term(law.name, tuple(_begun(model, law.name)), is_law=law is not EndStop) for law in LAWS),
     ]
     if "L" in model.free:
         found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
-    plain = error < SIZES.parted * max(run.sigma for run in runs)
-    found = [term for term in found if term.starts and not (term.is_far and plain)]
-    return [term for term in found if not is_there(model, term.name)]
+    return found
 
 
 def delayed_within(model: LoopModel) -> tuple[LoopModel, ...]:
@@ -159,7 +167,8 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
     if name == EndStop.name:
         return [stop for low, high, _, _ in starts for stop in stops(model, low, high)]
     if name == LoadDependentFriction.name:
-        return [model.with_effect(name, np.array([mu, np.inf])) for mu in (0.05, 0.3)]
+        rest = starts[0][1:]  # the torque that the gear carries is the integrator's own
+        return [model.with_effect(name, np.array([mu, *rest])) for mu in (0.05, 0.3)]
     return [model.with_effect(name, start) for start in starts]
 
 
