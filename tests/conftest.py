@@ -20,6 +20,6 @@ def plain():
 @pytest.fixture(scope="session")
 def delayed():
     """A servo whose drive delays and sleeps: (its baseline, its laws by name)."""
-    truth = {"drive_dead_zone": np.array([0.95, np.inf]), "input_delay": np.array([0.0157])}
+    truth = {"drive_dead_zone": np.array([0.95, np.inf, np.inf]), "input_delay": np.array([0.0157])}
     values = {**TRUTH, "c_2": 85.0}
     return started(recorded(list(truth.items()), values=values, t=SPARSE), values), truth

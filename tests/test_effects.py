@@ -50,7 +50,14 @@ def test_an_absent_effect_leaves_the_motion_alone(effect):
     assert np.degrees(np.max(np.abs(motion - table_1().simulate(T, u).theta))) < 2e-4
 
 
-@pytest.mark.parametrize("effect", [e for e in EFFECTS if not e.only_in_loop], **ids)
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e.loop_only], **ids)
+def test_what_acts_within_a_loop_alone_is_refused_without_one(effect):
+    values = {p.name: 0.3 for p in effect.parameters}
+    with pytest.raises(InputError, match="acts within a position loop"):
+        simulate_recording(read_datasheet("table1"), T, 0 * T, effects=[(effect.name, values)])
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if not e.loop_only], **ids)
 def test_what_a_reader_may_give_acts_and_leaves_numbers(effect):
     """Any of an effect's numbers, however few, are refused or change the recording: none is swallowed in silence."""
     starts = effect.starts(SCALES)

@@ -69,6 +69,13 @@ def test_what_has_a_clock_of_its_own_leads_only_where_no_law_explains_half_of_it
     assert order([law("drag", 11.0), clocked("gust", 10.9)], chance={"gust": 0.9, "drag": 0.1})[0] == "drag"
 
 
+def test_a_form_of_another_effect_gives_way_where_that_explains_half_of_it():
+    shaft, winding = law("shaft", 21.0), law("inductance", 17.0)
+    assert order([shaft, winding], really={"shaft": "inductance"}) == ["inductance", "shaft"]
+    assert order([shaft, replace(winding, gain=10.0)], really={"shaft": "inductance"})[0] == "shaft"
+    assert order([shaft, winding])[0] == "shaft"
+
+
 @pytest.mark.parametrize("better, first", [(1.0, "bias"), (0.99 * POLICY.curved, "bias"), (POLICY.curved, "gravity")])
 def test_what_bends_along_the_travel_must_be_likelier_than_what_is_constant(better, first):
     kin = frozenset({"bias", "one_sided"})

@@ -83,7 +83,7 @@ def test_the_generator_knows_nothing_of_the_effects_folder():
 
 
 def test_effects_are_those_of_the_contract_and_their_subsystems_are_right():
-    named = [e for e in EFFECTS if e.named]
+    named = [e for e in EFFECTS if e.named and not e.loop_only]  # no rudder has a position loop
     assert {e.name for e in named} == set(LISTED)
     assert {e.name: e.subsystem for e in named} == {e.name: scoring.subsystem_of(e.name) for e in named}
 

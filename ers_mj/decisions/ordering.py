@@ -49,6 +49,13 @@ def likeliest_first(
     if not offers:
         return []
     ranked = _lawful_first(offers, policy)
+    gains = {offer.name: offer.gain for offer in ranked}
+
+    def is_a_form(offer: Offer) -> bool:
+        other = really[offer.name]
+        return other != offer.name and gains.get(other, 0.0) >= policy.nearly * offer.gain
+
+    ranked = sorted(ranked, key=is_a_form)
     rivals = [o for o in rivals_of(ranked, policy) if really[o.name] != ranked[0].name or o is ranked[0]] or ranked[:1]
     name = likeliest(rivals, curves, chances(rivals), policy)
     first = next(offer for offer in rivals if offer.name == name)

@@ -193,6 +193,12 @@ class Policy:
         0.02, "share of the best gain", "the same where all is large", "slopes are good to some per cent"
     )
     rival: float = _threshold(0.3, "share of the leader's gain", "a rival that may take its place later", UNRECORDED)
+    nearly: float = _threshold(
+        0.5,
+        "share of the gain",
+        "an effect told as another's form",
+        "what this other must win itself",
+    )
     curved: float = _threshold(
         1.06,
         "factor of probability",

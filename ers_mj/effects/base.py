@@ -92,7 +92,7 @@ class Effect:
     holds: ClassVar[bool] = False  # a wire that brings an earlier reading again
     # letters of a position loop (position_loop/model.py) that it is told by, where a firmware closes one
     in_loop: ClassVar[tuple[str, ...]] = ()
-    only_in_loop: ClassVar[bool] = False  # whether it is none without one
+    loop_only: ClassVar[bool] = False  # nothing without such a loop
     loop_sentence: ClassVar[str] = ""  # what is said of it there, with the {value} of the first of these letters
     is_weight: ClassVar[bool] = False  # its torques grow with a load's moment m l
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)

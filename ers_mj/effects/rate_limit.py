@@ -11,9 +11,12 @@ class RateLimit(Drive):
     name = "rate_limit"
     sentence = "the servo's own reference moves no faster than {R}"
     mjcf = "none: the reference is limited before it reaches ctrl"
+    apart = (
+        "large steps become ramps of one slope, whatever the load; voltage_saturation and current_limit make a slope"
+        " that the load and the speed change"
+    )
     parameters = (Parameter("R", "speed", "largest speed of the reference", absent=np.inf),)
-    apart = "the answer to a step is a ramp of one slope, whatever its size; a limit of the drive bends it at the start"
-    in_loop, only_in_loop = ("R",), True
+    in_loop, loop_only = ("R",), True
     loop_sentence = "the servo's own reference moves no faster than {value}"
 
     def starts(self, scales):

@@ -30,6 +30,7 @@ SUBSYSTEMS = {
         "input_delay",
         "thermal_drift",
         "supply_sag",
+        "rate_limit",
     },
     "transmission": {"backlash", "shaft_compliance", "variable_ratio", "transmission_ripple"},
     "sensor": {"sensor_lag", "sensor_nonlinearity", "sensor_quantisation", "sensor_dropout"},

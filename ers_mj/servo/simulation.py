@@ -110,6 +110,8 @@ def build_plant(
             " expected"
         )
     chosen = kernel_effects([*datasheet.effects, *effects], inertia_of(datasheet))
+    if alone := [name for name, _ in chosen if BY_NAME[name].loop_only]:
+        raise InputError(f"{alone[0]} acts within a position loop, which a servo that is told a voltage has not")
     c = lumped(_values(datasheet, inductance))
     if plant != "mujoco" and linkage != "constant":
         raise InputError(f"the reduced model has the constant linkage only, a {linkage} linkage needs --plant mujoco")
@@ -262,8 +264,6 @@ def _number(text: str, where: str) -> float:
 def _effect(name: str) -> Effect:
     if name not in BY_NAME:
         raise InputError(f"there is no effect {name[:40]!r}; {_nearest(name, BY_NAME)}there are {', '.join(BY_NAME)}")
-    if BY_NAME[name].only_in_loop:
-        raise InputError(f"{name}: acts within a position loop only, where a model's [loop] has it")
     return BY_NAME[name]
 
 
