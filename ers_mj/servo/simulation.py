@@ -262,6 +262,8 @@ def _number(text: str, where: str) -> float:
 def _effect(name: str) -> Effect:
     if name not in BY_NAME:
         raise InputError(f"there is no effect {name[:40]!r}; {_nearest(name, BY_NAME)}there are {', '.join(BY_NAME)}")
+    if BY_NAME[name].only_in_loop:
+        raise InputError(f"{name}: acts within a position loop only, where a model's [loop] has it")
     return BY_NAME[name]
 
 
