@@ -6,7 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, is_doubtful, is_no_closer, paired_p
+from ers_mj.decisions.confirmation import (
+    HeldOut,
+    Won,
+    is_confirmed,
+    is_doubtful,
+    is_no_closer,
+    is_no_size,
+    paired_p,
+    pays,
+)
 from ers_mj.decisions.thresholds import POLICY
 
 HELD = HeldOut(p=0.2, rmse=(0.6, 1.0), noise=0.1, cost=(10.0, 20.0), ratio=0.6, log_ratio=math.log(0.6))
@@ -38,6 +47,31 @@ def test_what_holds_once_another_day_is_known_is_confirmed():
     assert is_confirmed(lost, lambda: True) and not is_confirmed(lost, lambda: False)
     assert not is_confirmed(replace(lost, rmse=(1.4, 1.0)), never)  # not where its free runs are worse
     assert is_confirmed(replace(HELD, p=0.01), never)
+
+
+@pytest.mark.parametrize(
+    "with_it, without, worth",
+    [
+        (2.0, 2.05, False),  # squares above a noise of 1: 3.0 and 3.2
+        (2.0, 2.1, True),
+        (0.9, 0.95, True),  # nothing above the noise either way: the blocks decide
+        (0.9, 1.1, True),
+    ],
+)
+def test_a_name_must_be_worth_a_share_of_the_error_above_the_noise(with_it, without, worth):
+    assert pays(replace(HELD, p=0.01, rmse=(with_it, without), noise=1.0, log_ratio=0.0)) is worth
+
+
+def test_a_run_that_forks_does_not_make_a_name_worthless_beyond_doubt():
+    forked = replace(HELD, rmse=(9.0, 2.0), noise=1.0, log_ratio=math.log(0.5))
+    assert pays(replace(forked, p=1e-9)) and not pays(replace(forked, p=0.01))
+
+
+@pytest.mark.parametrize(
+    "ends, told", [((-0.1, 0.3), False), ((0.1, 0.3), True), ((1e-6, 1.0), False), ((-2.0, -1.0), True)]
+)
+def test_an_interval_across_zero_or_decades_is_no_size(ends, told):
+    assert is_no_size(*ends) is not told
 
 
 def test_losses_alone_tell_the_scatter_of_chance():

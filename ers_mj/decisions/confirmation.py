@@ -82,6 +82,23 @@ def is_no_closer(held: HeldOut, policy: Policy = POLICY) -> bool:
     return held.log_ratio >= 0.0
 
 
+def pays(held: HeldOut, policy: Policy = POLICY) -> bool:
+    """Whether the squared held-out error above the noise rises by a share of itself without an effect.
+
+    Where its blocks leave no doubt, forks of stick and slip may swamp the error of one recording: the geometric mean
+    over recordings counts as well.
+    """
+    with_it, without = (max(rmse**2 - held.noise**2, 0.0) for rmse in held.rmse)
+    if without >= (1.0 + policy.pays) * with_it:
+        return True
+    return held.p < policy.sure_p and math.exp(-2.0 * held.log_ratio) >= 1.0 + policy.pays
+
+
+def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:
+    """Whether an interval tells no size: it spans zero, or decades."""
+    return low <= 0.0 <= high or max(abs(low), abs(high)) > policy.unsure * min(abs(low), abs(high))
+
+
 def is_confirmed(held: HeldOut, halves_recalibrated: Callable[[], bool], policy: Policy = POLICY) -> bool:
     """Whether an effect is confirmed: by blocks and free runs, or by an error that is halved once gain, offset and
     friction level of another day are known (asked for only where nothing else confirms it).

@@ -18,7 +18,8 @@ from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
-from ers_mj.diagnosis.sentences import remainder, sentence, shown
+from ers_mj.diagnosis.remainder import beyond_training, remainder
+from ers_mj.diagnosis.sentences import sentence, shown
 from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
@@ -83,7 +84,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "sentence": sentence(case, missing, found),
         "where": [] if verdict == "consistent" else [place_of(p) for p in found],
         "missing": missing,
-        "remainder": remainder(case),
+        "remainder": _remainder(case),
         "record_state": states,
         "fit": case.fits,
         "parameters": _parameters(case),
@@ -107,6 +108,13 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         spectrum,
     )
     return Diagnosis(document, evidence, _improved(case), case.rig.plant(model if case.told_effects else base))
+
+
+def _remainder(case: Case) -> dict:
+    """What the answer leaves, beside what memory tells of it by sensor."""
+    beyond = beyond_training(case.recordings, case.holdout)
+    left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
+    return {**remainder(case.explained, case.more_is_left, case.free_held, beyond), "left_sigma": left_sigma}
 
 
 def _missing(case: Case) -> list[dict]:
