@@ -26,6 +26,7 @@ from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.selection.comparison import kin_of
 from ers_mj.selection.confirmation import delta_bic
 from ers_mj.selection.cross_validation import pooled
 from ers_mj.selection.moves import Move
@@ -219,12 +220,12 @@ def _symptom(case: Case, name: str, values: np.ndarray) -> dict:
 
 def _alternatives(case: Case, name: str) -> list[dict]:
     """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer
-    on them.
+    on them; then what is easily taken for it and was compared in no round.
     """
     ranked, weights = case.found(name)
     others = [c for c in ranked[1:] if weights[c.name] > case.policy.tied]
     apart = isolability(ranked[0].fit, [c.fit for c in others], case.start.traces) if others else []
-    return [
+    left = [
         {
             "effect": c.name,
             "probability": weights[c.name],
@@ -237,6 +238,15 @@ def _alternatives(case: Case, name: str) -> list[dict]:
             "cost_difference": d.cost,
         }
         for c, d in zip(others, apart)
+    ]
+    known = {*case.model.names, *(c.name for compared in case.selection.rounds for c in compared)}
+    return left + [
+        {
+            "effect": kin,
+            "probability": None,
+            "why_not_excluded": f"was not compared; what tells them apart: {BY_NAME[kin].apart}",
+        }
+        for kin in sorted(kin_of(name) - known)
     ]
 
 
