@@ -233,8 +233,8 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
     best, tried = _narrowest(leader, wish, bench)
     if best is None:
         return _nothing(
-            "Nothing else that was tried explains these recordings, and no input was found that keeps the rig within its"
-            " travel and would tell more.",
+            "Nothing else that was tried explains these recordings, and no input was found that keeps the rig within"
+            " its travel and would tell more.",
             {"tried": tried, "simulations": bench.simulations},
         )
     ratios = {leader.layout[i].name: float(a / b) for i, a, b in zip(wish.places, best[1], wish.before)}
