@@ -13,6 +13,7 @@ from ers_mj import __version__
 from ers_mj.data.columns import per
 from ers_mj.data.prepared import Trace
 from ers_mj.data.recording import Recording
+from ers_mj.decisions.confirmation import is_no_size
 from ers_mj.decisions.explained import cost
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import Evidence
@@ -166,6 +167,7 @@ def _effect_parameters(case: Case, name: str):
         factor = case.inertia if case.inertia and parameter.kind in PER_INERTIA else 1.0
         finite = bool(np.isfinite(value))
         low_high = errors.get((name, parameter.name))
+        is_told = finite and low_high is not None and not (parameter.positive and is_no_size(*low_high, case.policy))
         yield {
             "name": parameter.name,
             "entry": (
@@ -173,7 +175,7 @@ def _effect_parameters(case: Case, name: str):
                 | {
                     "value": float(value) * factor if finite else None,
                     "unit": unit_of(parameter.kind, case.output_unit, case.input_unit, bool(case.inertia)),
-                    "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
+                    "ci95": [float(v) * factor for v in low_high] if is_told else [None, None],
                     "meaning": parameter.meaning,
                 }
             ),
@@ -267,16 +269,17 @@ def _parameters(case: Case) -> dict:
     rows, errors = {}, case.errors
     for name in BASE:
         fitted = ("base", name) in errors
+        is_told = fitted and (name == "theta_0" or not is_no_size(*errors[("base", name)], case.policy))
         if not fitted and name in ("tau_e", "emf_share", "ampere"):
             continue
         absent = name in ("a_1", "c_1") and case.model.values[name] == 0
-        value = float(case.model.values[name]) if fitted or absent else None
+        value = float(case.model.values[name]) if is_told or absent else None
         rows[name] = {
             "value": value,
             "unit": units[name],
-            "ci95": list(errors[("base", name)]) if fitted else [None, None],
+            "ci95": list(errors[("base", name)]) if is_told else [None, None],
             "datasheet": known.get(name),
-            "identifiable": fitted or absent,
+            "identifiable": is_told or absent,
         }
     for name, value in (case.datasheet.parameters if case.datasheet is not None else {}).items():
         if name != "theta_0":
