@@ -15,6 +15,8 @@ FORMAT = "numpy file"
 
 def load(file: File) -> Loaded:
     """Each array a column; arrays (N, k) become lists."""
+    if not file.content.startswith((b"PK", b"\x93NUMPY")):
+        raise InputError(f"{file.name}: is no numpy file (it does not begin as one)")
     try:
         found = np.load(io.BytesIO(file.content), allow_pickle=False)
         tree = dict(found) if hasattr(found, "files") else found
