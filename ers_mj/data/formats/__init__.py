@@ -55,6 +55,10 @@ def load(
     if os.path.isfile(path / "metadata.yaml"):  # a bag of ROS 2
         whole = b"".join(p.read_bytes() for p in sorted(path.iterdir()) if p.is_file())
         return _read("ros", File(path, b"", name, wanted or {}, beside)), hashlib.sha256(whole).hexdigest()
+    if os.path.isdir(path):
+        inside = sorted(str(p.relative_to(path)) for p in path.rglob("*") if p.suffix.lower() in READERS)
+        told = f", it holds {listed(inside, 4)}" if inside else ""
+        raise InputError(f"{name}: is a folder and no bag of ROS 2, a file was expected{told}")
     packed = read_content(path)
     content, inner = (_unpacked(packed, name), path.with_suffix("")) if path.suffix.lower() == ".gz" else (packed, path)
     suffix = inner.suffix.lower()
