@@ -1,5 +1,7 @@
 """What the package says when it is given something that it cannot use: one family of exceptions, one sentence each."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 
 
@@ -15,6 +17,16 @@ class InputError(ErsError, ValueError):
 
     The message is kept on one line, whatever the text that is quoted in it.
     """
+
+
+class Unwritable(InputError):
+    """A place that results cannot be written to."""
+
+    @classmethod
+    def at(cls, place: object, reason: Exception | str, instead: str = "") -> Unwritable:
+        """The sentence for this place, what the system says of it, and what to do instead."""
+        said = reason.strerror if isinstance(reason, OSError) else None
+        return cls(f"{place}: cannot be written ({said or reason}){instead}")
 
 
 class MissingPackage(ErsError, ImportError):

@@ -11,11 +11,13 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ers_mj"
 MAY_READ = {
     "errors": (),
+    "passing": (),
+    "stopping": ("passing",),
     "decisions": (),
     "solvers": (),
-    "data": ("decisions", "errors"),
+    "data": ("decisions", "errors", "passing"),
     "effects": ("decisions", "errors"),
-    "plants": ("effects", "errors"),
+    "plants": ("effects", "errors", "passing"),
     "servo": ("data", "effects", "errors", "plants"),
     "estimation": ("data", "decisions", "effects", "errors", "servo", "solvers"),
     "identification": ("data", "errors", "estimation", "plants", "servo", "solvers"),
@@ -27,20 +29,20 @@ MAY_READ = {
         "servo",
     ),
     "online": ("data", "estimation", "servo", "solvers"),
-    "control": ("data", "effects", "errors", "plants", "servo"),
+    "control": ("data", "effects", "errors", "passing", "plants", "servo"),
     "validation": ("plants", "servo"),
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
-    "proving": ("data", "errors", "plants"),
+    "proving": ("data", "errors", "passing", "plants"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "door": (
-        "control", "data", "diagnosis", "effects", "errors", "estimation", "identification", "plants", "position_loop",
-        "report", "selection", "servo", "validation", "view",
+        "control", "data", "diagnosis", "effects", "errors", "estimation", "identification", "passing", "plants",
+        "position_loop", "report", "selection", "servo", "validation", "view",
     ),
     "commands": (
-        "control", "data", "door", "errors", "experiment_design", "online", "plants", "proving", "report", "servo",
-        "validation", "view",
+        "control", "data", "door", "errors", "experiment_design", "online", "passing", "plants", "proving", "report",
+        "servo", "stopping", "validation", "view",
     ),
-    "cli": ("commands", "errors"),
+    "cli": ("commands", "errors", "stopping"),
 }  # fmt: skip
 WRITERS = {
     "commands",
@@ -48,6 +50,7 @@ WRITERS = {
     "report",
     "view",
     "proving",
+    "stopping",
     "cli",
 }  # beside these only the tables of data/ open a file to write
 FAMILIES = {

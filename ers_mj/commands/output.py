@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Sequence
-from pathlib import Path
+
+from ers_mj.commands.keeping import Kept
 
 
 class Progress:
@@ -34,9 +34,10 @@ class Progress:
             sys.stderr.flush()
 
 
-def written(files: Sequence[Path]) -> list[str]:
+def written(kept: Kept) -> list[str]:
     """The lines that tell which files were written, none where there are none."""
-    return ["", bold("written"), *(f"  {path}" for path in files)] if files else []
+    title = "written, in the place of what was there" if kept.replaced else "written"
+    return ["", bold(title), *(f"  {path}" for path in kept.files)] if kept.files else []
 
 
 def bold(text: str) -> str:

@@ -5,17 +5,17 @@ truth.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import tempfile
-import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, whole
+from ers_mj import stopping
+from ers_mj.commands.keeping import Place, folder_for, keep
+from ers_mj.commands.options import add_common, add_out, number, whole
 from ers_mj.commands.output import Progress, bold, written
-from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
-from ers_mj.errors import InputError
+from ers_mj.door.saving import as_json, plain, report_writers, write_results, write_text
+from ers_mj.passing import passing
 
 if TYPE_CHECKING:
     from ers_mj.proving.conduct import Proof, Task
@@ -57,20 +57,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped."""
     if arguments.out is None and arguments.json:
-        with tempfile.TemporaryDirectory(prefix="ers-prove-") as passing:
-            return _run(Path(passing), arguments, keeps=False)
-    folder = Path(DEFAULT_OUT if arguments.out is None else arguments.out)
-    if arguments.out == "":
-        raise InputError("--out is empty, a folder was expected")
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file, --out needs a folder")
-    refuse_unwritable(folder)
-    return _run(folder, arguments, keeps=True)
+        with passing(Path(tempfile.mkdtemp(prefix="ers-prove-"))) as folder:
+            return _run(folder, arguments, None)
+    from ers_mj.proving.sealing import WRITTEN, refuse_foreign
+
+    place = folder_for(arguments.out, arguments.force, WRITTEN, may_hold=True)
+    if place.is_default and not arguments.force:
+        refuse_foreign(place.folder)
+    return _run(place.folder, arguments, place)
 
 
-def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
+def _run(folder: Path, arguments: argparse.Namespace, place: Place | None) -> int:
     tasks, settings = _tasks(arguments)
-    _heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
     from ers_mj.proving.scoring import row_of, scored
@@ -88,22 +86,22 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
                 progress=progress,
             )
     except KeyboardInterrupt:
-        kept = (
+        state = (
             f"{folder} keeps what was done, the same command goes on from there"
-            if keeps
+            if place is not None
             else "nothing was kept, --out DIR would keep it"
         )
-        print(f"ers: stopped; {kept}", file=sys.stderr)
-        return 130
+        stopping.tell(f"; {state}")
+        return stopping.STOPPED
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
     scores = scored(rows) if arguments.real is None else scored_real(rows)
     results = plain(
         {**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)}
     )
     told = _told(results)
-    files = _write(folder, results, rows, told) if keeps else []
-    print(as_json(results) if arguments.json else "\n".join([*told, *written(files)]))
-    return 0
+    kept = keep(place, lambda folder: _write(folder, results, rows, told))
+    print(as_json(results) if arguments.json else "\n".join([*told, *written(kept)]))
+    return kept.code
 
 
 def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
@@ -127,12 +125,6 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     cases = case.plans(arguments.cases or CASES, arguments.seed)
     tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in cases]
     return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(cases)}
-
-
-def _heed_terminate() -> None:
-    """Let a plain kill stop as Ctrl-C does: no diagnosis under way is left behind."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _tell(line: str) -> None:

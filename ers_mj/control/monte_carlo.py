@@ -15,6 +15,7 @@ import numpy as np
 from ers_mj.control.metrics import Measures
 from ers_mj.control.trial import Conditions, try_out
 from ers_mj.effects import BY_NAME
+from ers_mj.passing import end_with_parent
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import EffectSettings
 
@@ -142,7 +143,7 @@ def scatter(
             progress(f"servo {k + 1} of {count}", k / count)
             found[k] = _one(fleet, k, wanted, conditions)
     else:
-        with ProcessPoolExecutor(min(jobs, count)) as pool:
+        with ProcessPoolExecutor(min(jobs, count), initializer=end_with_parent) as pool:
             waiting = {pool.submit(_one, fleet, k, wanted, conditions): k for k in range(count)}
             for done, future in enumerate(as_completed(waiting), start=1):
                 found[waiting[future]] = future.result()

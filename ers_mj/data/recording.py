@@ -38,7 +38,8 @@ from ers_mj.data.formats.base import Loaded
 from ers_mj.data.inspection import Inspection, inspected
 from ers_mj.data.mapping import Source
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec, write_whole
+from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec
+from ers_mj.data.whole import write_whole
 from ers_mj.errors import InputError
 
 

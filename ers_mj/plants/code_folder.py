@@ -5,13 +5,14 @@ from __future__ import annotations
 import atexit
 import logging
 import os
-import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
+
+from ers_mj.passing import pass_with_process, remove
 
 try:
     import fcntl
@@ -37,7 +38,8 @@ def _folder(folder: Path) -> Path:
     if not refused:
         return folder
     fresh = Path(tempfile.mkdtemp(prefix="ers_mj-"))
-    atexit.register(shutil.rmtree, fresh, ignore_errors=True)
+    pass_with_process(fresh)
+    atexit.register(remove, fresh)
     logging.getLogger(__name__).warning(f"ers-mj: {refused}; compiled code is kept in {fresh} until this command ends")
     return fresh
 

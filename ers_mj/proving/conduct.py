@@ -12,6 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
+from ers_mj.passing import end_with_parent
 from ers_mj.proving.asking import LIMIT, Asker
 from ers_mj.proving.sealing import (
     answer_of,
@@ -102,8 +103,9 @@ def _make(folder: Path, tasks: Sequence[Task], jobs: int, progress: Progress) ->
 
 
 def _deaf() -> None:
-    """Leave Ctrl-C to the process that conducts."""
+    """Leave Ctrl-C to the process that conducts, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
 
 
 def _made(job: tuple[Path, Task]) -> None:

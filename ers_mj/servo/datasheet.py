@@ -19,7 +19,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ers_mj.data.tables import write_whole
+from ers_mj.data.whole import write_whole
 from ers_mj.errors import InputError
 
 # Table 1 of the paper (Energies 2020): the values of its joint simulation model, as printed but for the units
