@@ -6,10 +6,12 @@ from collections.abc import Iterable
 
 
 class ErsError(Exception):
-    """Whatever the package raises on purpose. Its text is the sentence that the command line prints."""
+    """Whatever the package raises on purpose. Its text is the sentence that the command line prints: one line, and of
+    text from a file nothing that would steer a terminal.
+    """
 
     def __init__(self, message: str):
-        super().__init__(" ".join(message.split()))
+        super().__init__("".join(c if c.isprintable() else "?" for c in " ".join(message.split())))
 
 
 class InputError(ErsError, ValueError):

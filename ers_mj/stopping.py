@@ -44,7 +44,8 @@ def guarded(run: Callable[[], int]) -> int:
         for each in SIGNALS:  # one is enough; the next would break into the end
             signal.signal(each, signal.SIG_IGN)
         # where the interrupt meets a callback or another thread's end, Python prints what it cannot raise
-        sys.unraisablehook = threading.excepthook = lambda _: None
+        sys.unraisablehook = lambda _: None
+        threading.excepthook = lambda _: None
         raise KeyboardInterrupt
 
     heeded = [each for each in SIGNALS if signal.getsignal(each) != signal.SIG_IGN]  # which nohup sets

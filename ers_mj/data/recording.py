@@ -19,7 +19,7 @@ import pyarrow as pa
 
 from ers_mj.data.checks import FEWEST_SAMPLES as FEWEST_SAMPLES
 from ers_mj.data.checks import GAP as GAP
-from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_time
+from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_still, refuse_time
 from ers_mj.data.columns import (
     COLUMNS,
     CONSTANT,
@@ -334,6 +334,8 @@ class Read:
         rows = np.arange(fields["t"].size)
         first = Sheet(name, self.kind, fields, labels, self.units, rows, step * factors["y"], self.sure)
         sheet, faults = consistent(first)
+        if faults:
+            refuse_still(sheet.y, labels["y"], name)
         seen = {field: _seen(x[sheet.rows], field, first, sheet, factors[field]) for field, x in printed.items()}
         told = [*problems_of(dict(sheet.fields), seen, labels, step), *faults, *notes]
         return {

@@ -20,6 +20,7 @@ class Clock:
     lone: int = 10  # samples: fewer at an end, beside a long gap, tell nothing
     long_gap: float = 20.0  # median steps
     fewest: int = 100  # samples that the longest part must have
+    thinnest: float = 20.0  # median steps of time a sample, all in all: what is laid out over time stays that small
 
 
 CLOCK = Clock()
@@ -63,6 +64,26 @@ def jumps(sheet: Sheet) -> Found:
         sentence = f"{what}: the {drop.size} rows on its shorter side are left out"
         faults.append(sheet.fault("time_jump", "t", drop, sentence))
         sheet = sheet.only(keep)
+
+
+def pieces(sheet: Sheet) -> Found:
+    """Where long gaps take up nearly all of the time, the longest piece between them stays."""
+    dt = np.diff(sheet.t)
+    step = float(np.median(dt))
+    if sheet.t[-1] - sheet.t[0] <= CLOCK.thinnest * step * sheet.t.size:
+        return sheet, []
+    ends = np.r_[0, np.flatnonzero(dt > CLOCK.long_gap * step) + 1, sheet.t.size]
+    longest = int(np.argmax(np.diff(ends)))
+    keep = np.arange(ends[longest], ends[longest + 1])
+    what = (
+        f"the time {sheet.labels['t']} spans {sheet.t[-1] - sheet.t[0]:.4g} s in {ends.size - 1} pieces apart, of at"
+        f" most {keep.size} samples"
+    )
+    if keep.size < CLOCK.fewest:
+        raise InputError(f"{sheet.name}: {what}, at least {CLOCK.fewest} in one piece are needed")
+    drop = np.setdiff1d(np.arange(sheet.t.size), keep)
+    sentence = f"{what}: the {drop.size} rows of the others are left out"
+    return sheet.only(keep), [sheet.fault("time_jump", "t", drop, sentence)]
 
 
 def lone_rows(sheet: Sheet) -> Found:

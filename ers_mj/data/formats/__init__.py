@@ -7,16 +7,19 @@ extra names it where it is missing.
 from __future__ import annotations
 
 import contextlib
+import gc
 import gzip
 import hashlib
 import importlib
 import io
 import os
+import sys
+import traceback
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ers_mj.data.formats.base import File, Loaded
+from ers_mj.data.formats.base import MOST, File, Loaded, refuse_large
 from ers_mj.data.tables import listed, read_content, reason
 from ers_mj.errors import ErsError, InputError
 
@@ -70,12 +73,29 @@ def _read(module: str, file: File) -> Loaded:
             return reader.load(file)
     except ErsError:
         raise
+    except MemoryError:
+        raise InputError(f"{file.name}: takes more memory than there is, cut it") from None
     except Exception as error:
+        _let_go(error)
         raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({reason(error)})") from None
+
+
+def _let_go(error: Exception) -> None:
+    """Free what a library left half made, whose end may fail once more and print that."""
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda _: None
+    try:
+        traceback.clear_frames(error.__traceback__)
+        gc.collect(1)  # it may hold itself
+    finally:
+        sys.unraisablehook = hook
 
 
 def _unpacked(content: bytes, name: str) -> bytes:
     try:
-        return gzip.decompress(content)
+        with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
+            found = file.read(MOST.size + 1)
+        refuse_large(name, size=len(found))
+        return found
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{name}: is no whole gzip file ({error})") from None

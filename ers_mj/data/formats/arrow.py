@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-from ers_mj.data.formats.base import File, Loaded, refuse_twice
+from ers_mj.data.formats.base import File, Loaded, refuse_large, refuse_twice
 from ers_mj.data.tables import reason
 from ers_mj.errors import InputError
 
@@ -31,6 +31,10 @@ def _table(file: File) -> pa.Table:
     if file.path.suffix.lower() == ".parquet":
         from pyarrow import parquet  # here alone: it takes long to import
 
+        told = parquet.ParquetFile(buffer).metadata
+        groups = (told.row_group(k).total_byte_size for k in range(told.num_row_groups))
+        refuse_large(file.name, told.num_columns, told.num_rows, sum(groups))
+        buffer.seek(0)
         return parquet.read_table(buffer)
     try:
         return pa.ipc.open_file(buffer).read_all()
