@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+P, T = ParamSpec("P"), TypeVar("T")
+LONGEST = 300  # characters of a sentence about a file
 
 
 class ErsError(Exception):
@@ -33,6 +38,23 @@ class Unwritable(InputError):
 
 class MissingPackage(ErsError, ImportError):
     """An optional package is needed for what was asked, and is not installed."""
+
+
+def brief(function: Callable[P, T]) -> Callable[P, T]:
+    """Keep the sentence of an InputError that a function raises short, whatever names and values it quotes: its
+    beginning says where, its end what was expected.
+    """
+
+    @wraps(function)
+    def called(*given: P.args, **named: P.kwargs) -> T:
+        try:
+            return function(*given, **named)
+        except InputError as error:
+            if len(text := str(error)) <= LONGEST:
+                raise
+            raise type(error)(f"{text[: LONGEST - 85]} ... {text[-80:]}") from None
+
+    return called
 
 
 def refuse_other(what: str, value: object, known: Iterable[str]) -> None:

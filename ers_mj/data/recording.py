@@ -40,7 +40,7 @@ from ers_mj.data.mapping import Source
 from ers_mj.data.sensor_faults import converter_step
 from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec
 from ers_mj.data.whole import write_whole
-from ers_mj.errors import InputError
+from ers_mj.errors import InputError, brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +143,7 @@ class Recording:
 # -- the three ways in and out --------------------------------------------------------------------------
 
 
+@brief
 def read_recording(
     path_or_spec: str | os.PathLike[str],
     mapping: Mapping[str, str] | None = None,
@@ -174,6 +175,7 @@ def read_recording(
     return _of_table(replace(loaded, table=table), asked, name, path=str(path), sha256=digest)
 
 
+@brief
 def from_columns(
     columns: Mapping[str, Any],
     mapping: Mapping[str, str] | None = None,
@@ -370,6 +372,7 @@ def _array(x: Any, field: str, name: str) -> np.ndarray:
     return array
 
 
+@brief
 def read_input(path: str | os.PathLike[str], column: str = "u_V") -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and input, each (N,), of a CSV or Parquet file with the columns t_s and ``column``.
 

@@ -41,5 +41,5 @@ def final(path: Path) -> Path:
     except FileNotFoundError:
         return file
     if not stat.S_ISREG(mode):
-        raise Unwritable(f"{path}: is {'a folder' if stat.S_ISDIR(mode) else 'no ordinary file'}, a file was expected")
+        raise Unwritable.at(path, "is a folder" if stat.S_ISDIR(mode) else "is no ordinary file")
     return file

@@ -14,6 +14,7 @@ from ers_mj.errors import InputError
 class Clock:
     """How servos are logged."""
 
+    fastest: float = 1e-7  # [s] a step of time, below which no servo is logged
     slowest: float = 0.5  # [s] a step of time, from which it is no log of a servo's motion
     usual: tuple[float, float] = (1e-4, 0.2)  # [s] the steps of one, by which a unit is guessed
     gap: float = 3.0  # median steps, above which a step is a gap
@@ -30,9 +31,14 @@ UNITS = {"ms": ("milliseconds", 1e-3), "us": ("microseconds", 1e-6), "ns": ("nan
 def scale(sheet: Sheet) -> Found:
     """Refuse a time whose steps are those of another unit."""
     step = float(np.median(np.diff(sheet.t)))
+    column = sheet.labels["t"]
+    if step < CLOCK.fastest:
+        raise InputError(
+            f"{sheet.name}: the time {column} steps by {step:.3g} s, at least {CLOCK.fastest:g} s were expected: give"
+            f' its unit as in --map "t_s={column} [min]"'
+        )
     if "t" in sheet.sure or step < CLOCK.slowest:
         return sheet, []
-    column = sheet.labels["t"]
     for unit, (words, factor) in UNITS.items():
         if CLOCK.usual[0] <= step * factor <= CLOCK.usual[1]:
             raise InputError(

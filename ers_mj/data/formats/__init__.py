@@ -69,7 +69,7 @@ def _read(module: str, file: File) -> Loaded:
     """
     reader = importlib.import_module(f"ers_mj.data.formats.{module}")
     try:
-        with contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             return reader.load(file)
     except ErsError:
         raise
