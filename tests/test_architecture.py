@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ers_mj"
 MAY_READ = {
     "errors": (),
+    "comparing": ("errors",),
     "decisions": (),
     "solvers": (),
     "data": ("decisions", "errors"),
@@ -37,8 +38,8 @@ MAY_READ = {
         "report", "selection", "servo", "validation", "view",
     ),
     "commands": (
-        "control", "data", "door", "errors", "experiment_design", "online", "plants", "proving", "report", "servo",
-        "validation", "view",
+        "comparing", "control", "data", "door", "errors", "experiment_design", "online", "plants", "proving", "report",
+        "servo", "validation", "view",
     ),
     "cli": ("commands", "errors"),
 }  # fmt: skip

@@ -6,6 +6,7 @@ frequency), output (files, JSON, lines). What is slow to import is imported insi
 
 from ers_mj.commands import (
     cache,
+    compare,
     demo,
     diagnose,
     excite,
@@ -29,6 +30,7 @@ COMMANDS = (
     validate,
     view,
     inspect,
+    compare,
     prove,
     trial,
     gains,
