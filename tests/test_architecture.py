@@ -12,6 +12,7 @@ PACKAGE = ROOT / "ers_mj"
 MAY_READ = {
     "errors": (),
     "comparing": ("errors",),
+    "workers": ("errors",),
     "decisions": (),
     "solvers": (),
     "data": ("decisions", "errors"),
@@ -31,21 +32,23 @@ MAY_READ = {
     "control": ("data", "effects", "errors", "plants", "servo"),
     "validation": ("plants", "servo"),
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
-    "proving": ("data", "errors", "plants"),
+    "proving": ("data", "errors", "plants", "workers"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "door": (
         "control", "data", "diagnosis", "effects", "errors", "estimation", "identification", "plants", "position_loop",
         "report", "selection", "servo", "validation", "view",
     ),
+    "fleet": ("data", "door", "errors", "servo", "workers"),
     "commands": (
-        "comparing", "control", "data", "door", "errors", "experiment_design", "online", "plants", "proving", "report",
-        "servo", "validation", "view",
+        "comparing", "control", "data", "door", "errors", "experiment_design", "fleet", "online", "plants", "proving",
+        "report", "servo", "validation", "view", "workers",
     ),
     "cli": ("commands", "errors"),
 }  # fmt: skip
 WRITERS = {
     "commands",
     "door",
+    "fleet",
     "report",
     "view",
     "proving",

@@ -5,6 +5,7 @@ frequency), output (files, JSON, lines). What is slow to import is imported insi
 """
 
 from ers_mj.commands import (
+    batch,
     cache,
     compare,
     demo,
@@ -31,6 +32,7 @@ COMMANDS = (
     view,
     inspect,
     compare,
+    batch,
     prove,
     trial,
     gains,

@@ -5,15 +5,13 @@ truth.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import tempfile
-import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, whole
-from ers_mj.commands.output import Progress, bold, written
+from ers_mj.commands.output import Progress, bold, heed_terminate, tell, written
 from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
 from ers_mj.errors import InputError
 
@@ -70,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     tasks, settings = _tasks(arguments)
-    _heed_terminate()
+    heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
     from ers_mj.proving.scoring import row_of, scored
@@ -84,7 +82,7 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
                 force=arguments.force or arguments.out is None,
                 jobs=arguments.jobs,
                 limit=arguments.limit,
-                tell=_tell,
+                tell=tell,
                 progress=progress,
             )
     except KeyboardInterrupt:
@@ -127,17 +125,6 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     cases = case.plans(arguments.cases or CASES, arguments.seed)
     tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in cases]
     return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(cases)}
-
-
-def _heed_terminate() -> None:
-    """Let a plain kill stop as Ctrl-C does: no diagnosis under way is left behind."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-
-
-def _tell(line: str) -> None:
-    """A line for a person while the work goes on, out of the way of --json."""
-    print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
 
 
 def _versions(proof: Proof) -> dict[str, str]:

@@ -19,12 +19,12 @@ from ers_mj.proving.sealing import (
     has_case,
     hash_of_diagnosis,
     hash_of_maker,
-    held,
     keep_answer,
     keep_case,
     opened,
     seal,
 )
+from ers_mj.workers.held import held
 
 Progress = Callable[[str, float], None]
 MAKING = 0.4  # share of the bar
@@ -69,7 +69,7 @@ def conduct(
         KeyboardInterrupt: stopped; what was made and answered is kept.
     """
     settings = {**settings, "limit_s": limit, "made_by": hash_of_maker()}
-    with held(folder):
+    with held(folder, "ers prove"):
         if begin(folder, settings, force):
             tell(f"{folder}: goes on where it was left")
         names = [task.name for task in tasks]
