@@ -29,7 +29,7 @@ MAY_READ = {
         "servo",
     ),
     "online": ("data", "estimation", "servo", "solvers"),
-    "control": ("data", "effects", "errors", "plants", "servo"),
+    "control": ("data", "effects", "errors", "plants", "servo", "workers"),
     "validation": ("plants", "servo"),
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
     "proving": ("data", "errors", "plants", "workers"),

@@ -29,6 +29,7 @@ from ers_mj.proving.sampling import Setup
 from ers_mj.proving.strength import nearest
 from ers_mj.report import proof_report
 from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.workers.base import Task
 from ers_mj.workers.held import held
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
@@ -200,7 +201,7 @@ def made(name, seed):
     }
 
 
-TASKS = [conduct.Task(f"case-{k:03d}", made, (f"case-{k:03d}", k)) for k in (1, 2, 3)]
+TASKS = [Task(f"case-{k:03d}", made, (f"case-{k:03d}", k)) for k in (1, 2, 3)]
 SETTINGS = {"kind": "simulated", "seed": 1, "cases": 3}
 COST = {"exit": 0, "wall_s": 2.0, "cpu_s": 1.0, "peak_MiB": 100.0}
 

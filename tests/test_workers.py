@@ -6,9 +6,13 @@ import time
 from pathlib import Path
 
 import pytest
-from stub_tasks import ended_always, ended_once, refused, squared
+from stub_tasks import ended_always, ended_once, made_case, refused, squared
 
+from ers_mj.control.monte_carlo import Fleet, scatter
+from ers_mj.control.trial import Conditions
+from ers_mj.door.known import known
 from ers_mj.errors import ErsError, InputError
+from ers_mj.proving.conduct import conduct
 from ers_mj.workers.base import Task
 from ers_mj.workers.hiring import crew
 
@@ -149,3 +153,26 @@ def test_a_worker_of_another_version_is_refused(tmp_path, touch, sentence):
         init.write(touch)
     with Cluster(1, (tmp_path,)) as other, pytest.raises(InputError, match=sentence):
         crew(1, other.address)
+
+
+def test_a_monte_carlo_is_the_same_on_a_cluster(cluster, tmp_path):
+    """With a reference from a file, which the workers do not have."""
+    rows = ["t_s,theta_ref_deg", *(f"{k / 1000},{15 + (k > 20)}" for k in range(150))]
+    (tmp_path / "mine.csv").write_text("\n".join(rows))
+    asked = (["pid"], ["reduced"], ["step", str(tmp_path / "mine.csv")], Conditions(rate_hz=1000.0))
+    fleet, hired = Fleet(known("table1"), 3, 1.2), crew(1, cluster.address)
+    assert scatter(fleet, *asked, crew=hired) == scatter(fleet, *asked)
+    hired.close()
+
+
+def test_a_proof_is_the_same_on_a_cluster(cluster, tmp_path):
+    """Cases made and answered there, by a diagnosis that refuses what is no recording."""
+    tasks = [Task(f"case-{k:03d}", made_case, (f"case-{k:03d}", k)) for k in (1, 2)]
+    proofs = []
+    for hired, name in ((crew(1, cluster.address), "there"), (crew(1), "here")):
+        proofs.append(conduct(tmp_path / name, tasks, {"kind": "simulated"}, crew=hired))
+        hired.close()
+    there, here = proofs
+    assert (there.truths, there.sha256) == (here.truths, here.sha256)
+    told = [{name: (x["error"], x["document"]) for name, x in proof.answers.items()} for proof in proofs]
+    assert told[0] == told[1] and "ers: rec1.csv" in told[0]["case-001"][0]

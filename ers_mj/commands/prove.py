@@ -7,16 +7,18 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, whole
+from ers_mj.commands.options import DEFAULT_OUT, add_cluster, add_common, add_out, crew_of, number, whole
 from ers_mj.commands.output import Progress, bold, heed_terminate, tell, written
 from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.proving.conduct import Proof, Task
+    from ers_mj.proving.conduct import Proof
+    from ers_mj.workers.base import Task
 
 CASES = 20  # of a proof that names no number
 
@@ -47,6 +49,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)"
     )
+    add_cluster(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -74,13 +77,13 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     from ers_mj.proving.scoring import row_of, scored
 
     try:
-        with Progress() as progress:
+        with closing(crew_of(arguments)) as hired, Progress() as progress:
             proof = conduct(
                 folder,
                 tasks,
                 settings,
                 force=arguments.force or arguments.out is None,
-                jobs=arguments.jobs,
+                crew=hired,
                 limit=arguments.limit,
                 tell=tell,
                 progress=progress,
@@ -106,7 +109,7 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
 
 def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     """The cases to be made, and what names this proof."""
-    from ers_mj.proving.conduct import Task
+    from ers_mj.workers.base import Task
 
     if arguments.real is not None:
         from ers_mj.proving import real
