@@ -11,6 +11,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ers_mj.commands.contest import add_contest, exported, scored, wanted
 from ers_mj.commands.options import DEFAULT_OUT, add_cluster, add_common, add_out, crew_of, number, whole
 from ers_mj.commands.output import Progress, bold, heed_terminate, tell, written
 from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
@@ -37,7 +38,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ),
         epilog=(
             "examples:\n  ers prove --cases 40 --seed 7 --out proof\n  ers prove --real ../shared/data --cases 15 --out"
-            " proof-real"
+            " proof-real\n  ers prove --cases 20 --export cases\n  ers prove --score answers --truth cases.truth.json"
         ),
     )
     parser.add_argument("--cases", type=whole(1), metavar="N", help=f"how many (default {CASES})")
@@ -49,14 +50,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)"
     )
+    add_contest(parser)
     add_cluster(parser)
     add_out(parser)
     add_common(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, seed=None)  # cases for others are drawn by chance
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped."""
+    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped. Or what others are handed, and scored."""
+    if wanted(arguments):
+        return exported(arguments, _tasks) if arguments.export is not None else scored(arguments, _shown)
+    arguments.seed = arguments.seed or 0
     if arguments.out is None and arguments.json:
         with tempfile.TemporaryDirectory(prefix="ers-prove-") as passing:
             return _run(Path(passing), arguments, keeps=False)
@@ -74,7 +79,8 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
-    from ers_mj.proving.scoring import row_of, scored
+    from ers_mj.proving.scoring import row_of
+    from ers_mj.proving.scoring import scored as scored_simulated
 
     try:
         with closing(crew_of(arguments)) as hired, Progress() as progress:
@@ -97,12 +103,11 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
         print(f"ers: stopped; {kept}", file=sys.stderr)
         return 130
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
-    scores = scored(rows) if arguments.real is None else scored_real(rows)
+    scores = scored_simulated(rows) if arguments.real is None else scored_real(rows)
     results = plain(
         {**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)}
     )
-    told = _told(results)
-    files = _write(folder, results, rows, told) if keeps else []
+    told, files = _shown(folder if keeps else None, results, rows)
     print(as_json(results) if arguments.json else "\n".join([*told, *written(files)]))
     return 0
 
@@ -135,6 +140,12 @@ def _versions(proof: Proof) -> dict[str, str]:
 
     answers = (answer.get("document") or {} for answer in proof.answers.values())
     return {"ers-mj": __version__, **next((a["versions"] for a in answers if a.get("versions")), {})}
+
+
+def _shown(folder: Path | None, results: dict, rows: list[dict]) -> tuple[list[str], list[Path]]:
+    """The lines of a terminal, and what was written of them."""
+    told = _told(results)
+    return told, _write(folder, results, rows, told) if folder is not None else []
 
 
 def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> list[Path]:
