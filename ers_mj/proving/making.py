@@ -84,11 +84,11 @@ def context_of(bench: Bench) -> dict:
 
 
 def _winding(bench: Bench, labels: tuple[str, ...]) -> tuple[str, ...]:
-    """The names of an ordinary winding whose time constant shows above the faintest that is concealed."""
+    """The names of an ordinary winding whose time constant shows as much as the faintest that is concealed."""
     if bench.servo.closed or not bench.ordinary_inductance or set(LATE) & set(labels):
         return ()
     twice = {"label": "inductance", "strength": 2.0 * bench.ordinary_inductance, "shape": {}}
-    return LATE if bench.projected([twice]) > VISIBILITY.barely else ()
+    return LATE if bench.projected([twice]) > VISIBILITY.least else ()
 
 
 # -- files -----------------------------------------------------------------------------------------------------------
@@ -208,4 +208,5 @@ def loop_of(servo: Servo) -> dict[str, float]:
         "tau_s": servo.latency,
     }
     limits = [speed_limit(effect) * a for effect in record.inherent if effect["label"] == "rate_limit"]
+    out = {name: float(x) for name, x in out.items()}
     return out | {"a_2+D": out["a_2"] + out["D"], "c_2/K": out["c_2"] / out["K"]} | ({"R": limits[0]} if limits else {})
