@@ -58,7 +58,7 @@ RIGS = {
     "throttle": Rig(
         "Electronic throttle, 25 s to 63 s",
         "ers diagnose throttle/aprbs_25s.csv --holdout throttle/aprbs_63s.csv",
-        "A preloaded return spring with a limp-home place at 4.42 V, wide stiction, hard stops at 0.702 and about 4.50 V"
+        "A preloaded return spring with a limp-home place at 4.42 V, wide stiction, hard stops at 0.702 and 4.50 V"
         " (University of Kassel). Units are duty and sensor volts; more duty lowers the reading.",
         "None on this split.",
         _files("throttle/aprbs_25s.csv"),
