@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -122,6 +122,32 @@ def portable(
     )
 
 
+def bare(p: Portable, numbers: Mapping[str, float], drive: Table | None = None) -> Portable:
+    """The same with other numbers, without laws and without a sensor of its own; the drive a clip, or nothing."""
+    drive, sensor = drive or _straight(), _straight()
+    plain = {"T_sensor": 0.0, "late_sensor": 0.0}
+    return replace(
+        p,
+        numbers={**p.numbers, **numbers, **plain},
+        constants={},
+        remembering=(),
+        drive=drive,
+        sensor=sensor,
+        laws=_laws((), False, drive, sensor),
+        left_out=(),
+    )
+
+
+def clipping(limit: float) -> Table:
+    """A drive that does nothing but clip its input."""
+    at = np.array([-2.0, -1.0, 1.0, 2.0]) * limit
+    return Table(at, np.clip(at, -limit, limit))
+
+
+def _straight() -> Table:
+    return Table(np.array([-1.0, 1.0]), np.array([-1.0, 1.0]))
+
+
 # -- numbers ----------------------------------------------------------------------------------------------------------
 
 
@@ -207,10 +233,9 @@ def _travel(c: Coefficients) -> float:
 
 def _table(curve: Callable[[np.ndarray], np.ndarray], reach: float) -> Table:
     """Points of a curve over +-reach, halved until what lies straight between two is within 1e-6 of it."""
-    at = np.array([-reach, 0.0, reach])
-    if np.array_equal(curve(at), at) and np.allclose(curve(np.linspace(-reach, reach, 1001)[1:-1] * 0.997),
-                                                     np.linspace(-reach, reach, 1001)[1:-1] * 0.997, rtol=0, atol=0):
-        return Table(at[[0, 2]], at[[0, 2]])
+    points = 0.997 * np.linspace(-reach, reach, 1001)
+    if np.array_equal(curve(points), points):
+        return _straight()
     at = np.linspace(-reach, reach, 257)
     for _ in range(22):
         middle = 0.5 * (at[1:] + at[:-1])

@@ -10,7 +10,7 @@ from string import Template
 import numpy as np
 
 from ers_mj.export.base import Servo, Target, Written
-from ers_mj.export.portable import STATE, WITHIN
+from ers_mj.export.portable import STATE, WITHIN, Portable
 
 PADE = 4  # order of the approximations that stand for dead times in linear()
 NOT_RECORDED = (
@@ -25,14 +25,14 @@ class PythonControl(Target):
     name, file, tool = "control", "model_control.py", "python-control"
 
     def write(self, servo: Servo) -> Written:
-        content = _filled(servo)
-        return Written(content.encode(), (*servo.portable.left_out, *_linear_losses(servo), NOT_RECORDED))
+        return Written(module_of(servo, servo.portable).encode(), (*servo.portable.left_out, *_linear_losses(servo), NOT_RECORDED))
 
 
-def _filled(servo: Servo) -> str:
+def module_of(servo: Servo, p: Portable) -> str:
+    """The module's text, of a servo with these numbers and laws."""
     from ers_mj import __version__
 
-    p, (into, out) = servo.portable, servo.signals
+    into, out = servo.signals
     values = {
         "title": f"{servo.name}: a servo's model, for python-control.",
         "version": __version__,
