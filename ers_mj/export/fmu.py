@@ -13,14 +13,17 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 from xml.sax.saxutils import quoteattr
 
-from ers_mj.export.base import Servo, Target, Written
+import numpy as np
+
+from ers_mj.export.base import Target, Written
 from ers_mj.export.portable import STATE, WITHIN
+from ers_mj.export.servo import Servo
 from ers_mj.export.translation import translated
 
 TUNABLE = (
@@ -31,7 +34,7 @@ FIRST = 4  # reference of the first of these: input, output, speed and start com
 STEP = 1e-3  # [s] of communication that is suggested
 HELD = "the input is held within a communication step and taken in at its end: choose the step as your samples are"
 SOURCE_ONLY = (
-    "no C compiler was here: model.fmu holds source alone, which `fmpy compile model.fmu` or the importing tool compiles"
+    "no C compiler was here: model.fmu holds source alone, which `fmpy compile` or the importing tool compiles"
 )
 ROUNDED = "the delay is kept in steps: it is stretched for as long as it lasts where the communication step changes"
 
@@ -54,7 +57,9 @@ class Fmu(Target):
 
 def tunable(servo: Servo) -> list[str]:
     """The numbers that an FMI tool may change."""
-    return [name for name in TUNABLE if 0.0 != servo.portable.numbers[name] and math.isfinite(servo.portable.numbers[name])]
+    return [
+        name for name in TUNABLE if 0.0 != servo.portable.numbers[name] and math.isfinite(servo.portable.numbers[name])
+    ]
 
 
 def source_of(servo: Servo) -> str:
@@ -66,23 +71,14 @@ def source_of(servo: Servo) -> str:
     scalars = {**p.numbers, **{f"{name}_kept": float(n) for name, n in kept.items()}}
     arrays = {**p.tables, **{name: x for name, x in p.constants.items() if name not in p.remembering}}
     fixed = {name: p.constants[name] for name in p.remembering}
-    state = [*(f"    double {name};" for name in (*STATE, *WITHIN)), *(f"    double {n}[{k}];" for n, k in kept.items())]
-    state += [f"    double {name}[{x.size}];" for name, x in fixed.items()]
     values = {
         "title": f"{servo.name}: a servo's model, {servo.signals[0]} in, {servo.signals[1]} out.",
         "version": __version__,
         "step": repr(p.step),
         "rest": repr(servo.rest),
-        "servo_fields": "\n".join(
-            [*(f"    double {n};" for n in scalars), *(f"    double {n}[{x.size}];" for n, x in arrays.items())]
-        ),
-        "state_fields": "\n".join(state),
-        "servo_values": "\n".join(
-            [
-                *(f"    .{n} = {_number(x)}," for n, x in scalars.items()),
-                *(f"    .{n} = {{{', '.join(map(_number, x))}}}," for n, x in arrays.items()),
-            ]
-        ),
+        "servo_fields": _fields(scalars, {name: x.size for name, x in arrays.items()}),
+        "state_fields": _fields((*STATE, *WITHIN), {**kept, **{name: x.size for name, x in fixed.items()}}),
+        "servo_values": _values(scalars, arrays),
         "remembering": "\n".join(
             f"    i->x.{name}[{k}] = {_number(v)};" for name, x in fixed.items() for k, v in enumerate(x) if v != 0.0
         ),
@@ -92,6 +88,15 @@ def source_of(servo: Servo) -> str:
         "guid": "$guid",
     }
     return Template((files("ers_mj.export") / "fmi2.txt").read_text(encoding="utf-8")).substitute(values)
+
+
+def _fields(scalars: Iterable[str], arrays: Mapping[str, int]) -> str:
+    return "\n".join(f"    double {text};" for text in (*scalars, *(f"{name}[{n}]" for name, n in arrays.items())))
+
+
+def _values(scalars: Mapping[str, float], arrays: Mapping[str, np.ndarray]) -> str:
+    lines = [f"    .{name} = {_number(x)}," for name, x in scalars.items()]
+    return "\n".join([*lines, *(f"    .{name} = {{{', '.join(map(_number, x))}}}," for name, x in arrays.items())])
 
 
 def _number(x: float) -> str:
@@ -135,7 +140,7 @@ def _description(servo: Servo, guid: str) -> str:
 
 
 def _variable(name: str, reference: int, causality: str, variability: str, start: str, unit: str, said: str) -> str:
-    told = f' unit={quoteattr(unit)}' if unit else ""
+    told = f" unit={quoteattr(unit)}" if unit else ""
     return (
         f'<ScalarVariable name={quoteattr(name)} valueReference="{reference}" causality="{causality}"'
         f' variability="{variability}" description={quoteattr(said)}><Real{told} {start}/></ScalarVariable>'

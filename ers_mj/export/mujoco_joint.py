@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ers_mj.export.base import Servo, Target, Written
+from ers_mj.export.base import Target, Written
 from ers_mj.export.portable import Portable, bare, clipping
+from ers_mj.export.servo import Servo
 from ers_mj.export.trying import apart, excitation, response
 from ers_mj.plants.joint import JointLines, clip_of, joint_lines, pushed
 from ers_mj.plants.looped_mujoco import firmware_alone
@@ -22,8 +23,8 @@ INTEGRATED = (
     " damping, from a timestep of a tenth of J / damping on"
 )
 INVERSE = (
-    "stops, and friction below breakaway, are as stiff as written against J alone: in a robot they scale with its inertia"
-    " at the joint (dof_invweight0)"
+    "stops, and friction below breakaway, are as stiff as written against J alone: in a robot they scale with its"
+    " inertia at the joint (dof_invweight0)"
 )
 WEIGHTS = "the bodies of your robot bring their own weight: give them the masses and centres that they have"
 LATE = "the delay is written half a timestep less than a whole number of steps: MuJoCo's clock would add one at times"
@@ -107,11 +108,12 @@ class OwnJoint:
         lines, hinge = self.lines.xml, ' axis="0 1 0"'
         joint = next(line for line in lines.splitlines() if line.startswith("<joint")).replace("/>", f"{hinge}/>")
         actuator = next(line for line in lines.splitlines() if line.startswith("<actuator"))
-        size = repr(NEGLIGIBLE * self.inertia)
-        told = "\n".join(f"     {sentence.replace('--', '- -')}" for sentence in self.lines.left_out) or "     nothing"
-        return f"""<!-- {self.servo.name.replace('--', '- -')} as a joint and its actuator, written by ers-mj: copy the two marked lines.
-     They do not carry:
-{told} -->
+        size, name = repr(NEGLIGIBLE * self.inertia), self.servo.name.replace("--", "- -")
+        told = [sentence.replace("--", "- -") for sentence in self.lines.left_out] or ["nothing"]
+        lost = "\n".join(f"     {sentence}" for sentence in told)
+        return f"""<!-- {name} as a joint and its actuator, written by ers-mj.
+     Copy the two marked lines; they do not carry:
+{lost} -->
 <mujoco model="servo">
   <compiler angle="radian" autolimits="true"/>
   <option timestep="{self.timestep!r}" integrator="implicitfast" gravity="0 0 0"/>
@@ -162,8 +164,8 @@ class OwnJoint:
         off = apart(self.follow(t, u), response(self.servo, self.carried, t, u))
         rest = "the model with that switched off" if self.lines.left_out else "the model"
         return (
-            f"measured: at a timestep of {1e3 * self.timestep:g} ms MuJoCo {_version()} is {100.0 * off:.2g} % of the RMS"
-            f" from {rest}, soft friction and stops included"
+            f"measured: at a timestep of {1e3 * self.timestep:g} ms MuJoCo {_version()} is {100.0 * off:.2g} % of the"
+            f" RMS from {rest}, soft friction and stops included"
         )
 
 

@@ -122,18 +122,26 @@ def portable(
     )
 
 
-def bare(p: Portable, numbers: Mapping[str, float], drive: Table | None = None) -> Portable:
-    """The same with other numbers, without laws and without a sensor of its own; the drive a clip, or nothing."""
-    drive, sensor = drive or _straight(), _straight()
-    plain = {"T_sensor": 0.0, "late_sensor": 0.0}
+def bare(
+    p: Portable,
+    numbers: Mapping[str, float],
+    drive: Table | None = None,
+    kept: Sequence[Effect] = (),
+    sensor: Table | None = None,
+) -> Portable:
+    """The same with other numbers and the laws of these effects alone; drive and sensor as given, or straight. A sensor
+    that is not given is at once.
+    """
+    homes, at_once = {f"law_{effect.name}" for effect in kept}, {"T_sensor": 0.0, "late_sensor": 0.0}
+    drive, read = drive or _straight(), sensor or _straight()
     return replace(
         p,
-        numbers={**p.numbers, **numbers, **plain},
-        constants={},
+        numbers={**p.numbers, **numbers, **({} if sensor else at_once)},
+        constants={name: x for name, x in p.constants.items() if name in homes},
         remembering=(),
         drive=drive,
-        sensor=sensor,
-        laws=_laws((), False, drive, sensor),
+        sensor=read,
+        laws=_laws(kept, False, drive, read),
         left_out=(),
     )
 
@@ -264,18 +272,7 @@ def _thinned(at: np.ndarray, to: np.ndarray, near: float) -> Table:
 
 def _laws(acting: Sequence[Effect], parted: bool, drive: Table, sensor: Table) -> str:
     """The functions that scheme.py calls, and the laws that they call."""
-    owned = [
-        renamed(getattr(effect, kind).py_func, f"{kind}_{effect.name}")
-        for effect in acting
-        for kind in ("torque", "friction", "memory")
-        if getattr(effect, kind)
-    ]
-    heavy = [effect for effect in acting if effect.inertia]
-    owned += [
-        renamed(effect.inertia.py_func, f"{kind}_{effect.name}", part)  # type: ignore[attr-defined]
-        for effect in heavy
-        for part, kind in enumerate(("inertia", "half_slope"))
-    ]
+    owned, heavy = _owned(acting), [effect for effect in acting if effect.inertia]
     at_load = [e for e in acting if e.torque and not (parted and e.at_motor)]
     at_motor = [e for e in acting if e.torque and parted and e.at_motor]
     rubbing = [e for e in acting if e.friction]
@@ -290,6 +287,20 @@ def _laws(acting: Sequence[Effect], parted: bool, drive: Table, sensor: Table) -
         _mapped("sensor_law", "y", sensor, "sensor"),
     ]
     return "\n\n\n".join([*owned, *glue]) + "\n"
+
+
+def _owned(acting: Sequence[Effect]) -> list[str]:
+    """The laws' own texts, of an inertia two functions."""
+    texts = [
+        renamed(getattr(effect, kind).py_func, f"{kind}_{effect.name}")
+        for effect in acting
+        for kind in ("torque", "friction", "memory")
+        if getattr(effect, kind)
+    ]
+    for effect in acting:
+        for part, kind in enumerate(("inertia", "half_slope") if effect.inertia else ()):
+            texts.append(renamed(effect.inertia.py_func, f"{kind}_{effect.name}", part))  # type: ignore[union-attr]
+    return texts
 
 
 def _home(effect: Effect) -> str:

@@ -9,8 +9,9 @@ from string import Template
 
 import numpy as np
 
-from ers_mj.export.base import Servo, Target, Written
+from ers_mj.export.base import Target, Written
 from ers_mj.export.portable import STATE, WITHIN, Portable
+from ers_mj.export.servo import Servo
 
 PADE = 4  # order of the approximations that stand for dead times in linear()
 NOT_RECORDED = (
@@ -25,7 +26,9 @@ class PythonControl(Target):
     name, file, tool = "control", "model_control.py", "python-control"
 
     def write(self, servo: Servo) -> Written:
-        return Written(module_of(servo, servo.portable).encode(), (*servo.portable.left_out, *_linear_losses(servo), NOT_RECORDED))
+        return Written(
+            module_of(servo, servo.portable).encode(), (*servo.portable.left_out, *_linear_losses(servo), NOT_RECORDED)
+        )
 
 
 def module_of(servo: Servo, p: Portable) -> str:

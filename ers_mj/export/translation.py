@@ -133,6 +133,7 @@ def _attribute(node: ast.Attribute) -> str:
 
 
 def _constant(node: ast.Constant) -> str:
+    assert isinstance(node.value, int | float)
     return "INFINITY" if node.value == math.inf else repr(float(node.value))
 
 
@@ -153,9 +154,7 @@ def _binary(node: ast.BinOp) -> str:
 
 def _compare(node: ast.Compare) -> str:
     sides = [node.left, *node.comparators]
-    parts = [
-        f"{_c(a)} {OPERATORS[type(op)]} {_c(b)}" for a, op, b in zip(sides[:-1], node.ops, sides[1:], strict=True)
-    ]
+    parts = [f"{_c(a)} {OPERATORS[type(op)]} {_c(b)}" for a, op, b in zip(sides[:-1], node.ops, sides[1:], strict=True)]
     return f"({' && '.join(parts)})"
 
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ers_mj.export.base import Servo
 from ers_mj.export.portable import Portable
 from ers_mj.export.python_control import module_of
+from ers_mj.export.servo import Servo
 
 RATE_HZ, DURATION = 1000.0, 4.0  # [Hz], [s] of the excitation
 SLOW, FAST = (0.5, 0.7), (2.3, 0.3)  # (frequency [Hz], share of the amplitude) of its sines

@@ -5,7 +5,7 @@ With J the inertia at the joint, on its angle theta (one body, output units):
 
     armature J less the bodies' own, damping J (a_mech [+ a_emf]), frictionloss J c_2, stiffness J a_1 about theta_0
     motor: torque J b u, the back-EMF in the damping;   dcmotor: the same with the winding's time constant
-    range: stops as spring-dampers that do not pull; a constant torque and friction that differs by direction move springref
+    range: stops as spring-dampers; a constant torque, and friction that differs by direction, move springref
 
 Numbers are written as Python repeats them, 17 digits where needed. `dampratio` is never written: MuJoCo turns it into a
 number of the model that it stands in.
