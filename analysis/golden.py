@@ -41,6 +41,10 @@ SHARED = Path(__file__).resolve().parents[2] / "shared"
 DECIDING = ("tuning", "seeds", "foreign", "rigs")
 COMMIT, SEED = "581c791", 4201
 
+# rules that the older commit did not have, each with the value at which it decides nothing: what they change is told
+# apart
+SINCE = {"far_off": np.inf, "pays": -1.0}
+
 
 def tables(sets: list[str]) -> Iterator[tuple[str, dict]]:
     """The cases of these sets that were answered, by SET/CASE."""
@@ -133,9 +137,13 @@ def kept(row: dict, folds: dict, name: str, policy: Policy) -> bool:
         log_ratio=number(judged["log_ratio"]),
     )
     excluded = any(row.get(key) for key in ("may_be_none", "a_converters", "any_wave"))
-    again = {"after": 1.0, "before": 0.0} | (row.get("recalibrated") or {})  # without errors: nothing to recalibrate
-    halved = again["after"] ** 2 < policy.half * again["before"] ** 2
-    return confirmation.is_confirmed(held, lambda: halved, policy) and not excluded
+    again = row.get("recalibrated") or {}
+
+    def recalibrated() -> tuple[float, float] | None:
+        return (again["after"], again["before"]) if {"after", "before"} <= again.keys() else None
+
+    worth = row["once"] or confirmation.pays(held, recalibrated, policy)
+    return confirmation.is_confirmed(held, recalibrated, policy) and worth and not excluded
 
 
 def chance_of(pool: dict, row: dict, policy: Policy) -> float:
@@ -202,10 +210,16 @@ def changed(sets: list[str], policy: Policy) -> list[tuple[str, str, object, obj
 
 
 def replay(arguments: argparse.Namespace) -> int:
-    policy = replace(POLICY, **dict(named(arguments.policy)))
+    asked_for = dict(named(arguments.policy))
+    policy = replace(POLICY, **(SINCE | asked_for))
     begun, found = time.perf_counter(), changed(arguments.sets, policy)
     for case, what, was, now in found:
         print(f"{case}: {what}: {now}, not {was}")
+    for name in SINCE.keys() - asked_for.keys():
+        then = changed(arguments.sets, replace(policy, **{name: getattr(POLICY, name)}))
+        new = [one for one in then if one[:2] not in {old[:2] for old in found}]
+        for case, what, was, now in new:
+            print(f"since, by {name}: {case}: {what}: {now}, not {was}")
     counts = Counter(case.split("/")[0] for case, _ in tables(arguments.sets))
     total = sum(1 for _, table in tables(arguments.sets) for _ in decisions(table, policy))
     cases = ", ".join(f"{count} of {name}" for name, count in counts.items())

@@ -1,6 +1,7 @@
 """What held-out data confirms, and what few samples, a converter or any remainder would show."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit
 from ers_mj.selection.confirmation import confirmed, delta_bic, is_a_converters, is_any_wave, may_be_none
-from ers_mj.selection.cross_validation import Score, folds, halves
+from ers_mj.selection.cross_validation import Score, folds, halves, scored
 from ers_mj.selection.stepwise import Selection
 
 
@@ -53,6 +54,16 @@ def test_an_effect_is_judged_on_recordings_of_another_day():
     for laws, kept in (([("bias_torque", np.array([3.0]))], True), ((), False)):
         selection, told = confirmed(start, named, [trace("chirp", laws, seed=5, t=SPARSE)], 1)
         assert bool(selection.chosen.model.names) is kept and told.parts[0].training is None
+
+
+def test_what_a_refit_alone_buys_is_not_counted_for_an_effect(plain):
+    """A baseline that rests far from its optimum: the answer's own parameters without the effect are the better one."""
+    far = replace(plain.fit.model, values={**plain.fit.model.values, "b": 0.7 * plain.fit.model.values["b"]})
+    poor = replace(plain, fit=replace(plain.fit, model=far))
+    selection, told = confirmed(poor, chosen(plain, "quadratic_drag", [0.01, np.inf]), [], 1)
+    assert not selection.chosen.model.names  # all of what it seemed to explain was the refit's
+    left = [scored(fit.model, plain.traces[0]).rmse for fit in (told.base, poor.fit)]
+    assert left[0] < 0.5 * left[1]
 
 
 def test_folds_and_halves_leave_out_what_is_judged(plain):

@@ -6,7 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, is_doubtful, is_no_closer, paired_p
+from ers_mj.decisions.confirmation import (
+    HeldOut,
+    Won,
+    is_confirmed,
+    is_doubtful,
+    is_no_closer,
+    is_no_size,
+    paired_p,
+    pays,
+)
 from ers_mj.decisions.thresholds import POLICY
 
 HELD = HeldOut(p=0.2, rmse=(0.6, 1.0), noise=0.1, cost=(10.0, 20.0), ratio=0.6, log_ratio=math.log(0.6))
@@ -35,9 +44,41 @@ def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks(ratio, log_ratio, p,
 
 def test_what_holds_once_another_day_is_known_is_confirmed():
     lost = replace(HELD, rmse=(1.0, 1.0))
-    assert is_confirmed(lost, lambda: True) and not is_confirmed(lost, lambda: False)
-    assert not is_confirmed(replace(lost, rmse=(1.4, 1.0)), never)  # not where its free runs are worse
+    assert is_confirmed(lost, lambda: (0.7, 1.0)) and not is_confirmed(lost, lambda: (0.8, 1.0))
+    assert not is_confirmed(lost, lambda: None) and not is_confirmed(
+        replace(lost, rmse=(1.4, 1.0)), never
+    )  # not where its free runs are worse
     assert is_confirmed(replace(HELD, p=0.01), never)
+
+
+@pytest.mark.parametrize(
+    "with_it, without, worth",
+    [
+        (2.0, 2.05, False),  # squares above a noise of 1: 3.0 and 3.2
+        (2.0, 2.1, True),
+        (0.9, 0.95, True),  # nothing above the noise either way: the blocks decide
+        (0.9, 1.1, True),
+    ],
+)
+def test_a_name_must_be_worth_a_share_of_the_error_above_the_noise(with_it, without, worth):
+    assert pays(replace(HELD, p=0.01, rmse=(with_it, without), noise=1.0, log_ratio=0.0), lambda: None) is worth
+
+
+def test_a_run_that_forks_does_not_make_a_name_worthless_beyond_doubt():
+    forked = replace(HELD, rmse=(9.0, 2.0), noise=1.0, log_ratio=math.log(0.5))
+    assert pays(replace(forked, p=1e-9), never) and not pays(replace(forked, p=0.01), lambda: None)
+
+
+def test_where_the_rig_has_changed_a_name_is_worth_what_it_is_once_the_day_is_known():
+    swamped = replace(HELD, p=0.01, rmse=(2.0, 2.0), noise=1.0, log_ratio=0.0)
+    assert pays(swamped, lambda: (1.5, 2.0)) and not pays(swamped, lambda: (2.0, 2.01))
+
+
+@pytest.mark.parametrize(
+    "ends, told", [((-0.1, 0.3), False), ((0.1, 0.3), True), ((1e-6, 1.0), False), ((-2.0, -1.0), True)]
+)
+def test_an_interval_across_zero_or_decades_is_no_size(ends, told):
+    assert is_no_size(*ends) is not told
 
 
 def test_losses_alone_tell_the_scatter_of_chance():

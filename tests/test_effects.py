@@ -205,9 +205,7 @@ def test_a_torque_too_slow_for_cogging_is_the_gears(pushed):
 
 
 def test_a_torque_that_returns_must_be_seen_to_return(pushed):
-    """Less than a period of it is any smooth torque; with a second harmonic even a whole one is. A friction that
-    changes along the travel may be slower.
-    """
+    """Two periods of it: less is any smooth torque. A friction that changes along the travel may be slower."""
     model, ripple = pushed.fit.model, BY_NAME["transmission_ripple"]
     travel = 2.0 * model.scales.position
     longest = {
@@ -220,7 +218,7 @@ def test_a_torque_that_returns_must_be_seen_to_return(pushed):
             ("position_dependent_friction", [1.0, np.inf, np.inf, 0.1, 0.0]),
         )
     }
-    assert longest["cogging"] == longest["transmission_ripple"] == pytest.approx(1 / 0.95) and longest[
+    assert longest["cogging"] == longest["transmission_ripple"] == pytest.approx(1 / 2) and longest[
         "position_dependent_friction"
     ] == pytest.approx(1.25)
     assert [

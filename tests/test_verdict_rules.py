@@ -118,3 +118,11 @@ def test_a_share_lies_between_nothing_and_all():
     assert rules.share(10.0, 2.0, 1.0) == pytest.approx(8.0 / 9.0)
     assert rules.share(10.0, 20.0, 1.0) == 0.0 == rules.share(0.5, 0.1, 1.0)
     assert rules.share(10.0, 0.5, 1.0) == 1.0
+
+
+@pytest.mark.parametrize("names", [("stribeck",), ()])
+def test_held_out_error_far_above_the_noise_is_a_mismatch_that_is_left(names):
+    """The contract's three noise floors, whatever memory tells and however much is explained."""
+    case = replace(RIGHT if names else NONE, explained=0.99 if names else 0.0, free_held=3.1)
+    assert rules.is_more_left(case) and not rules.is_more_left(replace(case, free_held=2.9))
+    assert rules.verdict(case) == ("missing_physics" if names else "unexplained")

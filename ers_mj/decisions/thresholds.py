@@ -260,6 +260,18 @@ class Policy:
     half: float = _threshold(
         0.5, "share of squared error above the noise", "a verdict that accounts for less", "the contract"
     )
+    pays: float = _threshold(
+        0.1,
+        "share of squared held-out error above the noise",
+        "a name that could be left out: without it, refitted, the error must rise by as much",
+        "what a name is asked to be worth",
+    )
+    unsure: float = _threshold(
+        100.0, "end over end of an interval", "a size that nothing tells", "two decades are no size"
+    )
+    far_off: float = _threshold(
+        3.0, "noise levels of held-out error", "a mismatch that the observer does not see", "the contract"
+    )
     many_periods: int = _threshold(
         10,
         "starts",
@@ -341,9 +353,6 @@ class Policy:
         20.0, "half blocks times ln of squared errors' ratio, less Schwarz's price", "a name on a clean servo",
         "the best rival on 15 clean servos gained 17; at 5 seven of 15 are false",
     )  # fmt: skip
-    loop_wrong: float = _threshold(
-        3.0, "noise levels of held-out error", "a mismatch passed over beside names", "the contract"
-    )
     loop_integral: float = _threshold(
         0.05, "1/s, I over K", "integral action that is not there", "of 16 PD loops all refitted below 0.005"
     )

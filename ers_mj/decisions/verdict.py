@@ -33,7 +33,7 @@ class Findings(Protocol):
     ``names`` are the effects of the model, ``sensors`` those that show in the data itself, ``suspects`` the laws
     without a name that act here; ``explained`` is the share of the squared held-out error that goes with the names,
     ``left_before`` and ``left`` what memory tells without and with them, ``left_elsewhere`` the same in the recordings
-    but the worst, ``free_held`` the held-out free-run error after and ``least_astray`` the smallest of a recording
+    but the worst, ``free_held`` the held-out error after and ``least_astray`` the smallest of a recording
     before, in noise levels; ``datasheet_explains`` whether the datasheet as it stands does.
     """
 
@@ -104,8 +104,8 @@ def told_effects(f: Findings, policy: Policy = POLICY) -> Sequence[str]:
 
 
 def is_more_missing(f: Findings, policy: Policy = POLICY) -> bool:
-    """Whether the model leaves more than noise."""
-    if is_more_than_noise(f.left, f.left_before if f.names else None, policy):
+    """Whether the model leaves more than noise, by memory or by an error that is far beyond it."""
+    if f.free_held > policy.far_off or is_more_than_noise(f.left, f.left_before if f.names else None, policy):
         return True
     return not f.names and f.left_elsewhere > policy.elsewhere
 

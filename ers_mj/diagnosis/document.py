@@ -13,18 +13,21 @@ from ers_mj import __version__
 from ers_mj.data.columns import per
 from ers_mj.data.prepared import Trace
 from ers_mj.data.recording import Recording
+from ers_mj.decisions.confirmation import is_no_size
 from ers_mj.decisions.explained import cost
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
-from ers_mj.diagnosis.sentences import remainder, sentence, shown
+from ers_mj.diagnosis.remainder import beyond_training, remainder
+from ers_mj.diagnosis.sentences import sentence, shown
 from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.selection.comparison import kin_of
 from ers_mj.selection.confirmation import delta_bic
 from ers_mj.selection.cross_validation import pooled
 from ers_mj.selection.moves import Move
@@ -83,7 +86,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "sentence": sentence(case, missing, found),
         "where": [] if verdict == "consistent" else [place_of(p) for p in found],
         "missing": missing,
-        "remainder": remainder(case),
+        "remainder": _remainder(case),
         "record_state": states,
         "fit": case.fits,
         "parameters": _parameters(case),
@@ -108,6 +111,13 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
     )
     model_told = with_diagnosis(_improved(case), document)
     return Diagnosis(document, evidence, model_told, case.rig.plant(model if case.told_effects else base))
+
+
+def _remainder(case: Case) -> dict:
+    """What the answer leaves, beside what memory tells of it by sensor."""
+    beyond = beyond_training(case.recordings, case.holdout)
+    left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
+    return {**remainder(case.explained, case.more_is_left, case.free_held, beyond), "left_sigma": left_sigma}
 
 
 def _missing(case: Case) -> list[dict]:
@@ -158,6 +168,7 @@ def _effect_parameters(case: Case, name: str):
         factor = case.inertia if case.inertia and parameter.kind in PER_INERTIA else 1.0
         finite = bool(np.isfinite(value))
         low_high = errors.get((name, parameter.name))
+        is_told = finite and low_high is not None and not (parameter.positive and is_no_size(*low_high, case.policy))
         yield {
             "name": parameter.name,
             "entry": (
@@ -165,7 +176,7 @@ def _effect_parameters(case: Case, name: str):
                 | {
                     "value": float(value) * factor if finite else None,
                     "unit": unit_of(parameter.kind, case.output_unit, case.input_unit, bool(case.inertia)),
-                    "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
+                    "ci95": [float(v) * factor for v in low_high] if is_told else [None, None],
                     "meaning": parameter.meaning,
                 }
             ),
@@ -212,12 +223,12 @@ def _symptom(case: Case, name: str, values: np.ndarray) -> dict:
 
 def _alternatives(case: Case, name: str) -> list[dict]:
     """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer
-    on them.
+    on them; then what is easily taken for it and was compared in no round.
     """
     ranked, weights = case.found(name)
     others = [c for c in ranked[1:] if weights[c.name] > case.policy.tied]
     apart = isolability(ranked[0].fit, [c.fit for c in others], case.start.traces) if others else []
-    return [
+    left = [
         {
             "effect": c.name,
             "probability": weights[c.name],
@@ -230,6 +241,15 @@ def _alternatives(case: Case, name: str) -> list[dict]:
             "cost_difference": d.cost,
         }
         for c, d in zip(others, apart)
+    ]
+    known = {*case.model.names, *(c.name for compared in case.selection.rounds for c in compared)}
+    return left + [
+        {
+            "effect": kin,
+            "probability": None,
+            "why_not_excluded": f"was not compared; what tells them apart: {BY_NAME[kin].apart}",
+        }
+        for kin in sorted(kin_of(name) - known)
     ]
 
 
@@ -250,16 +270,17 @@ def _parameters(case: Case) -> dict:
     rows, errors = {}, case.errors
     for name in BASE:
         fitted = ("base", name) in errors
+        is_told = fitted and (name == "theta_0" or not is_no_size(*errors[("base", name)], case.policy))
         if not fitted and name in ("tau_e", "emf_share", "ampere"):
             continue
         absent = name in ("a_1", "c_1") and case.model.values[name] == 0
-        value = float(case.model.values[name]) if fitted or absent else None
+        value = float(case.model.values[name]) if is_told or absent else None
         rows[name] = {
             "value": value,
             "unit": units[name],
-            "ci95": list(errors[("base", name)]) if fitted else [None, None],
+            "ci95": list(errors[("base", name)]) if is_told else [None, None],
             "datasheet": known.get(name),
-            "identifiable": fitted or absent,
+            "identifiable": is_told or absent,
         }
     for name, value in (case.datasheet.parameters if case.datasheet is not None else {}).items():
         if name != "theta_0":

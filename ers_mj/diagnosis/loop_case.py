@@ -145,7 +145,7 @@ class LoopCase:
     @cached_property
     def more_is_left(self) -> bool:
         """Whether a mismatch stays that nothing named accounts for."""
-        return rules.is_more_left(self, self.policy) or self.confirmed.after.rmse > self.policy.loop_wrong * self.noise
+        return rules.is_more_left(self, self.policy)
 
     @cached_property
     def fits(self) -> dict:

@@ -13,6 +13,7 @@ from ers_mj.diagnosis.localisation import Place, Ranked, Samples, places, residu
 from ers_mj.diagnosis.loop_advice import next_recording
 from ers_mj.diagnosis.loop_case import LoopCase
 from ers_mj.diagnosis.loop_rows import improved, parameters
+from ers_mj.diagnosis.remainder import beyond_training, remainder
 from ers_mj.diagnosis.sentences import shown
 from ers_mj.effects import BY_NAME
 from ers_mj.position_loop.intervals import Told
@@ -32,7 +33,9 @@ def told(case: LoopCase) -> Diagnosis:
         "sentence": _sentence(case, missing, found),
         "where": [place_of(p) for p in found],
         "missing": missing,
-        "remainder": _remainder(case),
+        "remainder": remainder(
+            case.explained, case.more_is_left, case.free_held, beyond_training(case.recordings, case.holdout)
+        ),
         "record_state": [],
         "fit": case.fits,
         "parameters": parameters(case.intervals, case.output_unit),
@@ -137,23 +140,10 @@ def _sentence(case: LoopCase, missing: list[dict], found: list[Place]) -> str:
         before, after = (shown(getattr(case.confirmed, w).rmse, case.output_unit) for w in ("before", "after"))
         return (
             f"Beside {loop}, friction and damping this acts: {names}. With it the held-out error falls from {before} to"
-            f" {after}."
+            f" {after}{'; a mismatch is left beside it' if case.more_is_left else ''}."
         )
     place = next((p.sentence for p in found if p.axis != "subsystem"), "it is spread over the whole record")
     return f"Something acts here that no effect of the library accounts for; {place}."
-
-
-def _remainder(case: LoopCase) -> dict:
-    words = (
-        "a mismatch is left that nothing named accounts for"
-        if case.more_is_left
-        else "nothing beyond the noise is left"
-    )
-    return {
-        "explained_share": case.explained,
-        "significant": case.more_is_left,
-        "sentence": f"{case.explained:.0%} of the squared held-out error above the noise is explained; {words}.",
-    }
 
 
 def gather(case: LoopCase) -> Samples:

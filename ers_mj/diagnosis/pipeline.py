@@ -90,6 +90,7 @@ def diagnose(
         named, suspects = without_confounders(selection, start.traces, jobs, policy, search)
         if named is not selection:
             selection, judged = confirmed(start, named, held, jobs, policy)
+    start = replace(start, fit=judged.base)
     rig = Rig(dict(datasheet.parameters) if datasheet is not None else {}, first.output_unit == "rad")
     multibody = _in_mujoco(rig, selection, judged, jobs, progress) if search.in_mujoco else (None, None)
     progress("locating", 0.92)

@@ -45,23 +45,8 @@ def _of_what_is_missing(case: Case, names: str) -> str:
     if fits["heldout_rmse_after_rad"] > halved and case.holdout:
         told, kind = "held-out error, once gain, offset and friction level of that day are known,", "recalibrated"
     before, after = (shown(fits[f"{kind}_rmse_{w}_rad"], case.output_unit) for w in ("before", "after"))
-    return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}."
-
-
-def remainder(case: Case) -> dict:
-    """What the answer explains, and whether a mismatch is left that nothing named accounts for."""
-    words = (
-        "a mismatch is left that nothing named accounts for"
-        if case.more_is_left
-        else "nothing beyond the noise is left"
-    )
-    left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
-    return {
-        "explained_share": case.explained,
-        "significant": case.more_is_left,
-        "left_sigma": left_sigma,
-        "sentence": f"{case.explained:.0%} of the squared held-out error above the noise is explained; {words}.",
-    }
+    left = "; a mismatch is left beside it" if case.more_is_left else ""
+    return f"The model leaves out this: {names}. With it the {told} falls from {before} to {after}{left}."
 
 
 def shown(value: float | None, unit: str) -> str:

@@ -20,9 +20,9 @@ from ers_mj.decisions.thresholds import Policy
 from ers_mj.effects.quantities import Coefficients, Parameter, Scales, Symptoms, Twin
 
 LEAST_IRON = 0.25  # share of an inductance that no current saturates
-# periods of a torque that returns with the angle which the travel must hold, overshoots set aside: less is a spring, a
-# weight or a cubic
-RETURNS = 0.95
+RETURNS = (
+    2.0  # periods of a torque that returns with the angle which the travel must hold: less is a spring or a weight
+)
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,11 @@ class Effect:
     def signed(self) -> bool:
         """Whether the effect may act either way along a start."""
         return self.sized > 0 and not any(p.positive for p in self.parameters[: self.sized])
+
+    def sizes(self, p: np.ndarray) -> list[int]:
+        """Which of its numbers p (k,) tell how large it is: those to which it is proportional, else its first."""
+        finite = [int(k) for k in np.flatnonzero(np.isfinite(p))]
+        return [k for k in finite if k < self.sized] or finite[:1]
 
     def absent(self) -> np.ndarray:
         """Parameter values (k,) at which the effect vanishes, so that models nest."""

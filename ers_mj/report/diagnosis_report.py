@@ -102,9 +102,25 @@ def _error_unit(document: Mapping, evidence: Evidence) -> Unit:
 
 def _header(document: Mapping, unit: Unit, below: str = "") -> str:
     verdict = str(document.get("verdict") or "")
-    named = VERDICTS.get(verdict, "No verdict")
-    header = page.header(verdict, named, verdict, document.get("sentence"), _tiles(document, unit), below)
+    header = page.header(
+        _tone(document), _told(document), verdict, document.get("sentence"), _tiles(document, unit), below
+    )
     return header + _left_out(document)
+
+
+def _told(document: Mapping) -> str:
+    """The verdict in words, with what it does not cover: a mismatch that is left, recordings that go further."""
+    verdict, remainder = str(document.get("verdict") or ""), document.get("remainder") or {}
+    words = VERDICTS.get(verdict, "No verdict")
+    if verdict != "unexplained" and remainder.get("significant"):
+        words += ", and more is left"
+    return words + (", judged beyond what it was fitted to" if remainder.get("beyond_training") else "")
+
+
+def _tone(document: Mapping) -> str:
+    """The verdict, by which the page is coloured; as unexplained, where an answer leaves a mismatch."""
+    is_left = (document.get("remainder") or {}).get("significant")
+    return "unexplained" if is_left else str(document.get("verdict") or "")
 
 
 def _left_out(document: Mapping) -> str:

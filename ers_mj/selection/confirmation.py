@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache
 
 import numpy as np
 
@@ -25,15 +25,18 @@ from ers_mj.selection.moves import Move
 from ers_mj.selection.stepwise import Selection
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
+STEPS = 15  # of a refit without an effect
+
 
 @dataclass(frozen=True)
 class Confirmed:
     """What held-out data says: scores before and after, without each effect, and the p-value of each effect.
 
-    ``shown`` are the scores before and after with the noise of what was held out, by halves where an effect was judged
-    so; ``measure`` is how all of them are taken.
+    ``base`` is the best refit without the named effects. ``shown`` are the scores before and after with the noise of
+    what was held out, by halves where an effect was judged so; ``measure`` is how all of them are taken.
     """
 
+    base: Fit
     before: list[Score]
     after: list[Score]
     without: dict[str, Score]
@@ -73,9 +76,11 @@ def confirmed(
         if not failed:
             return selection, court.told(model, after_models, after, judged)
         worst = max(failed, key=lambda n: judged[n].p)
-        reduced = court.without(worst, model)
-        kept = reduced if reduced.model.names or reduced.model.states else start.fit
-        because = f"held-out data does not confirm it (p {judged[worst].p:.2g})"
+        kept = court.without(worst, model)
+        if not (kept.model.names or kept.model.states):
+            kept = court.bare(model)
+            court.start = replace(start, fit=kept)
+        because = f"held-out data does not confirm that it is needed (p {judged[worst].p:.2g})"
         move = Move("drop", model.names, kept.model.names, selection.chosen.cost - kept.cost, True, because)
         selection = replace(selection, chosen=kept, trail=(*selection.trail, move))
 
@@ -91,6 +96,8 @@ class Court:
     policy: Policy
     parts: list[Fold] = field(init=False)
     sentence: str = field(init=False)
+    _bases: dict[tuple[str, ...], tuple[Fit, list[Model]]] = field(init=False, default_factory=dict)
+    _wide: tuple[Model, np.ndarray] | None = field(init=False, default=None)
 
     def __post_init__(self):
         self.parts, self.sentence = folds(self.start.traces, self.held)
@@ -102,10 +109,30 @@ class Court:
         """The score of each part by its model."""
         return _scores(models, self.parts, self.measure)
 
-    @cached_property
-    def base_models(self) -> list[Model]:
-        """The baseline fitted to each part."""
-        return self.refits(self.start.fit.model)
+    def bare(self, model: Model) -> Fit:
+        """The better of two fits without any effect, by what they leave of the training recordings: the baseline that
+        the search began with, and one that begins at the answer's own parameters, so that what a refit alone buys is
+        not counted for the effects.
+        """
+        own = model
+        for name in model.names:
+            own = own.without_effect(name)
+        if own is model:
+            return self.start.fit
+        traces = list(self.start.traces)
+        begun = polished(fit(own, traces, tau=self.tau, steps=STEPS), traces)
+
+        def left(found: Fit) -> float:
+            return pooled([scored(found.model, t, k, measure=self.measure) for k, t in enumerate(traces)]).sure
+
+        return min((self.start.fit, begun), key=left)
+
+    def base(self, model: Model) -> tuple[Fit, list[Model]]:
+        """The best fit without the effects of a model, and its refits to each part."""
+        if model.names not in self._bases:
+            bare = self.bare(model)
+            self._bases[model.names] = bare, self.refits(bare.model)
+        return self._bases[model.names]
 
     def refits(self, model: Model) -> list[Model]:
         return refits(model, self.parts, self.tau, self.jobs)
@@ -113,15 +140,16 @@ class Court:
     def without(self, name: str, model: Model) -> Fit:
         """The model without an effect, refitted to all training recordings."""
         traces = self.start.traces
-        return polished(fit(model.without_effect(name), traces, tau=self.tau, steps=15), traces)
+        return polished(fit(model.without_effect(name), traces, tau=self.tau, steps=STEPS), traces)
 
     def judged(self, name: str, model: Model, after: list[Score]) -> Judged:
         """What held-out data says of one effect; where neither it nor the free runs confirm the effect, by halves of
         the recording that teaches most of it.
         """
         is_lone = len(model.names) == 1
-        less = self.start.fit.model if is_lone else self.without(name, model).model
-        lesser_models = self.base_models if is_lone else self.refits(less)
+        bare, bare_models = self.base(model)
+        less = bare.model if is_lone else self.without(name, model).model
+        lesser_models = bare_models if is_lone else self.refits(less)
         lesser = self.scores(lesser_models)
         one = Judged(lesser_models, pooled(lesser), (after, lesser), self.p_of(name, after, lesser))
         doubtful = decisions.is_doubtful(self.numbers(one, after), self.policy)
@@ -154,20 +182,44 @@ class Court:
     def is_confirmed(
         self, name: str, one: Judged, model: Model, after_models: Sequence[Model], after: Sequence[Score]
     ) -> bool:
-        """Whether an effect is confirmed, and is none that few samples, a converter or any remainder would show."""
-        if not decisions.is_confirmed(
-            self.numbers(one, after),
-            lambda: _halves_recalibrated(after_models, one.lesser_models, self.parts, self.measure, self.policy),
-            self.policy,
-        ):
+        """Whether an effect is confirmed, pays, and is none that few samples, a converter or any remainder would show.
+
+        What acts in one recording only was judged there: it cannot make another one better.
+        """
+        numbers = self.numbers(one, after)
+
+        @cache
+        def again() -> tuple[float, float] | None:
+            return _recalibrated(after_models, one.lesser_models, self.parts, self.measure)
+
+        if not decisions.is_confirmed(numbers, again, self.policy):
             return False
         traces, policy = self.start.traces, self.policy
         with_it, without = (pooled(scores) for scores in one.pair)
+        if not BY_NAME[name].local and not decisions.pays(numbers, again, policy):
+            return False
         return not (
-            may_be_none(name, model, traces, self.tau, policy)
+            self.is_unsure(name, model)
+            or may_be_none(name, model, traces, self.tau, policy)
             or is_a_converters(name, model, traces)
             or is_any_wave(name, model, with_it, without, policy)
         )
+
+    def is_unsure(self, name: str, model: Model) -> bool:
+        """Whether the interval of an effect's size spans zero, or decades where it has a sign."""
+        if name in model.frozen or BY_NAME[name].local:
+            return False
+        effect, layout = BY_NAME[name], model.layout()
+        sizes = {effect.parameters[k].name for k in effect.sizes(dict(model.effects)[name])}
+        widths = zip(layout, model.vector(layout), self.widths(model))
+        ends = [f.ends(q, w) for f, q, w in widths if f.owner == name and f.name in sizes]
+        return bool(ends) and all(decisions.is_no_size(low, high, self.policy) for low, high in ends)
+
+    def widths(self, model: Model) -> np.ndarray:
+        """95 % half-widths of a model's numbers, the last model's kept."""
+        if self._wide is None or self._wide[0] is not model:
+            self._wide = model, half_widths(model, self.start.traces, (), self.tau)
+        return self._wide[1]
 
     def _halved(
         self, model: Model, less: Model, after: Sequence[Score], without: Sequence[Score]
@@ -194,7 +246,8 @@ class Court:
 
     def told(self, model: Model, after_models: list[Model], after: list[Score], judged: dict[str, Judged]) -> Confirmed:
         """What held-out data says in the end."""
-        before, traces = self.scores(self.base_models), self.start.traces
+        (base, base_models), traces = self.base(model), self.start.traces
+        before = self.scores(base_models)
         by_halves = {one.record for one in judged.values() if one.record is not None}
         shown = [
             (b, a, fold.held_out.sure_noise)
@@ -204,13 +257,13 @@ class Court:
         sentence = self.sentence
         for record in sorted(by_halves):
             cut = halves(traces, record)
-            some = (refits(model, cut, self.tau, self.jobs) for model in (self.start.fit.model, model))
+            some = (refits(model, cut, self.tau, self.jobs) for model in (base.model, model))
             ends = (_scores(models, cut, self.measure) for models in some)
             shown += [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(*ends, cut)]
             sentence += f"; {traces[record].name}, which teaches most of an effect, by halves as well"
         without, p = ({name: getattr(one, of) for name, one in judged.items()} for of in ("without", "p"))
         return Confirmed(
-            before, after, without, p, after_models, self.base_models, self.parts, sentence, shown, self.measure
+            base, before, after, without, p, after_models, base_models, self.parts, sentence, shown, self.measure
         )
 
 
@@ -274,19 +327,19 @@ def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:
     return Blocks.of([trace]).misfit(residuals_in(model, trace, record, OBSERVER_RATE))
 
 
-def _halves_recalibrated(
-    models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold], measure: Measure, policy: Policy
-) -> bool:
-    """Whether the models halve the squared error of recordings of another day once gain, offset and friction level of
-    that day are known.
+def _recalibrated(
+    models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold], measure: Measure
+) -> tuple[float, float] | None:
+    """Errors of two models on recordings of another day, once gain, offset and friction level of that day are known;
+    None where there are none.
     """
     if parts[0].training is not None:
-        return False
-    after, before = (
+        return None
+    with_it, without = (
         pooled([recalibrated(m, fold.held_out, measure)[0] for m, fold in zip(some, parts)]).rmse
         for some in (models, lesser)
     )
-    return after**2 < policy.half * before**2
+    return with_it, without
 
 
 def _scores(models: Sequence[Model], parts: Sequence[Fold], measure: Measure) -> list[Score]:
