@@ -9,6 +9,7 @@ from ers_mj.commands import (
     demo,
     diagnose,
     excite,
+    export,
     frequency,
     gains,
     identify,
@@ -35,5 +36,6 @@ COMMANDS = (
     frequency,
     watch,
     excite,
+    export,
     cache,
 )
