@@ -137,10 +137,13 @@ def kept(row: dict, folds: dict, name: str, policy: Policy) -> bool:
         log_ratio=number(judged["log_ratio"]),
     )
     excluded = any(row.get(key) for key in ("may_be_none", "a_converters", "any_wave"))
-    again = {"after": 1.0, "before": 0.0} | (row.get("recalibrated") or {})  # without errors: nothing to recalibrate
-    halved = again["after"] ** 2 < policy.half * again["before"] ** 2
-    worth = row["once"] or confirmation.pays(held, policy)
-    return confirmation.is_confirmed(held, lambda: halved, policy) and worth and not excluded
+    again = row.get("recalibrated") or {}
+
+    def recalibrated() -> tuple[float, float] | None:
+        return (again["after"], again["before"]) if {"after", "before"} <= again.keys() else None
+
+    worth = row["once"] or confirmation.pays(held, recalibrated, policy)
+    return confirmation.is_confirmed(held, recalibrated, policy) and worth and not excluded
 
 
 def chance_of(pool: dict, row: dict, policy: Policy) -> float:

@@ -44,8 +44,10 @@ def test_blocks_beyond_doubt_outweigh_a_free_run_that_forks(ratio, log_ratio, p,
 
 def test_what_holds_once_another_day_is_known_is_confirmed():
     lost = replace(HELD, rmse=(1.0, 1.0))
-    assert is_confirmed(lost, lambda: True) and not is_confirmed(lost, lambda: False)
-    assert not is_confirmed(replace(lost, rmse=(1.4, 1.0)), never)  # not where its free runs are worse
+    assert is_confirmed(lost, lambda: (0.7, 1.0)) and not is_confirmed(lost, lambda: (0.8, 1.0))
+    assert not is_confirmed(lost, lambda: None) and not is_confirmed(
+        replace(lost, rmse=(1.4, 1.0)), never
+    )  # not where its free runs are worse
     assert is_confirmed(replace(HELD, p=0.01), never)
 
 
@@ -59,12 +61,17 @@ def test_what_holds_once_another_day_is_known_is_confirmed():
     ],
 )
 def test_a_name_must_be_worth_a_share_of_the_error_above_the_noise(with_it, without, worth):
-    assert pays(replace(HELD, p=0.01, rmse=(with_it, without), noise=1.0, log_ratio=0.0)) is worth
+    assert pays(replace(HELD, p=0.01, rmse=(with_it, without), noise=1.0, log_ratio=0.0), lambda: None) is worth
 
 
 def test_a_run_that_forks_does_not_make_a_name_worthless_beyond_doubt():
     forked = replace(HELD, rmse=(9.0, 2.0), noise=1.0, log_ratio=math.log(0.5))
-    assert pays(replace(forked, p=1e-9)) and not pays(replace(forked, p=0.01))
+    assert pays(replace(forked, p=1e-9), never) and not pays(replace(forked, p=0.01), lambda: None)
+
+
+def test_where_the_rig_has_changed_a_name_is_worth_what_it_is_once_the_day_is_known():
+    swamped = replace(HELD, p=0.01, rmse=(2.0, 2.0), noise=1.0, log_ratio=0.0)
+    assert pays(swamped, lambda: (1.5, 2.0)) and not pays(swamped, lambda: (2.0, 2.01))
 
 
 @pytest.mark.parametrize(

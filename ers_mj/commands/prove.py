@@ -5,20 +5,20 @@ truth.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import tempfile
-import threading
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, whole
-from ers_mj.commands.output import Progress, bold, written
+from ers_mj.commands.options import DEFAULT_OUT, add_cluster, add_common, add_out, crew_of, number, whole
+from ers_mj.commands.output import Progress, bold, heed_terminate, tell, written
 from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.proving.conduct import Proof, Task
+    from ers_mj.proving.conduct import Proof
+    from ers_mj.workers.base import Task
 
 CASES = 20  # of a proof that names no number
 
@@ -49,6 +49,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)"
     )
+    add_cluster(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -70,21 +71,21 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     tasks, settings = _tasks(arguments)
-    _heed_terminate()
+    heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
     from ers_mj.proving.scoring import row_of, scored
 
     try:
-        with Progress() as progress:
+        with closing(crew_of(arguments)) as hired, Progress() as progress:
             proof = conduct(
                 folder,
                 tasks,
                 settings,
                 force=arguments.force or arguments.out is None,
-                jobs=arguments.jobs,
+                crew=hired,
                 limit=arguments.limit,
-                tell=_tell,
+                tell=tell,
                 progress=progress,
             )
     except KeyboardInterrupt:
@@ -108,7 +109,7 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
 
 def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     """The cases to be made, and what names this proof."""
-    from ers_mj.proving.conduct import Task
+    from ers_mj.workers.base import Task
 
     if arguments.real is not None:
         from ers_mj.proving import real
@@ -127,17 +128,6 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     cases = case.plans(arguments.cases or CASES, arguments.seed)
     tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in cases]
     return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(cases)}
-
-
-def _heed_terminate() -> None:
-    """Let a plain kill stop as Ctrl-C does: no diagnosis under way is left behind."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-
-
-def _tell(line: str) -> None:
-    """A line for a person while the work goes on, out of the way of --json."""
-    print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
 
 
 def _versions(proof: Proof) -> dict[str, str]:

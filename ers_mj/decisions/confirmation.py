@@ -10,6 +10,9 @@ import numpy as np
 
 from ers_mj.decisions.thresholds import POLICY, Policy
 
+# errors with and without an effect, recalibrated [output unit]; None where nothing was recorded on another day
+Recalibrated = Callable[[], tuple[float, float] | None]
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -82,16 +85,22 @@ def is_no_closer(held: HeldOut, policy: Policy = POLICY) -> bool:
     return held.log_ratio >= 0.0
 
 
-def pays(held: HeldOut, policy: Policy = POLICY) -> bool:
-    """Whether the squared held-out error above the noise rises by a share of itself without an effect.
+def pays(held: HeldOut, recalibrated: Recalibrated, policy: Policy = POLICY) -> bool:
+    """Whether the squared held-out error above the noise rises by a share of itself without an effect: as it is, or,
+    where the rig has changed, once gain, offset and friction level of another day are known (asked for only then).
 
     Where its blocks leave no doubt, forks of stick and slip may swamp the error of one recording: the geometric mean
     over recordings counts as well.
     """
-    with_it, without = (max(rmse**2 - held.noise**2, 0.0) for rmse in held.rmse)
-    if without >= (1.0 + policy.pays) * with_it:
+
+    def is_worth(with_it: float, without: float) -> bool:
+        left, lost = (max(rmse**2 - held.noise**2, 0.0) for rmse in (with_it, without))
+        return lost >= (1.0 + policy.pays) * left
+
+    if is_worth(*held.rmse) or (held.p < policy.sure_p and math.exp(-2.0 * held.log_ratio) >= 1.0 + policy.pays):
         return True
-    return held.p < policy.sure_p and math.exp(-2.0 * held.log_ratio) >= 1.0 + policy.pays
+    again = recalibrated()
+    return again is not None and is_worth(*again)
 
 
 def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:
@@ -99,10 +108,13 @@ def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:
     return low <= 0.0 <= high or max(abs(low), abs(high)) > policy.unsure * min(abs(low), abs(high))
 
 
-def is_confirmed(held: HeldOut, halves_recalibrated: Callable[[], bool], policy: Policy = POLICY) -> bool:
+def is_confirmed(held: HeldOut, recalibrated: Recalibrated, policy: Policy = POLICY) -> bool:
     """Whether an effect is confirmed: by blocks and free runs, or by an error that is halved once gain, offset and
     friction level of another day are known (asked for only where nothing else confirms it).
     """
     if not is_doubtful(held, policy):
         return True
-    return held.rmse[0] <= policy.worse * held.rmse[1] and halves_recalibrated()
+    if held.rmse[0] > policy.worse * held.rmse[1]:
+        return False
+    again = recalibrated()
+    return again is not None and again[0] ** 2 < policy.half * again[1] ** 2

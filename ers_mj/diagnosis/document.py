@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ers_mj import __version__
 from ers_mj.data.columns import per
 from ers_mj.data.prepared import Trace
 from ers_mj.data.recording import Recording
+from ers_mj.decisions.confirmation import is_no_size
 from ers_mj.decisions.explained import cost
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import Evidence
@@ -26,6 +27,7 @@ from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.selection.comparison import kin_of
 from ers_mj.selection.confirmation import delta_bic
 from ers_mj.selection.cross_validation import pooled
 from ers_mj.selection.moves import Move
@@ -107,7 +109,8 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         case.recordings[0].input_unit,
         spectrum,
     )
-    return Diagnosis(document, evidence, _improved(case), case.rig.plant(model if case.told_effects else base))
+    model_told = with_diagnosis(_improved(case), document)
+    return Diagnosis(document, evidence, model_told, case.rig.plant(model if case.told_effects else base))
 
 
 def _remainder(case: Case) -> dict:
@@ -165,6 +168,7 @@ def _effect_parameters(case: Case, name: str):
         factor = case.inertia if case.inertia and parameter.kind in PER_INERTIA else 1.0
         finite = bool(np.isfinite(value))
         low_high = errors.get((name, parameter.name))
+        is_told = finite and low_high is not None and not (parameter.positive and is_no_size(*low_high, case.policy))
         yield {
             "name": parameter.name,
             "entry": (
@@ -172,7 +176,7 @@ def _effect_parameters(case: Case, name: str):
                 | {
                     "value": float(value) * factor if finite else None,
                     "unit": unit_of(parameter.kind, case.output_unit, case.input_unit, bool(case.inertia)),
-                    "ci95": [float(v) * factor for v in low_high] if low_high and finite else [None, None],
+                    "ci95": [float(v) * factor for v in low_high] if is_told else [None, None],
                     "meaning": parameter.meaning,
                 }
             ),
@@ -219,12 +223,12 @@ def _symptom(case: Case, name: str, values: np.ndarray) -> dict:
 
 def _alternatives(case: Case, name: str) -> list[dict]:
     """What of the round in which the effect was found the recordings do not exclude, and how far it is from the answer
-    on them.
+    on them; then what is easily taken for it and was compared in no round.
     """
     ranked, weights = case.found(name)
     others = [c for c in ranked[1:] if weights[c.name] > case.policy.tied]
     apart = isolability(ranked[0].fit, [c.fit for c in others], case.start.traces) if others else []
-    return [
+    left = [
         {
             "effect": c.name,
             "probability": weights[c.name],
@@ -237,6 +241,15 @@ def _alternatives(case: Case, name: str) -> list[dict]:
             "cost_difference": d.cost,
         }
         for c, d in zip(others, apart)
+    ]
+    known = {*case.model.names, *(c.name for compared in case.selection.rounds for c in compared)}
+    return left + [
+        {
+            "effect": kin,
+            "probability": None,
+            "why_not_excluded": f"was not compared; what tells them apart: {BY_NAME[kin].apart}",
+        }
+        for kin in sorted(kin_of(name) - known)
     ]
 
 
@@ -257,16 +270,17 @@ def _parameters(case: Case) -> dict:
     rows, errors = {}, case.errors
     for name in BASE:
         fitted = ("base", name) in errors
+        is_told = fitted and (name == "theta_0" or not is_no_size(*errors[("base", name)], case.policy))
         if not fitted and name in ("tau_e", "emf_share", "ampere"):
             continue
         absent = name in ("a_1", "c_1") and case.model.values[name] == 0
-        value = float(case.model.values[name]) if fitted or absent else None
+        value = float(case.model.values[name]) if is_told or absent else None
         rows[name] = {
             "value": value,
             "unit": units[name],
-            "ci95": list(errors[("base", name)]) if fitted else [None, None],
+            "ci95": list(errors[("base", name)]) if is_told else [None, None],
             "datasheet": known.get(name),
-            "identifiable": fitted or absent,
+            "identifiable": is_told or absent,
         }
     for name, value in (case.datasheet.parameters if case.datasheet is not None else {}).items():
         if name != "theta_0":
@@ -359,6 +373,19 @@ def _improved(case: Case) -> Datasheet:
     ]
     parameters = dict(case.datasheet.parameters) if case.datasheet is not None else {}
     return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
+
+
+def with_diagnosis(sheet: Datasheet, document: dict) -> Datasheet:
+    """The model with the verdict that made it, and the intervals of what was identified of it."""
+    held = {**sheet.lumped, **sheet.loop, **sheet.baseline}
+    rows = {name: row["ci95"] for name, row in document["parameters"].items() if name in held and row["identifiable"]}
+    for missing in document["missing"]:
+        given = dict(sheet.effects).get(missing["effect"], {})
+        told = missing["parameters"].items()
+        rows |= {f"{missing['effect']}.{name}": row["ci95"] for name, row in told if name in given}
+    ends = {key: [math.nan if x is None else float(x) for x in row] for key, row in rows.items()}
+    known = {key: (low, high) for key, (low, high) in ends.items() if -math.inf < low <= high < math.inf}
+    return replace(sheet, verdict=document["verdict"], intervals=known)
 
 
 def versions_of() -> dict:

@@ -233,8 +233,8 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
     best, tried = _narrowest(leader, wish, bench)
     if best is None:
         return _nothing(
-            "No other explanation is left, and no input was found that keeps the rig within its travel and would tell"
-            " more.",
+            "Nothing else that was tried explains these recordings, and no input was found that keeps the rig within"
+            " its travel and would tell more.",
             {"tried": tried, "simulations": bench.simulations},
         )
     ratios = {leader.layout[i].name: float(a / b) for i, a, b in zip(wish.places, best[1], wish.before)}
@@ -242,15 +242,15 @@ def _to_know_better(leader: Explanation, bench: Bench, units: Mapping[str, str])
     told = {"interval_ratio": ratios, "tried": tried, "simulations": bench.simulations}
     if ratios[weakest.name] > ADVISING.worth:
         return _nothing(
-            f"No other explanation is left to tell apart, and none of {tried} inputs within the limits of these"
-            " recordings would narrow an interval by much: another recording of the same kind would confirm this one.",
+            f"Nothing else that was tried explains these recordings, and none of {tried} inputs within their"
+            " limits would narrow an interval by much: another recording of the same kind would confirm this one.",
             told,
         )
     chosen = {**best[0], **units}
     whose = f"{weakest.name} of the {plain(weakest.owner)}" if weakest.owner != "base" else weakest.name
     sentence = (
-        f"No other explanation is left to tell apart. {asked(chosen)} It would narrow the interval of {whose} to"
-        f" {ratios[weakest.name]:.0%} of today's."
+        f"Nothing else that was tried explains these recordings. {asked(chosen)} It would narrow the"
+        f" interval of {whose} to {ratios[weakest.name]:.0%} of today's."
     )
     return {**_nothing(sentence, told), "excitation": chosen}
 

@@ -139,7 +139,7 @@ def _holds(found: Confirmed, name: str, runs: Sequence[Run], policy: Policy) -> 
     ratio = after.rmse / max(less.rmse, 1e-300)
     costs = cost(after.misfit, 1.0), cost(less.misfit, 1.0)
     held = HeldOut(found.p_values[name], (after.rmse, less.rmse), noise, costs, ratio, math.log(ratio))
-    return is_confirmed(held, lambda: False, policy)
+    return is_confirmed(held, lambda: None, policy)
 
 
 # -- what a day changes ---------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -186,15 +187,16 @@ class Court:
         What acts in one recording only was judged there: it cannot make another one better.
         """
         numbers = self.numbers(one, after)
-        if not decisions.is_confirmed(
-            numbers,
-            lambda: _halves_recalibrated(after_models, one.lesser_models, self.parts, self.measure, self.policy),
-            self.policy,
-        ):
+
+        @cache
+        def again() -> tuple[float, float] | None:
+            return _recalibrated(after_models, one.lesser_models, self.parts, self.measure)
+
+        if not decisions.is_confirmed(numbers, again, self.policy):
             return False
         traces, policy = self.start.traces, self.policy
         with_it, without = (pooled(scores) for scores in one.pair)
-        if not BY_NAME[name].local and not decisions.pays(numbers, policy):
+        if not BY_NAME[name].local and not decisions.pays(numbers, again, policy):
             return False
         return not (
             self.is_unsure(name, model)
@@ -325,19 +327,19 @@ def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:
     return Blocks.of([trace]).misfit(residuals_in(model, trace, record, OBSERVER_RATE))
 
 
-def _halves_recalibrated(
-    models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold], measure: Measure, policy: Policy
-) -> bool:
-    """Whether the models halve the squared error of recordings of another day once gain, offset and friction level of
-    that day are known.
+def _recalibrated(
+    models: Sequence[Model], lesser: Sequence[Model], parts: Sequence[Fold], measure: Measure
+) -> tuple[float, float] | None:
+    """Errors of two models on recordings of another day, once gain, offset and friction level of that day are known;
+    None where there are none.
     """
     if parts[0].training is not None:
-        return False
-    after, before = (
+        return None
+    with_it, without = (
         pooled([recalibrated(m, fold.held_out, measure)[0] for m, fold in zip(some, parts)]).rmse
         for some in (models, lesser)
     )
-    return after**2 < policy.half * before**2
+    return with_it, without
 
 
 def _scores(models: Sequence[Model], parts: Sequence[Fold], measure: Measure) -> list[Score]:
