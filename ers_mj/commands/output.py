@@ -43,3 +43,8 @@ def written(kept: Kept) -> list[str]:
 def bold(text: str) -> str:
     """Text in bold on a terminal."""
     return f"\x1b[1m{text}\x1b[0m" if sys.stdout.isatty() and "NO_COLOR" not in os.environ else text
+
+
+def tell(line: str) -> None:
+    """A line for a person while the work goes on, out of the way of --json."""
+    print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
