@@ -132,10 +132,18 @@ def cell_of(x: float) -> str:
     return "" if x != x else repr(x)
 
 
+LONGEST_LIST = 190  # characters of names within a sentence
+
+
 def listed(names: Iterable, most: int = 24) -> str:
     """Names with commas; of many, the first ones, the last, and how many there are."""
     words = [str(name)[:40] for name in names]
-    return ", ".join(words) if len(words) <= most else f"{', '.join(words[:8])} ... {words[-1]} ({len(words)} in all)"
+    if len(words) <= most and len(", ".join(words)) <= LONGEST_LIST:
+        return ", ".join(words)
+    first = words[:8]
+    while len(", ".join(first)) > LONGEST_LIST // 2:
+        first.pop()
+    return f"{', '.join(first)} ... {words[-1]} ({len(words)} in all)"
 
 
 def reason(error: Exception) -> str:

@@ -13,10 +13,11 @@ import hashlib
 import importlib
 import io
 import os
+import re
 import sys
 import traceback
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ers_mj.data.formats.base import MOST, File, Loaded, refuse_large
@@ -38,6 +39,9 @@ READERS = {
     ".bin": "ardupilot",
 }
 
+CUT_OFF = re.compile(
+    "truncated|could not read bytes|unpack requires|not a zip file|Unterminated|end magic|reach(ed)? EOF"
+)
 ON_DISK = ("ros", "can_log", "ardupilot")  # formats whose libraries take paths
 
 
@@ -64,29 +68,30 @@ def load(
 
 
 def _read(module: str, file: File) -> Loaded:
-    """The file by this reader; what its library prints is not for our output, and what it raises, it raises at
-    whatever its parser met.
-    """
+    """The file by this reader; what its library raises, it raises at whatever its parser met."""
     reader = importlib.import_module(f"ers_mj.data.formats.{module}")
+    with _quiet():
+        try:
+            return reader.load(file)
+        except ErsError:
+            raise
+        except MemoryError:
+            raise InputError(f"{file.name}: takes more memory than there is, cut it") from None
+        except Exception as error:
+            traceback.clear_frames(error.__traceback__)  # and with them what the library has left half read
+            told = re.sub(r"'?<_io\.\w+ object at 0x[0-9a-f]+>'?", "it", reason(error))
+        gc.collect(1)  # it may hold itself
+    hint = ": it seems cut off, copy it again" if CUT_OFF.search(told) else ""
+    raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({told}){hint}")
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """What a library prints, and what its destructors raise over a damaged file, is not for our output."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            return reader.load(file)
-    except ErsError:
-        raise
-    except MemoryError:
-        raise InputError(f"{file.name}: takes more memory than there is, cut it") from None
-    except Exception as error:
-        _let_go(error)
-        raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({reason(error)})") from None
-
-
-def _let_go(error: Exception) -> None:
-    """Free what a library left half made, whose end may fail once more and print that."""
-    hook = sys.unraisablehook
-    sys.unraisablehook = lambda _: None
-    try:
-        traceback.clear_frames(error.__traceback__)
-        gc.collect(1)  # it may hold itself
+            yield
     finally:
         sys.unraisablehook = hook
 
