@@ -16,7 +16,6 @@ EXPLICIT = (
     "the drive is explicit unless you ask newton for an implicit one: keep its damping times the timestep well below J"
 )
 STOPS = "stops are newton's own springs, joint_limit_ke and joint_limit_kd, and scale with nothing"
-SOFT = "friction below breakaway creeps as newton's MuJoCo solver has it: its solreffriction is not set here"
 BRAKES = (
     "ENVELOPE alone: beyond the no-load speed ClampingDCMotor's line brakes, also when asked to drive; the limit of the"
     " servo itself is on its voltage, which add_to() has"
@@ -48,6 +47,8 @@ class Newton(Target):
             "armature": repr(n.armature),
             "damping": repr(n.damping + (n.emf if n.kind == "dcmotor" else 0.0)),
             "friction": repr(n.friction),
+            "solref": n.solref,
+            "solimp": n.solimp,
             "edits": "\n".join(_edits(n)),
             "drive": "DrivePD",
             "clamping": clamping,
@@ -61,7 +62,6 @@ def _losses(n: JointNumbers) -> tuple[str, ...]:
     found = {
         WOUND: n.inductance > 0,
         SOLVERS: True,
-        SOFT: n.friction > 0,
         EXPLICIT: n.brake > 0,
         STOPS: math.isfinite(n.lower) or math.isfinite(n.upper),
         GROWS: n.delay > 0,
