@@ -70,7 +70,7 @@ def in_newton(folder: Path, given) -> np.ndarray:
 
 
 def in_mjlab(folder: Path, given) -> np.ndarray:
-    """Positions (N,) of a joint that mjlab's actuator class wrote, in its MuJoCo; commands late as its buffer has them."""
+    """Positions (N,) of a joint that mjlab wrote, in its MuJoCo; commands late as its buffer has them."""
     import mujoco
 
     servo, u, h = loaded(folder, "mjlab_actuator"), given["u"], TIMESTEP
@@ -126,7 +126,9 @@ def off_by(tool: str, python: Path, name: str) -> float:
         model.export(folder, [tool])
         np.savez(folder / "given.npz", t=t, u=u, rest=servo.rest)
         subprocess.run([python, __file__, "--inside", tool, folder], check=True, stdout=subprocess.DEVNULL)
-        return apart(np.load(folder / "found.npy"), response(servo, OwnJoint(servo).carried, t, u))
+        return apart(
+            np.load(folder / "found.npy"), response(servo, OwnJoint(servo, wound=tool != "newton").carried, t, u)
+        )
 
 
 def main() -> None:

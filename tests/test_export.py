@@ -113,7 +113,7 @@ def test_a_loops_linear_system_follows_its_reference():
 
 
 def test_the_fmu_is_source_that_compiles_without_a_word(limited, tmp_path):
-    fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
+    pytest.importorskip("fmpy", reason="fmpy is not installed")
     from fmpy.validation import validate_fmu
 
     folder, _, _ = limited
@@ -124,6 +124,7 @@ def test_the_fmu_is_source_that_compiles_without_a_word(limited, tmp_path):
         described = ET.fromstring(archive.read("modelDescription.xml"))
     assert described.get("fmiVersion") == "2.0" and b"Python.h" not in source
     names = [v.get("name") for v in described.iter("ScalarVariable")]
+    assert [source_file.get("name") for source_file in described.iter("File")] == ["model.c"]
     assert names[:4] == ["u_V", "theta_rad", "speed", "start"] and "c_2_plus" in names
     if COMPILER is None:
         pytest.skip("no C compiler (cc) is here: the source cannot be compiled")
@@ -131,7 +132,6 @@ def test_the_fmu_is_source_that_compiles_without_a_word(limited, tmp_path):
     flags = ["-std=c99", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror", "-fsyntax-only"]
     done = subprocess.run([COMPILER, *flags, "model.c"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert fmpy.read_model_description(str(file)).coSimulation.sourceFiles == ["model.c"]
 
 
 def test_an_fmus_numbers_may_be_changed_and_its_state_kept(limited):

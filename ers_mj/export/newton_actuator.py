@@ -20,7 +20,6 @@ BRAKES = (
     "ENVELOPE alone: beyond the no-load speed ClampingDCMotor's line brakes, also when asked to drive; the limit of the"
     " servo itself is on its voltage, which add_to() has"
 )
-WOUND = "the winding's time constant: the drive's torque is there at once, the back-EMF is damping"
 
 
 class Newton(Target):
@@ -31,7 +30,7 @@ class Newton(Target):
     def write(self, servo: Servo) -> Written:
         from ers_mj import __version__
 
-        n = joint_numbers(servo)
+        n = joint_numbers(servo, wound=False)
         gain = math.copysign(n.torque, n.gear)
         limit = n.effort if n.kind == "position" else n.torque * n.limit
         clamping = f"[(ClampingMaxEffort, {{'max_effort': {limit!r}}})]" if math.isfinite(limit) else "[]"
@@ -45,7 +44,7 @@ class Newton(Target):
             "torque": "None  # it is told a position" if n.kind == "position" else f"{gain!r}  # [N m, or N]",
             "envelope": _enveloped(n),
             "armature": repr(n.armature),
-            "damping": repr(n.damping + (n.emf if n.kind == "dcmotor" else 0.0)),
+            "damping": repr(n.damping),
             "friction": repr(n.friction),
             "solref": n.solref,
             "solimp": n.solimp,
@@ -60,7 +59,6 @@ class Newton(Target):
 
 def _losses(n: JointNumbers) -> tuple[str, ...]:
     found = {
-        WOUND: n.inductance > 0,
         SOLVERS: True,
         EXPLICIT: n.brake > 0,
         STOPS: math.isfinite(n.lower) or math.isfinite(n.upper),
