@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.data.prepared import BLOCK, Blocks, Trace
+from ers_mj.data.prepared import BLOCK, Trace
 from ers_mj.decisions.explained import cost
 from ers_mj.effects import Effect
 from ers_mj.estimation.objective import Run, residuals_in
@@ -117,7 +117,7 @@ class Surroundings:
 
     def misfit(self, trace: Trace, e: np.ndarray) -> np.ndarray:
         """Misfits (B,) of the residuals (rows,) of a trace, its converter's thresholds aside."""
-        return Blocks.of([trace]).misfit(trace.plain(e))
+        return trace.blocks.misfit(trace.plain(e))
 
     def of(
         self, record: int, moment: float
