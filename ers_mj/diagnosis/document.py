@@ -376,13 +376,11 @@ def with_diagnosis(sheet: Datasheet, document: dict) -> Datasheet:
 
 
 def versions_of() -> dict:
-    import numba
-    import scipy
+    from importlib.metadata import version
 
     return {
         "ers-mj": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
+        **{package: version(package) for package in ("scipy", "numba")},
     }

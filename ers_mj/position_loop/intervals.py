@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
 from ers_mj.position_loop.fit import Data, Fit, fitted, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
+from ers_mj.solvers.student import quantile
 
 RUN = 5  # neighbouring blocks that are taken as one
 FEWEST = 3  # left-out refits from which they count
@@ -59,7 +59,7 @@ class Intervals:
         if len(left_out) >= FEWEST and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
         spread += np.diag([_inexact(f, q) ** 2 for f, q in zip(layout, model.vector(layout), strict=True)])
-        return Intervals(model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
+        return Intervals(model, tuple(layout), spread, quantile(max(n - len(layout), 1), 0.975))
 
     def told(self, owner: str, name: str) -> Told | None:
         """A fitted number."""
