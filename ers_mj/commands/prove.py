@@ -11,6 +11,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ers_mj.commands.contest import add_contest, exported, scored, wanted
 from ers_mj.commands.options import DEFAULT_OUT, add_cluster, add_common, add_out, crew_of, number, whole
 from ers_mj.commands.output import Progress, bold, heed_terminate, tell, written
 from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
@@ -30,15 +31,16 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="conceal effects, diagnose them blind, score",
         description=(
             "Measure what the diagnosis can do. Servos of several families are drawn, effects concealed in them,"
-            " recorded in MuJoCo or\nby an integrator of the proof's own; the truth is sealed and its hash printed;"
-            " each case is diagnosed by a process that\ngets its files only; the truth is opened and the answers scored."
-            " A quarter of the cases hides nothing, half one effect, 15 %\nseveral, 10 % one that the library does not"
+            " recorded in MuJoCo\nor by an integrator of the proof's own; the truth is sealed and its hash printed;"
+            " each case is diagnosed by a process\nthat gets its files only; the truth is opened, the answers scored."
+            " A quarter of the cases hides nothing, half one effect,\n15 % several, 10 % one that the library does not"
             " have. Stopped with Ctrl-C, the same command goes on where it was."
         ),
         epilog=(
             "examples:\n  ers prove --cases 40 --seed 7 --out proof\n"
             "  ers prove --families screw,position --cases 8 --seed 7\n"
-            "  ers prove --real ../shared/data --cases 15 --out proof-real"
+            "  ers prove --real ../shared/data --cases 15 --out proof-real\n"
+            "  ers prove --cases 20 --export cases\n  ers prove --score answers --truth cases.truth.json"
         ),
     )
     parser.add_argument("--cases", type=whole(1), metavar="N", help=f"how many (default {CASES})")
@@ -56,14 +58,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)"
     )
+    add_contest(parser)
     add_cluster(parser)
     add_out(parser)
     add_common(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, seed=None)  # cases for others are drawn by chance
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped."""
+    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped. Or what others are handed, and scored."""
+    if wanted(arguments):
+        return exported(arguments, _tasks) if arguments.export is not None else scored(arguments, _shown)
+    arguments.seed = arguments.seed or 0
     if arguments.out is None and arguments.json:
         with tempfile.TemporaryDirectory(prefix="ers-prove-") as passing:
             return _run(Path(passing), arguments, keeps=False)
@@ -81,7 +87,8 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
-    from ers_mj.proving.scoring import row_of, scored
+    from ers_mj.proving.scoring import row_of
+    from ers_mj.proving.scoring import scored as scored_simulated
 
     try:
         with closing(crew_of(arguments)) as hired, Progress() as progress:
@@ -104,12 +111,11 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
         print(f"ers: stopped; {kept}", file=sys.stderr)
         return 130
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
-    scores = scored(rows) if arguments.real is None else scored_real(rows)
+    scores = scored_simulated(rows) if arguments.real is None else scored_real(rows)
     results = plain(
         {**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)}
     )
-    told = _told(results)
-    files = _write(folder, results, rows, told) if keeps else []
+    told, files = _shown(folder if keeps else None, results, rows)
     print(as_json(results) if arguments.json else "\n".join([*told, *written(files)]))
     return 0
 
@@ -144,6 +150,12 @@ def _versions(proof: Proof) -> dict[str, str]:
 
     answers = (answer.get("document") or {} for answer in proof.answers.values())
     return {"ers-mj": __version__, **next((a["versions"] for a in answers if a.get("versions")), {})}
+
+
+def _shown(folder: Path | None, results: dict, rows: list[dict]) -> tuple[list[str], list[Path]]:
+    """The lines of a terminal, and what was written of them."""
+    told = _told(results)
+    return told, _write(folder, results, rows, told) if folder is not None else []
 
 
 def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> list[Path]:

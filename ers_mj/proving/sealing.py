@@ -18,7 +18,14 @@ from ers_mj.data.tables import reason, write_whole
 from ers_mj.errors import InputError
 
 SETTINGS, SEALED, ANSWERS = "settings.json", "sealed", "answers"
-JUDGES = ("sealing.py", "asking.py", "conduct.py", "scoring.py", "parameters.py")  # of proving/: they make no case
+JUDGES = (
+    "sealing.py",
+    "asking.py",
+    "conduct.py",
+    "scoring.py",
+    "parameters.py",
+    "contest.py",
+)  # of proving/: they make no case
 WRITTEN = ("results.json", "report.html", "summary.txt")  # by the command, at the end
 
 
