@@ -240,7 +240,10 @@ def make_trace(
     it.
     """
     t = s.t
-    block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
+    block = np.minimum(np.floor((t - t[0]) / BLOCK), max(np.floor((t[-1] - t[0]) / BLOCK) - 1, 0))
+    if block[-1] > t.size:  # blocks of one sample and none: those without are not laid out
+        block = np.unique(block, return_inverse=True)[1]
+    block = block.astype(np.int64)
     counts = np.bincount(block[s.valid], minlength=block[-1] + 1).astype(float)
     y = np.where(s.valid, s.y, np.nan)
     trace = Trace(name, t, s.u, y, s.valid, s.enable, s.load, sigma, quantum, start or (0.0, 0.0), block, counts)

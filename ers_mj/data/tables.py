@@ -1,9 +1,8 @@
-"""Tables of named columns: which rows, cells to numbers, and text to a file that appears whole.
+"""Tables of named columns: which rows, and cells to numbers.
 
 What cannot be read is refused with one sentence (`InputError`).
 """
 
-import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -133,26 +132,18 @@ def cell_of(x: float) -> str:
     return "" if x != x else repr(x)
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write text to a neighbour of path, then put it in path's place: a reader never sees half of it.
-
-    Raises:
-        InputError: the path cannot be written.
-    """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({reason(error)})") from None
-    finally:
-        part.unlink(missing_ok=True)
+LONGEST_LIST = 190  # characters of names within a sentence
 
 
 def listed(names: Iterable, most: int = 24) -> str:
     """Names with commas; of many, the first ones, the last, and how many there are."""
     words = [str(name)[:40] for name in names]
-    return ", ".join(words) if len(words) <= most else f"{', '.join(words[:8])} ... {words[-1]} ({len(words)} in all)"
+    if len(words) <= most and len(", ".join(words)) <= LONGEST_LIST:
+        return ", ".join(words)
+    first = words[:8]
+    while len(", ".join(first)) > LONGEST_LIST // 2:
+        first.pop()
+    return f"{', '.join(first)} ... {words[-1]} ({len(words)} in all)"
 
 
 def reason(error: Exception) -> str:
