@@ -11,6 +11,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ers_mj"
 MAY_READ = {
     "errors": (),
+    "comparing": ("errors",),
+    "workers": ("errors",),
     "decisions": (),
     "solvers": (),
     "data": ("decisions", "errors"),
@@ -27,25 +29,27 @@ MAY_READ = {
         "servo",
     ),
     "online": ("data", "estimation", "servo", "solvers"),
-    "control": ("data", "effects", "errors", "plants", "servo"),
+    "control": ("data", "effects", "errors", "plants", "servo", "workers"),
     "validation": ("plants", "servo"),
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
-    "proving": ("data", "errors", "plants"),
+    "proving": ("data", "errors", "plants", "workers"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "export": ("control", "effects", "errors", "plants", "position_loop", "servo"),
     "door": (
         "control", "data", "diagnosis", "effects", "errors", "estimation", "export", "identification", "plants",
         "position_loop", "report", "selection", "servo", "validation", "view",
     ),
+    "fleet": ("data", "door", "errors", "servo", "workers"),
     "commands": (
-        "control", "data", "door", "errors", "experiment_design", "online", "plants", "proving", "report", "servo",
-        "validation", "view",
+        "comparing", "control", "data", "door", "errors", "experiment_design", "fleet", "online", "plants", "proving",
+        "report", "servo", "validation", "view", "workers",
     ),
     "cli": ("commands", "errors"),
 }  # fmt: skip
 WRITERS = {
     "commands",
     "door",
+    "fleet",
     "report",
     "view",
     "proving",

@@ -5,7 +5,9 @@ frequency), output (files, JSON, lines). What is slow to import is imported insi
 """
 
 from ers_mj.commands import (
+    batch,
     cache,
+    compare,
     demo,
     diagnose,
     excite,
@@ -30,6 +32,8 @@ COMMANDS = (
     validate,
     view,
     inspect,
+    compare,
+    batch,
     prove,
     trial,
     gains,

@@ -7,9 +7,13 @@ import math
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ers_mj.door.saving import refuse_folder, refuse_table
 from ers_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from ers_mj.workers.base import Crew
 
 DEFAULT_OUT = "ers-out"
 
@@ -137,6 +141,24 @@ def add_jobs_and_json(parser: argparse.ArgumentParser) -> None:
         "--jobs", type=whole(1), default=os.cpu_count() or 1, metavar="N", help="cores to use (default all)"
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object; without --out write no file")
+
+
+def add_cluster(parser: argparse.ArgumentParser) -> None:
+    """--cluster."""
+    parser.add_argument(
+        "--cluster", metavar="ADDRESS", help="work on the Dask cluster of this scheduler, as in tcp://127.0.0.1:8786"
+    )
+
+
+def crew_of(arguments: argparse.Namespace) -> Crew:
+    """The workers that --jobs and --cluster ask for.
+
+    Raises:
+        InputError: the cluster cannot be used.
+    """
+    from ers_mj.workers.hiring import crew
+
+    return crew(arguments.jobs, arguments.cluster)
 
 
 def mapping(pairs: list[tuple[str, str]]) -> dict[str, str]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -42,3 +44,14 @@ def written(files: Sequence[Path]) -> list[str]:
 def bold(text: str) -> str:
     """Text in bold on a terminal."""
     return f"\x1b[1m{text}\x1b[0m" if sys.stdout.isatty() and "NO_COLOR" not in os.environ else text
+
+
+def tell(line: str) -> None:
+    """A line for a person while the work goes on, out of the way of --json."""
+    print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
+
+
+def heed_terminate() -> None:
+    """Let a plain kill stop as Ctrl-C does: nothing under way is left behind."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -5,20 +5,21 @@ truth.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import tempfile
-import threading
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, whole
-from ers_mj.commands.output import Progress, bold, written
+from ers_mj.commands.contest import add_contest, exported, scored, wanted
+from ers_mj.commands.options import DEFAULT_OUT, add_cluster, add_common, add_out, crew_of, number, whole
+from ers_mj.commands.output import Progress, bold, heed_terminate, tell, written
 from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from ers_mj.proving.conduct import Proof, Task
+    from ers_mj.proving.conduct import Proof
+    from ers_mj.workers.base import Task
 
 CASES = 20  # of a proof that names no number
 
@@ -37,7 +38,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ),
         epilog=(
             "examples:\n  ers prove --cases 40 --seed 7 --out proof\n  ers prove --real ../shared/data --cases 15 --out"
-            " proof-real"
+            " proof-real\n  ers prove --cases 20 --export cases\n  ers prove --score answers --truth cases.truth.json"
         ),
     )
     parser.add_argument("--cases", type=whole(1), metavar="N", help=f"how many (default {CASES})")
@@ -49,13 +50,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)"
     )
+    add_contest(parser)
+    add_cluster(parser)
     add_out(parser)
     add_common(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, seed=None)  # cases for others are drawn by chance
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped."""
+    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped. Or what others are handed, and scored."""
+    if wanted(arguments):
+        return exported(arguments, _tasks) if arguments.export is not None else scored(arguments, _shown)
+    arguments.seed = arguments.seed or 0
     if arguments.out is None and arguments.json:
         with tempfile.TemporaryDirectory(prefix="ers-prove-") as passing:
             return _run(Path(passing), arguments, keeps=False)
@@ -70,21 +76,22 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
     tasks, settings = _tasks(arguments)
-    _heed_terminate()
+    heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
-    from ers_mj.proving.scoring import row_of, scored
+    from ers_mj.proving.scoring import row_of
+    from ers_mj.proving.scoring import scored as scored_simulated
 
     try:
-        with Progress() as progress:
+        with closing(crew_of(arguments)) as hired, Progress() as progress:
             proof = conduct(
                 folder,
                 tasks,
                 settings,
                 force=arguments.force or arguments.out is None,
-                jobs=arguments.jobs,
+                crew=hired,
                 limit=arguments.limit,
-                tell=_tell,
+                tell=tell,
                 progress=progress,
             )
     except KeyboardInterrupt:
@@ -96,19 +103,18 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
         print(f"ers: stopped; {kept}", file=sys.stderr)
         return 130
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
-    scores = scored(rows) if arguments.real is None else scored_real(rows)
+    scores = scored_simulated(rows) if arguments.real is None else scored_real(rows)
     results = plain(
         {**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)}
     )
-    told = _told(results)
-    files = _write(folder, results, rows, told) if keeps else []
+    told, files = _shown(folder if keeps else None, results, rows)
     print(as_json(results) if arguments.json else "\n".join([*told, *written(files)]))
     return 0
 
 
 def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     """The cases to be made, and what names this proof."""
-    from ers_mj.proving.conduct import Task
+    from ers_mj.workers.base import Task
 
     if arguments.real is not None:
         from ers_mj.proving import real
@@ -129,22 +135,17 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(cases)}
 
 
-def _heed_terminate() -> None:
-    """Let a plain kill stop as Ctrl-C does: no diagnosis under way is left behind."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-
-
-def _tell(line: str) -> None:
-    """A line for a person while the work goes on, out of the way of --json."""
-    print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
-
-
 def _versions(proof: Proof) -> dict[str, str]:
     from ers_mj import __version__
 
     answers = (answer.get("document") or {} for answer in proof.answers.values())
     return {"ers-mj": __version__, **next((a["versions"] for a in answers if a.get("versions")), {})}
+
+
+def _shown(folder: Path | None, results: dict, rows: list[dict]) -> tuple[list[str], list[Path]]:
+    """The lines of a terminal, and what was written of them."""
+    told = _told(results)
+    return told, _write(folder, results, rows, told) if folder is not None else []
 
 
 def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> list[Path]:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import math
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
 from ers_mj.commands.options import (
+    add_cluster,
     add_common,
     add_out,
     angle_deg,
+    crew_of,
     number,
     refuse_unknown,
     results_folder,
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from ers_mj.control.monte_carlo import Spread
     from ers_mj.control.trial import Conditions, Trial
     from ers_mj.servo.datasheet import Datasheet
+    from ers_mj.workers.base import Crew
 
 COLUMNS = (
     ("settles [ms]", "settling_time_s", 1e3, ".1f"),
@@ -61,6 +65,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     _add_sensor(parser)
     add_laws(parser)
     _add_scatter(parser)
+    add_cluster(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -164,11 +169,11 @@ def run(arguments: argparse.Namespace) -> int:
     _refuse_cases(arguments)
     datasheet, design = plant_and_design(arguments.model, arguments.design)
     conditions = _conditions(arguments)
-    with Progress() as progress:
+    with closing(_crew(arguments)) as hired, Progress() as progress:
         trials = try_out(
             datasheet, controllers, arguments.plant, arguments.case, conditions, design=design, progress=progress
         )
-        spreads = _spreads(arguments, datasheet, controllers, conditions, design, progress)
+        spreads = _spreads(arguments, datasheet, controllers, conditions, design, hired, progress)
         document = plain(
             {
                 "trials": [t.as_document() for t in trials],
@@ -188,12 +193,24 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _crew(arguments: argparse.Namespace) -> Crew:
+    """Whoever tries the scattered servos.
+
+    Raises:
+        InputError: a cluster is asked for and there is nothing to share out, or it cannot be used.
+    """
+    if arguments.cluster is not None and not arguments.plants:
+        raise InputError("--cluster shares out the servos of --plants, none are asked for; give --plants N with it")
+    return crew_of(arguments)
+
+
 def _spreads(
     arguments: argparse.Namespace,
     datasheet: Datasheet,
     controllers: list[str],
     conditions: Conditions,
     design: Datasheet,
+    hired: Crew,
     progress: Progress,
 ) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
@@ -203,7 +220,7 @@ def _spreads(
         return []
     fleet = Fleet(datasheet, arguments.plants, arguments.scatter, design)
     asked = controllers, arguments.plant, arguments.case
-    return scatter(fleet, *asked, conditions, jobs=arguments.jobs, progress=progress)
+    return scatter(fleet, *asked, conditions, crew=hired, progress=progress)
 
 
 def _refuse_cases(arguments: argparse.Namespace) -> None:

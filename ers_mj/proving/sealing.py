@@ -8,12 +8,9 @@ answers/case-NNN.json             what the diagnosis said, bound to the same has
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
@@ -21,7 +18,14 @@ from ers_mj.data.tables import reason, write_whole
 from ers_mj.errors import InputError
 
 SETTINGS, SEALED, ANSWERS = "settings.json", "sealed", "answers"
-JUDGES = ("sealing.py", "asking.py", "conduct.py", "scoring.py", "parameters.py")  # of proving/: they make no case
+JUDGES = (
+    "sealing.py",
+    "asking.py",
+    "conduct.py",
+    "scoring.py",
+    "parameters.py",
+    "contest.py",
+)  # of proving/: they make no case
 WRITTEN = ("results.json", "report.html", "summary.txt")  # by the command, at the end
 
 
@@ -44,31 +48,6 @@ def _hash_of_sources(wanted: Callable[[tuple[str, ...]], bool]) -> str:
     root = Path(__file__).resolve().parents[1]
     parts = {p: p.relative_to(root).parts for p in sorted(root.rglob("*.py"))}
     return hash_of(b"".join("/".join(names).encode() + p.read_bytes() for p, names in parts.items() if wanted(names)))
-
-
-@contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Hold the folder of a proof, made if need be, so that no other run writes into it meanwhile; let go of however the
-    run ends.
-
-    Raises:
-        InputError: it cannot be made, or another run holds it.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({reason(error)})") from None
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(
-                f"{folder}: another `ers prove` is at work in it, wait for it or name another folder"
-            ) from None
-        yield
-    finally:
-        os.close(handle)
 
 
 def begin(folder: Path, settings: Mapping, force: bool) -> bool:
