@@ -57,7 +57,7 @@ def _blanks(rng, table, fault, columns):
     """Cells without a value, alone or a few together."""
     y = table[columns["output"]].copy()
     for start in np.flatnonzero(rng.random(y.size) < 0.003):
-        y[max(start, 5) : max(start, 5) + int(rng.integers(1, 4))] = np.nan
+        y[start + 5 : start + 5 + int(rng.integers(1, 4))] = np.nan
     return table | {columns["output"]: y}
 
 
