@@ -21,9 +21,20 @@ from ers_mj.proving.quick import advance, simulate
 from ers_mj.proving.sampling import Run, Setup
 from ers_mj.proving.sizing import STIFF, levenberg
 
-FINE = (2e-5, 4e-5)  # [own s], step of the recordings: with what is stiff, or a winding, and without
-ROUGH = 3e-4  # the longest while sizing; a fifth of the winding's time constant where that is less
-CONTACTS = 4e-5  # while sizing what is stiff
+
+@dataclass(frozen=True)
+class Steps:
+    """Of the integration [own s]."""
+
+    finest: float = 2e-5  # of recordings with what is stiff, or a winding
+    fine: float = 4e-5  # of all others
+    stiff: float = 4e-5  # while sizing what is stiff
+    rough: float = 3e-4  # while sizing, at most
+    winding: float = 0.2  # of its time constant, while sizing
+    least: float = 5e-5  # while sizing
+
+
+STEPS = Steps()
 
 
 @njit(cache=True)
@@ -69,7 +80,7 @@ def is_stiff(effects: Sequence[dict]) -> bool:
 def recorded(servo: Servo, effects: Sequence[dict], step: float | None = None) -> list[Run]:
     """Every recording with these effects beside what the servo always has; the finest step by default."""
     if step is None:
-        step = FINE[0] if is_stiff(effects) or servo.params["L"] else FINE[1]
+        step = STEPS.finest if is_stiff(effects) or servo.params["L"] else STEPS.fine
     return [_run(servo, record, k, effects, step) for k, record in enumerate(servo.records)]
 
 
@@ -83,13 +94,15 @@ class Bench:
         self.sigma = self.servo.sensor["noise_sigma_eff_rad"]
         self.ordinary_inductance = self.servo.params["L"]
         winding = self.servo.params["L"] / self.servo.params["R"]
-        self.rough = float(np.clip(0.2 * winding, 5e-5, ROUGH)) if winding else ROUGH
+        self.rough = STEPS.rough
+        if winding:
+            self.rough = float(np.clip(STEPS.winding * winding, STEPS.least, STEPS.rough))
         self.runs = recorded(self.servo, [], self.rough)
         self.basis = self._basis()
 
     def step_for(self, effects: Sequence[dict]) -> float:
         """[own s] step that does for sizing these effects."""
-        return CONTACTS if is_stiff(effects) else self.rough
+        return STEPS.stiff if is_stiff(effects) else self.rough
 
     def misses(self, servo: Servo, runs: Sequence[Run]) -> list[np.ndarray]:
         """(samples,) of each recording: the angle less what this servo's model makes of it [sigma]."""

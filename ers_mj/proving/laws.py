@@ -96,21 +96,27 @@ def torque_constant(p, y):
 
 
 @njit(cache=True)
+def opposed(p, y, v):
+    """[V] (v with what tachometer and brushes add to it, the motor's back-EMF)."""
+    i = y[CUR]
+    has_motor = p.two > 0.0 or p.rod > 0.0
+    speed = y[WM] if has_motor else y[W]
+    angle = y[THM] if has_motor else y[TH]
+    emf = p.K_e * (1.0 - p.th_beta * warmth(p, y)) * p.n * ratio(p, y[TH] - p.theta_0) * speed
+    if p.tacho_a > 0.0:
+        v += p.tacho_a * emf * np.sin(p.n * angle + p.tacho_ph)
+    if p.brush_V > 0.0:
+        v -= np.copysign(p.brush_V * np.log1p(abs(i) / p.brush_i), i)
+    return v, emf
+
+
+@njit(cache=True)
 def settled_current(p, y, u, gain):
     """[A] where the winding has no inductance: L i' = 0; a drive that is told a torque holds its current at u."""
-    v = driven_voltage(p, y, u, gain)
-    i = v
+    i = driven_voltage(p, y, u, gain)
     if p.torque == 0.0:
-        has_motor = p.two > 0.0 or p.rod > 0.0
-        speed = y[WM] if has_motor else y[W]
-        angle = y[THM] if has_motor else y[TH]
-        warm = warmth(p, y)
-        emf = p.K_e * (1.0 - p.th_beta * warm) * p.n * ratio(p, y[TH] - p.theta_0) * speed
-        if p.tacho_a > 0.0:
-            v += p.tacho_a * emf * np.sin(p.n * angle + p.tacho_ph)
-        if p.brush_V > 0.0:
-            v -= np.copysign(p.brush_V * np.log1p(abs(y[CUR]) / p.brush_i), y[CUR])
-        i = (v - emf) / (p.R * (1.0 + p.th_alpha * warm))
+        v, emf = opposed(p, y, i)
+        i = (v - emf) / (p.R * (1.0 + p.th_alpha * warmth(p, y)))
     if p.lim_A > 0.0 and abs(i) > p.lim_A:
         i = np.copysign(p.lim_A if p.lim_form == 0.0 else (abs(i) + 12.0 * p.lim_A) / 13.0, i)
     return i
@@ -120,17 +126,9 @@ def settled_current(p, y, u, gain):
 def current_rate(p, y, u, gain):
     """[A/s] L i' = v - R i - K_e n w - brush drop."""
     i = y[CUR]
-    has_motor = p.two > 0.0 or p.rod > 0.0
-    speed = y[WM] if has_motor else y[W]
-    angle = y[THM] if has_motor else y[TH]
-    warm = warmth(p, y)
-    emf = p.K_e * (1.0 - p.th_beta * warm) * p.n * ratio(p, y[TH] - p.theta_0) * speed
-    v = terminal_voltage(p, y, u, gain)
-    if p.tacho_a > 0.0:
-        v += p.tacho_a * emf * np.sin(p.n * angle + p.tacho_ph)
-    if p.brush_V > 0.0:
-        v -= np.copysign(p.brush_V * np.log1p(abs(i) / p.brush_i), i)
-    rate = (v - p.R * (1.0 + p.th_alpha * warm) * i - emf) / (p.L * (1.0 - 0.4 * np.tanh(p.L_sat * i) ** 2))
+    v, emf = opposed(p, y, terminal_voltage(p, y, u, gain))
+    resistance = p.R * (1.0 + p.th_alpha * warmth(p, y))
+    rate = (v - resistance * i - emf) / (p.L * (1.0 - 0.4 * np.tanh(p.L_sat * i) ** 2))
     if p.lim_A > 0.0 and p.lim_form == 0.0 and abs(i) >= p.lim_A and rate * i > 0.0:
         return 0.0
     return rate

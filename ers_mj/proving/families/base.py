@@ -106,7 +106,7 @@ class Record:
     controller: dict
     inherent: list[dict]
     constants: dict[str, float] = field(default_factory=dict)  # columns kp, load_kg, arm_m
-    told: np.ndarray | None = None  # of a position loop: the reference that is logged
+    told: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of a position loop: the reference that is logged
     lead: int = 0  # samples of the loop before the log begins
 
 
