@@ -29,6 +29,8 @@ from ers_mj.proving.sampling import Setup
 from ers_mj.proving.strength import nearest
 from ers_mj.report import proof_report
 from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.workers.base import Task
+from ers_mj.workers.held import held
 
 PACKAGE = Path(__file__).resolve().parents[1] / "ers_mj"
 T = np.arange(0.0, 2.0, 1e-3)
@@ -77,8 +79,8 @@ def test_the_generator_knows_nothing_of_the_effects_folder():
         seen.add(path)
         todo |= imported(path) - seen
     rooms = {p.relative_to(PACKAGE).parts[0].removesuffix(".py") for p in seen}
-    assert rooms <= {"proving", "plants", "errors", "data", "__init__"}
-    assert {p.name for p in seen if p.parent.name == "data"} <= {"__init__.py", "tables.py"}
+    assert rooms <= {"proving", "passing", "plants", "errors", "data", "workers", "__init__"}
+    assert {p.name for p in seen if p.parent.name == "data"} <= {"__init__.py", "tables.py", "whole.py"}
     assert {p.name for p in seen if p.parent.name == "plants"} == {"__init__.py", "mjcf.py"}
 
 
@@ -199,7 +201,7 @@ def made(name, seed):
     }
 
 
-TASKS = [conduct.Task(f"case-{k:03d}", made, (f"case-{k:03d}", k)) for k in (1, 2, 3)]
+TASKS = [Task(f"case-{k:03d}", made, (f"case-{k:03d}", k)) for k in (1, 2, 3)]
 SETTINGS = {"kind": "simulated", "seed": 1, "cases": 3}
 COST = {"exit": 0, "wall_s": 2.0, "cpu_s": 1.0, "peak_MiB": 100.0}
 
@@ -271,7 +273,7 @@ def test_another_proof_in_the_folder_is_refused_and_forced(tmp_path, asked):
 
 
 def test_a_folder_in_which_another_run_is_at_work_is_refused(tmp_path, asked):
-    with sealing.held(tmp_path / "p"), pytest.raises(InputError, match="another `ers prove` is at work"):
+    with held(tmp_path / "p", "ers prove"), pytest.raises(InputError, match="another `ers prove` is at work"):
         conduct.conduct(tmp_path / "p", TASKS, SETTINGS)
     assert not any((tmp_path / "p").iterdir())
     conduct.conduct(tmp_path / "p", TASKS, SETTINGS)  # let go of, it is free again

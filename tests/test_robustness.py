@@ -10,6 +10,7 @@ from ers_mj import cli
 from ers_mj.control.monte_carlo import Fleet, Spread, scatter, scattered
 from ers_mj.control.trial import Conditions, try_out
 from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.workers.here import Here
 
 SHEET = read_datasheet("table1")
 CONDITIONS = Conditions(rate_hz=500.0, noise=1e-4, seed=3, effects=(("stribeck", {"dF_s": 0.05, "v_s": 0.3}),))
@@ -17,7 +18,7 @@ CONDITIONS = Conditions(rate_hz=500.0, noise=1e-4, seed=3, effects=(("stribeck",
 
 def test_jobs_do_not_change_the_result_and_seeds_do():
     runs = [
-        scatter(Fleet(SHEET, 3, 1.3), ["pid"], ["reduced"], ["step"], replace(CONDITIONS, seed=seed), jobs=jobs)
+        scatter(Fleet(SHEET, 3, 1.3), ["pid"], ["reduced"], ["step"], replace(CONDITIONS, seed=seed), crew=Here(jobs))
         for seed, jobs in ((3, 1), (3, 2), (4, 1))
     ]
     assert runs[0] == runs[1] and runs[0] != runs[2] and len(runs[0][0].measures) == 3

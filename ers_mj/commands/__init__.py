@@ -5,10 +5,13 @@ frequency), output (files, JSON, lines). What is slow to import is imported insi
 """
 
 from ers_mj.commands import (
+    batch,
     cache,
+    compare,
     demo,
     diagnose,
     excite,
+    export,
     frequency,
     gains,
     identify,
@@ -29,11 +32,14 @@ COMMANDS = (
     validate,
     view,
     inspect,
+    compare,
+    batch,
     prove,
     trial,
     gains,
     frequency,
     watch,
     excite,
+    export,
     cache,
 )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Sequence
-from pathlib import Path
+
+from ers_mj.commands.keeping import Kept
 
 
 class Progress:
@@ -34,11 +34,17 @@ class Progress:
             sys.stderr.flush()
 
 
-def written(files: Sequence[Path]) -> list[str]:
+def written(kept: Kept) -> list[str]:
     """The lines that tell which files were written, none where there are none."""
-    return ["", bold("written"), *(f"  {path}" for path in files)] if files else []
+    title = "written, in the place of what was there" if kept.replaced else "written"
+    return ["", bold(title), *(f"  {path}" for path in kept.files)] if kept.files else []
 
 
 def bold(text: str) -> str:
     """Text in bold on a terminal."""
     return f"\x1b[1m{text}\x1b[0m" if sys.stdout.isatty() and "NO_COLOR" not in os.environ else text
+
+
+def tell(line: str) -> None:
+    """A line for a person while the work goes on, out of the way of --json."""
+    print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)

@@ -5,20 +5,22 @@ truth.
 from __future__ import annotations
 
 import argparse
-import signal
-import sys
 import tempfile
-import threading
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import DEFAULT_OUT, add_common, add_out, number, whole
-from ers_mj.commands.output import Progress, bold, written
-from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
-from ers_mj.errors import InputError
+from ers_mj import stopping
+from ers_mj.commands.contest import add_contest, exported, scored, wanted
+from ers_mj.commands.keeping import Kept, Place, folder_for, keep
+from ers_mj.commands.options import add_cluster, add_common, add_out, crew_of, number, whole
+from ers_mj.commands.output import Progress, bold, tell, written
+from ers_mj.door.saving import as_json, plain, report_writers, write_results, write_text
+from ers_mj.passing import passing
 
 if TYPE_CHECKING:
-    from ers_mj.proving.conduct import Proof, Task
+    from ers_mj.proving.conduct import Proof
+    from ers_mj.workers.base import Task
 
 CASES = 20  # of a proof that names no number
 
@@ -29,18 +31,26 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "prove",
         help="conceal effects, diagnose them blind, score",
         description=(
-            "Measure what the diagnosis can do. Servos are drawn, effects concealed in them in other forms than the"
-            " library's, recorded in\nMuJoCo; the truth is sealed and its hash printed; each case is diagnosed by a"
-            " process that gets its files only; the truth is\nopened and the answers scored. A quarter of the cases"
-            " hides nothing, half one effect, 15 % several, 10 % one that the\nlibrary does not have. Stopped with"
-            " Ctrl-C, the same command goes on where it was."
+            "Measure what the diagnosis can do. Servos of several families are drawn, effects concealed in them,"
+            " recorded in MuJoCo\nor by an integrator of the proof's own; the truth is sealed and its hash printed;"
+            " each case is diagnosed by a process\nthat gets its files only; the truth is opened, the answers scored."
+            " A quarter of the cases hides nothing, half one effect,\n15 % several, 10 % one that the library does not"
+            " have. Stopped with Ctrl-C, the same command goes on where it was."
         ),
         epilog=(
-            "examples:\n  ers prove --cases 40 --seed 7 --out proof\n  ers prove --real ../shared/data --cases 15 --out"
-            " proof-real"
+            "examples:\n  ers prove --cases 40 --seed 7 --out proof\n"
+            "  ers prove --families screw,position --cases 8 --seed 7\n"
+            "  ers prove --real ../shared/data --cases 15 --out proof-real\n"
+            "  ers prove --cases 20 --export cases\n  ers prove --score answers --truth cases.truth.json"
         ),
     )
     parser.add_argument("--cases", type=whole(1), metavar="N", help=f"how many (default {CASES})")
+    parser.add_argument(
+        "--families",
+        metavar="NAME,...",
+        help="kinds of servos, in turn (default all): rudder, hobby, direct, screw, throttle, strain_wave, gimbal,"
+        " position",
+    )
     parser.add_argument(
         "--real",
         metavar="FOLDER",
@@ -49,66 +59,69 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)"
     )
+    add_contest(parser)
+    add_cluster(parser)
     add_out(parser)
     add_common(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, seed=None)  # cases for others are drawn by chance
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped."""
+    """Conduct, write, tell; 0 whatever comes out, 130 where it was stopped. Or what others are handed, and scored."""
+    if wanted(arguments):
+        return exported(arguments, _tasks) if arguments.export is not None else scored(arguments, _shown)
+    arguments.seed = arguments.seed or 0
     if arguments.out is None and arguments.json:
-        with tempfile.TemporaryDirectory(prefix="ers-prove-") as passing:
-            return _run(Path(passing), arguments, keeps=False)
-    folder = Path(DEFAULT_OUT if arguments.out is None else arguments.out)
-    if arguments.out == "":
-        raise InputError("--out is empty, a folder was expected")
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file, --out needs a folder")
-    refuse_unwritable(folder)
-    return _run(folder, arguments, keeps=True)
+        with passing(Path(tempfile.mkdtemp(prefix="ers-prove-"))) as folder:
+            return _run(folder, arguments, None)
+    from ers_mj.proving.sealing import WRITTEN, refuse_foreign
+
+    place = folder_for(arguments.out, arguments.force, WRITTEN, may_hold=True)
+    if place.is_default and not arguments.force:
+        refuse_foreign(place.folder)
+    return _run(place.folder, arguments, place)
 
 
-def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
+def _run(folder: Path, arguments: argparse.Namespace, place: Place | None) -> int:
     tasks, settings = _tasks(arguments)
-    _heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
-    from ers_mj.proving.scoring import row_of, scored
+    from ers_mj.proving.scoring import row_of
+    from ers_mj.proving.scoring import scored as scored_simulated
 
     try:
-        with Progress() as progress:
+        with closing(crew_of(arguments)) as hired, Progress() as progress:
             proof = conduct(
                 folder,
                 tasks,
                 settings,
                 force=arguments.force or arguments.out is None,
-                jobs=arguments.jobs,
+                crew=hired,
                 limit=arguments.limit,
-                tell=_tell,
+                tell=tell,
                 progress=progress,
             )
     except KeyboardInterrupt:
-        kept = (
+        state = (
             f"{folder} keeps what was done, the same command goes on from there"
-            if keeps
+            if place is not None
             else "nothing was kept, --out DIR would keep it"
         )
-        print(f"ers: stopped; {kept}", file=sys.stderr)
-        return 130
+        stopping.tell(f"; {state}")
+        return stopping.STOPPED
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
-    scores = scored(rows) if arguments.real is None else scored_real(rows)
+    scores = scored_simulated(rows) if arguments.real is None else scored_real(rows)
     results = plain(
         {**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)}
     )
-    told = _told(results)
-    files = _write(folder, results, rows, told) if keeps else []
-    print(as_json(results) if arguments.json else "\n".join([*told, *written(files)]))
-    return 0
+    told, kept = _shown(place, results, rows)
+    print(as_json(results) if arguments.json else "\n".join([*told, *written(kept)]))
+    return kept.code
 
 
 def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     """The cases to be made, and what names this proof."""
-    from ers_mj.proving.conduct import Task
+    from ers_mj.workers.base import Task
 
     if arguments.real is not None:
         from ers_mj.proving import real
@@ -122,22 +135,13 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
             "cases": len(plans),
             "folder": str(Path(arguments.real).absolute()),
         }
-    from ers_mj.proving import case
+    from ers_mj.proving import world
 
-    cases = case.plans(arguments.cases or CASES, arguments.seed)
-    tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in cases]
-    return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(cases)}
-
-
-def _heed_terminate() -> None:
-    """Let a plain kill stop as Ctrl-C does: no diagnosis under way is left behind."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-
-
-def _tell(line: str) -> None:
-    """A line for a person while the work goes on, out of the way of --json."""
-    print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
+    families = world.chosen(arguments.families and [name.strip() for name in arguments.families.split(",")])
+    cases = world.plans(arguments.cases or CASES, arguments.seed, families)
+    tasks = [Task(f"case-{plan.index + 1:03d}", world.make, (plan, arguments.seed)) for plan in cases]
+    settings = {"kind": "simulated", "seed": arguments.seed, "cases": len(cases), "families": ",".join(families)}
+    return tasks, settings
 
 
 def _versions(proof: Proof) -> dict[str, str]:
@@ -145,6 +149,12 @@ def _versions(proof: Proof) -> dict[str, str]:
 
     answers = (answer.get("document") or {} for answer in proof.answers.values())
     return {"ers-mj": __version__, **next((a["versions"] for a in answers if a.get("versions")), {})}
+
+
+def _shown(place: Place | None, results: dict, rows: list[dict]) -> tuple[list[str], Kept]:
+    """The lines of a terminal, and what was written of them."""
+    told = _told(results)
+    return told, keep(place, lambda folder: _write(folder, results, rows, told))
 
 
 def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> list[Path]:
@@ -164,6 +174,7 @@ def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> li
 
 def _told(results: dict) -> list[str]:
     """What a terminal shows when all is done."""
+    from ers_mj.report.proof_families import told_families
     from ers_mj.report.proof_report import headline, table_of
 
     counts = ", ".join(f"{n} {kind}" for kind, n in results["counts"].items() if n)
@@ -176,6 +187,7 @@ def _told(results: dict) -> list[str]:
         lines.append(
             f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]"
         )
+    lines += told_families(results)
     lines += _told_real(results) if "concealed_in_real" in results else _told_confusion(results["confusion"])
     over, cpu, pair, wall = (results[name] for name in ("error_over_floor", "cpu_s", "cpu_s_of_a_pair", "wall_s"))
     lines += (

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import argparse
 import math
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ers_mj.commands.keeping import Kept, keep, results_folder
 from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
 from ers_mj.commands.options import (
+    add_cluster,
     add_common,
     add_out,
     angle_deg,
+    crew_of,
     number,
     refuse_unknown,
-    results_folder,
     several,
     small_deg,
     swing_deg,
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from ers_mj.control.monte_carlo import Spread
     from ers_mj.control.trial import Conditions, Trial
     from ers_mj.servo.datasheet import Datasheet
+    from ers_mj.workers.base import Crew
 
 COLUMNS = (
     ("settles [ms]", "settling_time_s", 1e3, ".1f"),
@@ -39,6 +43,8 @@ COLUMNS = (
     ("chatter [V]", "chatter_V", 1.0, ".3f"),
     ("energy [J]", "energy_J", 1.0, ".2f"),
 )
+
+RESULTS = ("trials.json", "report.html")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -61,6 +67,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     _add_sensor(parser)
     add_laws(parser)
     _add_scatter(parser)
+    add_cluster(parser)
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -155,7 +162,7 @@ def _add_scatter(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run every combination, write, tell; 0."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     from ers_mj.control.controllers import CONTROLLERS
     from ers_mj.control.paper_claims import headline
     from ers_mj.control.trial import try_out
@@ -164,11 +171,11 @@ def run(arguments: argparse.Namespace) -> int:
     _refuse_cases(arguments)
     datasheet, design = plant_and_design(arguments.model, arguments.design)
     conditions = _conditions(arguments)
-    with Progress() as progress:
+    with closing(_crew(arguments)) as hired, Progress() as progress:
         trials = try_out(
             datasheet, controllers, arguments.plant, arguments.case, conditions, design=design, progress=progress
         )
-        spreads = _spreads(arguments, datasheet, controllers, conditions, design, progress)
+        spreads = _spreads(arguments, datasheet, controllers, conditions, design, hired, progress)
         document = plain(
             {
                 "trials": [t.as_document() for t in trials],
@@ -183,9 +190,20 @@ def run(arguments: argparse.Namespace) -> int:
                 "versions": versions(),
             }
         )
-        files = _write(folder, document, trials, spreads, progress) if folder is not None else []
-    print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
-    return 0
+        kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress))
+    print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
+    return kept.code
+
+
+def _crew(arguments: argparse.Namespace) -> Crew:
+    """Whoever tries the scattered servos.
+
+    Raises:
+        InputError: a cluster is asked for and there is nothing to share out, or it cannot be used.
+    """
+    if arguments.cluster is not None and not arguments.plants:
+        raise InputError("--cluster shares out the servos of --plants, none are asked for; give --plants N with it")
+    return crew_of(arguments)
 
 
 def _spreads(
@@ -194,6 +212,7 @@ def _spreads(
     controllers: list[str],
     conditions: Conditions,
     design: Datasheet,
+    hired: Crew,
     progress: Progress,
 ) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
@@ -203,7 +222,7 @@ def _spreads(
         return []
     fleet = Fleet(datasheet, arguments.plants, arguments.scatter, design)
     asked = controllers, arguments.plant, arguments.case
-    return scatter(fleet, *asked, conditions, jobs=arguments.jobs, progress=progress)
+    return scatter(fleet, *asked, conditions, crew=hired, progress=progress)
 
 
 def _refuse_cases(arguments: argparse.Namespace) -> None:
@@ -264,7 +283,7 @@ def _write(folder: Path, document: dict, trials: list[Trial], spreads: list[Spre
 # -- the trials in lines --------------------------------------------------------------------------------------------
 
 
-def _told(document: dict, files: list[Path]) -> list[str]:
+def _told(document: dict, kept: Kept) -> list[str]:
     """What a terminal shows when all is done."""
     lines = ["", bold(document["sentence"])]
     keys = list(dict.fromkeys((t["case"], t["plant"]) for t in document["trials"]))
@@ -280,7 +299,7 @@ def _told(document: dict, files: list[Path]) -> list[str]:
                 lines.append(f"  {t['controller']:24}{cells}")
     lines += _spread_lines(document)
     lines += ["", *document["notes"]] if document["notes"] else []
-    return lines + written(files)
+    return lines + written(kept)
 
 
 def _spread_lines(document: dict) -> list[str]:

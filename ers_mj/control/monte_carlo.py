@@ -7,17 +7,22 @@ fleet (datasheet, count, spread), seed -> servos -> trials of each -> distributi
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ers_mj.control.controllers import Servo
 from ers_mj.control.metrics import Measures
-from ers_mj.control.trial import Conditions, try_out
+from ers_mj.control.references import Reference
+from ers_mj.control.trial import Conditions, references, try_out
 from ers_mj.effects import BY_NAME
+from ers_mj.errors import ErsError
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import EffectSettings
+from ers_mj.workers.base import Crew, Task
+from ers_mj.workers.here import Here
 
+ALONE = Here(1)
 SCATTERED = ("J", "B", "K_t", "K_e", "k_s", "T_LH", "F_c", "R", "L")
 LUMPED = ("a_1", "a_2", "b", "c_1", "c_2")
 QUANTILES = (0.05, 0.5, 0.95)
@@ -126,32 +131,29 @@ def scatter(
     cases: Sequence[str],
     conditions: Conditions,
     *,
-    jobs: int = 1,
+    crew: Crew = ALONE,
     progress: Progress = lambda text, fraction: None,
 ) -> list[Spread]:
-    """Try all combinations on every servo of a fleet, on ``jobs`` cores, which do not change the result. Servo k has
+    """Try all combinations on every servo of a fleet, by these workers, which do not change the result. Servo k has
     the noise of seed + k.
 
     Raises:
         InputError: as :func:`ers_mj.control.trial.try_out`.
     """
-    count, wanted = fleet.count, (tuple(controllers), tuple(plants), tuple(cases))
-    found: list[dict[Key, Measures]] = [{}] * count
-    if jobs <= 1:
-        for k in range(count):
-            progress(f"servo {k + 1} of {count}", k / count)
-            found[k] = _one(fleet, k, wanted, conditions)
-    else:
-        with ProcessPoolExecutor(min(jobs, count)) as pool:
-            waiting = {pool.submit(_one, fleet, k, wanted, conditions): k for k in range(count)}
-            for done, future in enumerate(as_completed(waiting), start=1):
-                found[waiting[future]] = future.result()
-                progress(f"servo {done} of {count}", done / count)
+    aims = references(cases, Servo.of(fleet.design or fleet.datasheet), conditions)  # workers have no files of ours
+    wanted = tuple(controllers), tuple(plants), tuple(aims)
+    tasks = [Task(str(k), _one, (fleet, k, wanted, conditions)) for k in range(fleet.count)]
+    found: list[dict[Key, Measures]] = [{}] * fleet.count
+    for count, done in enumerate(crew.run(tasks), start=1):
+        if done.lost:
+            raise ErsError(f"servo {int(done.name) + 1} of {fleet.count}: {done.lost}")
+        found[int(done.name)] = done.value
+        progress(f"servo {count} of {fleet.count}", count / fleet.count)
     return [Spread(*key, measures=tuple(measures[key] for measures in found)) for key in found[0]]
 
 
 def _one(
-    fleet: Fleet, k: int, wanted: tuple[Sequence[str], Sequence[str], Sequence[str]], conditions: Conditions
+    fleet: Fleet, k: int, wanted: tuple[Sequence[str], Sequence[str], Sequence[Reference]], conditions: Conditions
 ) -> dict[Key, Measures]:
     """All trials of servo k: {(controller, plant, case): measures}."""
     random = np.random.default_rng([conditions.seed, k])

@@ -121,15 +121,17 @@ def refuse_late(plant: Plant, rate_hz: float, most: int) -> None:
         )
 
 
-def references(cases: Sequence[str], servo: Servo, conditions: Conditions) -> list[Reference]:
-    """The references of names and files.
+def references(cases: Sequence[str | Reference], servo: Servo, conditions: Conditions) -> list[Reference]:
+    """The references of names and files; those that are some already stay as they are.
 
     Raises:
         InputError: a file is no reference, or two references have one name.
     """
     found = [
         (
-            named(case, conditions.amplitude, conditions.start, conditions.rate_hz)
+            case
+            if isinstance(case, Reference)
+            else named(case, conditions.amplitude, conditions.start, conditions.rate_hz)
             if case in CASES
             else read_reference(case, servo, conditions.u_max)
         )
@@ -147,7 +149,7 @@ def try_out(
     datasheet: Datasheet,
     controllers: Sequence[str],
     plants: Sequence[str],
-    cases: Sequence[str],
+    cases: Sequence[str | Reference],
     conditions: Conditions = Conditions(),
     *,
     design: Datasheet | None = None,
@@ -157,7 +159,7 @@ def try_out(
 
     Args:
         datasheet: the plant.
-        controllers, plants, cases: names; a case may be a file.
+        controllers, plants, cases: names; a case may be a file, or a reference.
         conditions: of all trials.
         design: what the controllers know of the plant; the datasheet itself where None.
         progress: told (text, fraction).

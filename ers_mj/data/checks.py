@@ -21,6 +21,8 @@ class Limits:
 
     most_missing: float = 0.20  # share of a column: a required one is refused, another one not used
     least_jitter: float = 0.01  # rms share of the step from which jitter is worth a sentence
+    largest: float = 1e25  # of any column: no sensor gives more, and its powers are still numbers
+    least_travel: float = 1e-25  # of an output, below which it is constant
     ends: tuple[int, ...] = (32767, 32768)  # counts at which a register of 16 bits ends
     fewest_at_end: int = 3  # samples there
 
@@ -36,16 +38,24 @@ def checked(values: dict[str, np.ndarray], labels: dict[str, str], name: str) ->
     for field, x in values.items():
         _refuse_length(x, labels[field], len(values["t"]), name)
         _refuse_infinite(x, labels[field], name)
+        _refuse_huge(x, labels[field], name)
     refuse_time(values["t"], labels["t"], name)
     for field in ("u", "y"):
         _refuse_missing(values[field], labels[field], name)
-    if np.nanmin(values["y"]) == np.nanmax(values["y"]):
-        raise InputError(f"{name}: the output {labels['y']} is constant at {np.nanmax(values['y']):.6g}")
+    refuse_still(values["y"], labels["y"], name)
     used = {field: x for field, x in values.items() if field not in CONSTANT and not _sparse(x)}
     fields = {field: x if field in MEASURED else _held(x) for field, x in used.items()}
     if "enable" in fields:
         fields["enable"] = fields["enable"] > 0.5
     return {field: locked(x) for field, x in (fields | {"valid": np.isfinite(values["y"])}).items()}
+
+
+def refuse_still(y: np.ndarray, label: str, name: str) -> None:
+    """Raise InputError where the output y (N,) is constant."""
+    known = y[np.isfinite(y)]
+    if not known.size or np.ptp(known) < LIMITS.least_travel:
+        told = f" at {known[0]:.6g}" if known.size else ""
+        raise InputError(f"{name}: the output {label} is constant{told}")
 
 
 def constants(values: dict[str, np.ndarray], labels: dict[str, str], name: str) -> dict[str, float]:
@@ -74,6 +84,12 @@ def _refuse_length(x: np.ndarray, label: str, count: int, name: str) -> None:
 def _refuse_infinite(x: np.ndarray, label: str, name: str) -> None:
     if np.isinf(x).any():
         raise InputError(f"{name}: {label} is infinite in data row {1 + int(np.argmax(np.isinf(x)))}")
+
+
+def _refuse_huge(x: np.ndarray, label: str, name: str) -> None:
+    if (huge := np.abs(x) > LIMITS.largest).any():
+        row = int(np.argmax(huge))
+        raise InputError(f"{name}: {label} is {x[row]:.3g} in data row {row + 1}, at most {LIMITS.largest:.0e} may be")
 
 
 def refuse_time(t: np.ndarray, label: str, name: str) -> None:

@@ -21,6 +21,7 @@ from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places,
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
 from ers_mj.diagnosis.sentences import sentence, shown
+from ers_mj.diagnosis.told_model import with_diagnosis
 from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
@@ -96,7 +97,8 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         case.recordings[0].input_unit,
         spectrum,
     )
-    return Diagnosis(document, evidence, _improved(case), case.rig.plant(model if case.told_effects else base))
+    model_told = with_diagnosis(_improved(case), document)
+    return Diagnosis(document, evidence, model_told, case.rig.plant(model if case.told_effects else base))
 
 
 def _remainder(case: Case) -> dict:
@@ -362,13 +364,11 @@ def _improved(case: Case) -> Datasheet:
 
 
 def versions_of() -> dict:
-    import numba
-    import scipy
+    from importlib.metadata import version
 
     return {
         "ers-mj": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
+        **{package: version(package) for package in ("scipy", "numba")},
     }

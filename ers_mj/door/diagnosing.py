@@ -31,6 +31,7 @@ class Diagnosis(Result):
     """
 
     made_by = ""  # the command, where one made it, for the page
+    made_on = ""  # the day that the page tells, today where none is given
 
     def __init__(self, found: Found):
         super().__init__(found.document)
@@ -96,7 +97,7 @@ class Diagnosis(Result):
         from ers_mj.report.diagnosis_report import Made, report_page
         from ers_mj.view.frames import frames_of
 
-        found, made = self._found, Made(self.made_by, today(), ("diagnosis.json", *self._beside))
+        found, made = self._found, Made(self.made_by, self.made_on or today(), ("diagnosis.json", *self._beside))
         return report_page(self._document, found.evidence, frames_of(found.plant, found.evidence), made)
 
     def _writers(self) -> Writers:

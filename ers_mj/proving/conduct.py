@@ -5,13 +5,13 @@ The same seed gives the same cases and answers whatever the number of jobs; what
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
+from ers_mj.errors import ErsError
 from ers_mj.proving.asking import LIMIT, Asker
 from ers_mj.proving.sealing import (
     answer_of,
@@ -19,24 +19,19 @@ from ers_mj.proving.sealing import (
     has_case,
     hash_of_diagnosis,
     hash_of_maker,
-    held,
     keep_answer,
     keep_case,
     opened,
     seal,
 )
+from ers_mj.workers.base import Crew, Task
+from ers_mj.workers.held import held
+from ers_mj.workers.here import Here
 
 Progress = Callable[[str, float], None]
 MAKING = 0.4  # share of the bar
-
-
-@dataclass(frozen=True)
-class Task:
-    """A case to be made: `make(*what)` gives its files and its truth. It travels to another process."""
-
-    name: str
-    make: Callable[..., tuple[dict[str, str], dict]]
-    what: tuple
+ALONE = Here(1)
+REAL = "real"  # the kind of a proof that conceals in real records
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ def conduct(
     settings: dict,
     *,
     force: bool = False,
-    jobs: int = 1,
+    crew: Crew = ALONE,
     limit: float = LIMIT,
     tell: Callable[[str], None] = lambda text: None,
     progress: Progress = lambda text, share: None,
@@ -62,6 +57,8 @@ def conduct(
     """Carry out a proof in this folder, or carry on with it.
 
     Args:
+        tasks: cases to be made, each ``call(*what)`` giving its files and its truth.
+        crew: who makes them and who is asked; real records are handed out by this machine, which has them.
         tell: called with lines for a person as they come, the hash before the first question among them.
 
     Raises:
@@ -69,11 +66,12 @@ def conduct(
         KeyboardInterrupt: stopped; what was made and answered is kept.
     """
     settings = {**settings, "limit_s": limit, "made_by": hash_of_maker()}
-    with held(folder):
+    with held(folder, "ers prove"):
         if begin(folder, settings, force):
             tell(f"{folder}: goes on where it was left")
         names = [task.name for task in tasks]
-        _make(folder, [task for task in tasks if not has_case(folder, task.name)], jobs, progress)
+        maker = crew if settings.get("kind") != REAL else ALONE
+        _make(folder, [task for task in tasks if not has_case(folder, task.name)], maker, progress)
         digest = seal(folder, names)
         tell(f"the truth of {len(names)} cases is sealed, sha256 {digest}")
         code = hash_of_diagnosis()
@@ -81,54 +79,59 @@ def conduct(
             folder,
             [name for name in names if answer_of(folder, name, code) is None],
             Asker(code, limit),
-            jobs,
+            crew,
             progress,
         )
         return Proof(opened(folder, digest), {name: answer_of(folder, name, code) or {} for name in names}, digest)
 
 
-def _make(folder: Path, tasks: Sequence[Task], jobs: int, progress: Progress) -> None:
-    """Make the cases, here or in processes of their own."""
-    if min(jobs, len(tasks)) <= 1:
-        for k, task in enumerate(tasks):
-            progress(f"making case {k + 1} of {len(tasks)}", MAKING * k / len(tasks))
-            _made((folder, task))
-        return
-    with multiprocessing.get_context("spawn").Pool(
-        min(jobs, len(tasks)), initializer=_deaf
-    ) as pool:  # left early, it ends its processes
-        for k, _ in enumerate(pool.imap_unordered(_made, [(folder, task) for task in tasks])):
-            progress(f"making case {k + 2} of {len(tasks)}", MAKING * (k + 1) / len(tasks))
+def _make(folder: Path, tasks: Sequence[Task], crew: Crew, progress: Progress) -> None:
+    """Make the cases and keep each as it comes."""
+    for k, done in enumerate(crew.run(tasks), start=1):
+        if done.lost:
+            raise ErsError(f"{done.name}: {done.lost}")
+        keep_case(folder, done.name, *done.value)
+        progress(f"making case {min(k + 1, len(tasks))} of {len(tasks)}", MAKING * k / len(tasks))
 
 
-def _deaf() -> None:
-    """Leave Ctrl-C to the process that conducts."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _made(job: tuple[Path, Task]) -> None:
-    folder, task = job
-    keep_case(folder, task.name, *task.make(*task.what))
-
-
-def _ask(folder: Path, names: Sequence[str], asker: Asker, jobs: int, progress: Progress) -> None:
+def _ask(folder: Path, names: Sequence[str], asker: Asker, crew: Crew, progress: Progress) -> None:
     """Ask about these cases, some at a time, and keep every answer as it comes."""
+    answers = _here(folder, names, asker, crew.jobs) if isinstance(crew, Here) else _there(folder, names, asker, crew)
+    for k, (name, answer) in enumerate(answers, start=1):
+        keep_answer(folder, name, answer)
+        share = MAKING + (1 - MAKING) * k / len(names)
+        progress(f"diagnosing case {min(k + 1, len(names))} of {len(names)}", share)
+
+
+def _here(folder: Path, names: Sequence[str], asker: Asker, jobs: int) -> Iterator[tuple[str, dict]]:
+    """Each diagnosis is a process of its own already; threads wait for them."""
     with ThreadPoolExecutor(jobs) as pool:
+        pending = {pool.submit(asker.ask, folder / name): name for name in names}
         try:
-            pending = {pool.submit(_asked, folder, name, asker) for name in names}
-            while pending:
-                done = len(names) - len(pending)
-                progress(f"diagnosing case {done + 1} of {len(names)}", MAKING + (1 - MAKING) * done / len(names))
-                finished, pending = wait(pending, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    future.result()
+            for future in as_completed(pending):
+                answer = future.result()
+                if answer is not None:
+                    yield pending[future], answer
         except BaseException:
             asker.stop()
             pool.shutdown(cancel_futures=True)
             raise
 
 
-def _asked(folder: Path, name: str, asker: Asker) -> None:
-    answer = asker.ask(folder / name)
-    if answer is not None:
-        keep_answer(folder, name, answer)
+def _there(folder: Path, names: Sequence[str], asker: Asker, crew: Crew) -> Iterator[tuple[str, dict]]:
+    """On the workers of a cluster, which get a case's files and nothing else."""
+    files = lambda name: {path.name: path.read_bytes() for path in (folder / name).iterdir()}
+    for done in crew.run(Task(name, asked_there, (name, files(name), asker.code, asker.limit)) for name in names):
+        if done.lost:
+            raise ErsError(f"{done.name}: {done.lost}")
+        yield done.name, done.value
+
+
+def asked_there(name: str, files: dict[str, bytes], code: str, limit: float) -> dict:
+    """The answer to one case, asked where this runs."""
+    with tempfile.TemporaryDirectory(prefix="ers-case-") as passing:
+        case = Path(passing) / name
+        case.mkdir()
+        for file, content in files.items():
+            (case / file).write_bytes(content)
+        return Asker(code, limit).ask(case) or {}

@@ -8,20 +8,25 @@ answers/case-NNN.json             what the diagnosis said, bound to the same has
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
-from ers_mj.data.tables import reason, write_whole
+from ers_mj.data.tables import reason
+from ers_mj.data.whole import write_whole
 from ers_mj.errors import InputError
 
 SETTINGS, SEALED, ANSWERS = "settings.json", "sealed", "answers"
-JUDGES = ("sealing.py", "asking.py", "conduct.py", "scoring.py", "parameters.py")  # of proving/: they make no case
+JUDGES = (
+    "sealing.py",
+    "asking.py",
+    "conduct.py",
+    "scoring.py",
+    "parameters.py",
+    "contest.py",
+)  # of proving/: they make no case
 WRITTEN = ("results.json", "report.html", "summary.txt")  # by the command, at the end
 
 
@@ -44,31 +49,6 @@ def _hash_of_sources(wanted: Callable[[tuple[str, ...]], bool]) -> str:
     root = Path(__file__).resolve().parents[1]
     parts = {p: p.relative_to(root).parts for p in sorted(root.rglob("*.py"))}
     return hash_of(b"".join("/".join(names).encode() + p.read_bytes() for p, names in parts.items() if wanted(names)))
-
-
-@contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Hold the folder of a proof, made if need be, so that no other run writes into it meanwhile; let go of however the
-    run ends.
-
-    Raises:
-        InputError: it cannot be made, or another run holds it.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({reason(error)})") from None
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(
-                f"{folder}: another `ers prove` is at work in it, wait for it or name another folder"
-            ) from None
-        yield
-    finally:
-        os.close(handle)
 
 
 def begin(folder: Path, settings: Mapping, force: bool) -> bool:
@@ -102,9 +82,21 @@ def begin(folder: Path, settings: Mapping, force: bool) -> bool:
     return False
 
 
+def refuse_foreign(folder: Path) -> None:
+    """Raise InputError where a folder holds folders of a proof's names, and no proof."""
+    held = [path for path in _kept(folder) if path.exists()]
+    if held and _read(folder / SETTINGS) is None:
+        raise InputError(f"{held[0]}: is of no proof, move it, or name another folder with --out")
+
+
+def _kept(folder: Path) -> list[Path]:
+    """The folders in which a proof keeps what it made."""
+    return [folder / SEALED, folder / ANSWERS, *folder.glob("case-[0-9][0-9][0-9]*")]
+
+
 def _clear(folder: Path) -> None:
     """Remove what an earlier proof wrote, and nothing else."""
-    for path in [folder / SEALED, folder / ANSWERS, *folder.glob("case-[0-9][0-9][0-9]*")]:
+    for path in _kept(folder):
         shutil.rmtree(path, ignore_errors=True)
     for name in (SETTINGS, *WRITTEN):
         (folder / name).unlink(missing_ok=True)

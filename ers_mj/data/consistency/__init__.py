@@ -19,6 +19,7 @@ from ers_mj.data.consistency.sheet import Fault, Sheet
 STEPS = (
     clock.scale,
     clock.jumps,
+    clock.pieces,
     clock.lone_rows,
     scales.whole_numbers,
     scales.duty_counts,

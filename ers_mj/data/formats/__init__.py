@@ -15,11 +15,12 @@ import io
 import os
 import re
 import sys
+import traceback
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ers_mj.data.formats.base import File, Loaded
+from ers_mj.data.formats.base import MOST, File, Loaded, refuse_large
 from ers_mj.data.tables import listed, read_content, reason
 from ers_mj.errors import ErsError, InputError
 
@@ -78,9 +79,12 @@ def _read(module: str, file: File) -> Loaded:
             return reader.load(file)
         except ErsError:
             raise
+        except MemoryError:
+            raise InputError(f"{file.name}: takes more memory than there is, cut it") from None
         except Exception as error:
+            traceback.clear_frames(error.__traceback__)  # and with them what the library has left half read
             told = re.sub(r"'?<_io\.\w+ object at 0x[0-9a-f]+>'?", "it", reason(error))
-        gc.collect()  # what the library has left half read goes here
+        gc.collect(1)  # it may hold itself
     hint = ": it seems cut off, copy it again" if CUT_OFF.search(told) else ""
     raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({told}){hint}")
 
@@ -98,6 +102,9 @@ def _quiet() -> Iterator[None]:
 
 def _unpacked(content: bytes, name: str) -> bytes:
     try:
-        return gzip.decompress(content)
+        with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
+            found = file.read(MOST.size + 1)
+        refuse_large(name, size=len(found))
+        return found
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{name}: is no whole gzip file ({error})") from None

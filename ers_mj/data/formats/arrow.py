@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-from ers_mj.data.formats.base import File, Loaded, refuse_twice
+from ers_mj.data.formats.base import File, Loaded, refuse_large, refuse_twice
 from ers_mj.data.tables import reason
 from ers_mj.errors import InputError
 
@@ -32,6 +32,10 @@ def _table(file: File) -> pa.Table:
         from pyarrow import parquet  # here alone: it takes long to import
 
         _refuse_part(file, b"PAR1", b"PAR1")
+        told = parquet.ParquetFile(buffer).metadata
+        groups = (told.row_group(k).total_byte_size for k in range(told.num_row_groups))
+        refuse_large(file.name, told.num_columns, told.num_rows, sum(groups))
+        buffer.seek(0)
         return parquet.read_table(buffer)
     if file.content.startswith(b"\xff\xff\xff\xff"):
         return pa.ipc.open_stream(buffer).read_all()

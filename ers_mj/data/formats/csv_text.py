@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv
 
-from ers_mj.data.formats.base import File, Loaded, refuse_twice
+from ers_mj.data.formats.base import File, Loaded, refuse_large, refuse_twice
 from ers_mj.data.tables import reason
 from ers_mj.data.units import is_unit
 from ers_mj.errors import InputError
@@ -34,10 +34,12 @@ class Text:
 
 def load(file: File) -> Loaded:
     """The cells as text, under the names of the header."""
+    refuse_large(file.name, text=len(file.content))
     text = _spaces_as_tabs(_uncommented(_below_titles(_decoded(file))))
     delimiter = max(DELIMITERS, key=text.header.count)
     text = _without_ends(text, delimiter)
     columns = [column.strip(' \t"') for column in text.header.split(delimiter)]
+    refuse_large(file.name, len(columns))
     refuse_twice(columns, file.name)
     text, units = _without_units(text, columns, delimiter)
     text = _without_part(text, delimiter)

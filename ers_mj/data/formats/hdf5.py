@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ers_mj.data.formats import arrays
-from ers_mj.data.formats.base import File, Loaded, library
+from ers_mj.data.formats.base import File, Loaded, library, refuse_large
 from ers_mj.errors import InputError
 
 FORMAT = "HDF5 file"
@@ -27,6 +27,7 @@ def load(file: File) -> Loaded:
     def visit(path: str, item: Any) -> None:
         if not isinstance(item, h5py.Dataset) or item.shape is None:
             return
+        refuse_large(file.name, len(found), size=int(item.size) * item.dtype.itemsize)
         found.update(arrays.flattened(item[()], path))
         said = next((item.attrs[key] for key in UNIT_KEYS if key in item.attrs), None)
         if said is not None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ers_mj.data.formats import arrays
-from ers_mj.data.formats.base import File, Loaded
+from ers_mj.data.formats.base import File, Loaded, refuse_large
 from ers_mj.errors import InputError
 
 FORMAT = "JSON file"
@@ -17,6 +17,7 @@ FORMAT = "JSON file"
 
 def load(file: File) -> Loaded:
     """The records as columns; what a record lacks is missing there."""
+    refuse_large(file.name, text=len(file.content))
     tree = _parsed(file)
     while isinstance(tree, dict) and len(tree) == 1 and isinstance(next(iter(tree.values())), (list, dict)):
         tree = next(iter(tree.values()))
