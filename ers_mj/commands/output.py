@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import sys
-import threading
-from collections.abc import Sequence
-from pathlib import Path
+
+from ers_mj.commands.keeping import Kept
 
 
 class Progress:
@@ -36,9 +34,10 @@ class Progress:
             sys.stderr.flush()
 
 
-def written(files: Sequence[Path]) -> list[str]:
+def written(kept: Kept) -> list[str]:
     """The lines that tell which files were written, none where there are none."""
-    return ["", bold("written"), *(f"  {path}" for path in files)] if files else []
+    title = "written, in the place of what was there" if kept.replaced else "written"
+    return ["", bold(title), *(f"  {path}" for path in kept.files)] if kept.files else []
 
 
 def bold(text: str) -> str:
@@ -49,9 +48,3 @@ def bold(text: str) -> str:
 def tell(line: str) -> None:
     """A line for a person while the work goes on, out of the way of --json."""
     print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
-
-
-def heed_terminate() -> None:
-    """Let a plain kill stop as Ctrl-C does: nothing under way is left behind."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)

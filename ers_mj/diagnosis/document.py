@@ -33,22 +33,9 @@ from ers_mj.selection.confirmation import delta_bic
 from ers_mj.selection.cross_validation import pooled
 from ers_mj.selection.moves import Move
 from ers_mj.selection.posterior import isolability
-from ers_mj.servo.datasheet import Datasheet
+from ers_mj.servo.datasheet import SHEET_UNITS, Datasheet
 from ers_mj.servo.model import BASE
 from ers_mj.servo.simulation import PER_INERTIA, unit_of
-
-SHEET_UNITS = {
-    "J": "kg m^2",
-    "B": "N m s/rad",
-    "K_t": "N m/A",
-    "K_e": "V s/rad",
-    "k_s": "N m/rad",
-    "T_LH": "N m",
-    "F_c": "N m",
-    "R": "ohm",
-    "L": "H",
-    "n": "-",
-}
 
 
 @dataclass(frozen=True)
@@ -377,13 +364,11 @@ def _improved(case: Case) -> Datasheet:
 
 
 def versions_of() -> dict:
-    import numba
-    import scipy
+    from importlib.metadata import version
 
     return {
         "ers-mj": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
+        **{package: version(package) for package in ("scipy", "numba")},
     }
