@@ -114,6 +114,8 @@ def test_ten_lines_from_arrays_to_margins_and_mujoco(found, monkeypatch, capsys)
 def test_a_quick_look_names_what_it_leaves_out(found):
     document = found.to_dict()
     assert found.effects == ("drive_dead_zone",)
+    told = found.model.datasheet
+    assert told.verdict == found.verdict and {"b", "drive_dead_zone.d"} <= set(told.intervals)
     assert [part["part"] for part in document["left_out"]] == [part for part, _ in QUICK.left_out()]
     shown = found._repr_html_()
     assert shown.startswith("<iframe") and "svg" in shown and SEARCH.left_out() == ()
