@@ -142,13 +142,12 @@ def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Seq
     it was met.
 
     From afar tangents and finite differences may lead to different valleys. The lower one is the baseline, the other
-    may be the less bent.
+    may be the less bent; where the first explains all, no other is looked for.
     """
     traces = with_starts(model, traces)
-    first, second = sorted(
-        (fit(model, traces, along=Along(by_tangents=by_tangents)) for by_tangents in (True, False)),
-        key=lambda found: found.cost,
-    )
+    first = fit(model, traces)
+    second = first if _explains(first) else fit(model, traces, along=Along(by_tangents=False))
+    first, second = sorted((first, second), key=lambda found: found.cost)
     traces = with_starts(first.model, without_spikes(first.model, traces))
     found = fit(first.model, traces, tau=tau_of(first.misfit))
     others = [dict(second.model.values)] if second.cost - found.cost > POLICY.valley else []
