@@ -28,6 +28,7 @@ import numba
 import numpy as np
 from numba.core import cgutils, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
 from ers_mj.plants.code_folder import code_folder, one_at_a_time
@@ -310,6 +311,14 @@ def _cache_of(piece: Piece) -> FunctionCache:
 
     class Kept(FunctionCache):
         _impl_class = staticmethod(lambda _: _Place(piece))
+
+        def load_overload(self, signature, target):
+            """As numba's, without reading all that numba knows how to compile (and scipy.linalg for it): what is kept
+            is linked, and who compiles reads it then.
+            """
+            rtsys.initialize(target)
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(signature, target)
 
     return Kept(piece.function)
 
