@@ -127,7 +127,7 @@ def test_a_diagnosis_shows_saves_and_hands_on_its_model(found, tmp_path):
     assert "missing_physics: drive_dead_zone" in repr(found) and found.sentence in repr(found)
     files = found.save(tmp_path / "res")
     assert sorted(file.name for file in files) == ["diagnosis.json", "model.toml", "plant.xml", "report.html"]
-    assert "A quick look" in (tmp_path / "res/report.html").read_text()
+    assert "Left out: " in (tmp_path / "res/report.html").read_text()
     with pytest.raises(ers.InputError, match="holds files already"):
         found.save(tmp_path / "res")
     found.save(tmp_path / "res", force=True)
