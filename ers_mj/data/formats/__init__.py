@@ -16,7 +16,7 @@ import os
 import sys
 import traceback
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ers_mj.data.formats.base import MOST, File, Loaded, refuse_large
@@ -38,6 +38,7 @@ READERS = {
     ".bin": "ardupilot",
 }
 
+STDERR = 2  # as the system numbers it
 ON_DISK = ("ros", "can_log", "ardupilot")  # formats whose libraries take paths
 
 
@@ -69,7 +70,7 @@ def _read(module: str, file: File) -> Loaded:
     """
     reader = importlib.import_module(f"ers_mj.data.formats.{module}")
     try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        with _hushed(module in ON_DISK):
             return reader.load(file)
     except ErsError:
         raise
@@ -78,6 +79,23 @@ def _read(module: str, file: File) -> Loaded:
     except Exception as error:
         _let_go(error)
         raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({reason(error)})") from None
+
+
+@contextlib.contextmanager
+def _hushed(in_c: bool) -> Iterator[None]:
+    """Without what is printed meanwhile, by Python or, on standard error, ``in_c`` as well."""
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
+        with contextlib.suppress(OSError):  # it may be closed
+            kept = os.dup(STDERR) if in_c else None
+            if kept is not None:
+                stack.callback(os.close, kept)
+                stack.callback(os.dup2, kept, STDERR)
+                nothing = os.open(os.devnull, os.O_WRONLY)
+                stack.callback(os.close, nothing)
+                os.dup2(nothing, STDERR)
+        yield
 
 
 def _let_go(error: Exception) -> None:
