@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ers_mj.door.reading import Given
     from ers_mj.report.display import Unit
 
-RESULTS = ("diagnosis.json", "report.html", "model.toml", "plant.xml", "next_input.csv")
+RESULTS = ("diagnosis.json", "report.html", "model.toml", "plant.xml", "next_recording.csv")
 FITS = (("training", "train"), ("held out", "heldout"), ("recalibrated", "recalibrated"))
 
 
