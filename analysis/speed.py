@@ -2,6 +2,7 @@
 
     python analysis/speed.py                       # cases of ../shared/concealed, both checkouts in turn: ratios
     python analysis/speed.py --growth 1 4 16 60    # minutes at 1 kHz: diagnose, identify, frequency, this checkout
+    python analysis/speed.py --side-by-side        # by the clock: --jobs 2 beside --jobs 1, on an idle machine
 
 Seconds are a processor's in user mode, one thread, kernels compiled beforehand; of several rounds the least counts,
 since other work on a machine only adds. Seconds belong to a machine, ratios hold.
@@ -15,6 +16,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +24,7 @@ from cold_start import BEFORE, ROOT, unpacked
 
 CONCEALED = ROOT.parent / "shared/concealed"
 CASES = ("case-001", "case-010", "case-032", "case-053")  # three with one effect, one with two
-MOST = 1.0 / 3.0  # the bar: share of the older commit's time
+MOST, TWICE = 1.0 / 3.0, 1.7  # the bars: share of the older commit's time, and how much faster two threads are
 
 
 def taken(checkout: Path, cache: Path, arguments: list[str]) -> tuple[float, float]:
@@ -61,6 +63,39 @@ def compare(cases: list[str], before: str, rounds: int) -> int:
             print(f"{name:12}{least['before']:8.1f} s{least['now']:8.1f} s{ratios[-1]:8.3f}", flush=True)
     print(f"{'median':12}{'':20}{statistics.median(ratios):8.3f}")
     return 0 if statistics.median(ratios) <= MOST else 1
+
+
+def serial_share(one: float, two: float) -> float:
+    """What share of the time of one thread cannot run side by side, by Amdahl, where two threads take ``two``."""
+    return min(max(2.0 * two / one - 1.0, 0.0), 1.0)
+
+
+def side_by_side(cases: list[str]) -> int:
+    """Print by the clock what one and two threads take, the start-up aside, and what sixteen would; 1 where two are
+    less than TWICE times as fast.
+    """
+
+    def clocked(*arguments: str) -> float:
+        begun = time.perf_counter()
+        taken(ROOT, folder / "cache", list(arguments))
+        return time.perf_counter() - begun
+
+    gains = []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        print(f"{'case':12}{'one':>9}{'two':>9}{'faster':>9}{'serial':>9}{'sixteen':>10}   (bar: {TWICE} times)")
+        for name in cases:
+            arguments = case_arguments(CONCEALED / name, folder / "out")
+            threads = arguments.index("--jobs") + 1
+            both = [[*arguments[:threads], jobs, *arguments[threads + 1 :]] for jobs in ("1", "2")]
+            clocked(*both[0])  # compiles
+            start = min(clocked("diagnose", "--help") for _ in range(3))
+            one, two = (clocked(*each) - start for each in both)
+            serial = serial_share(one, two)
+            gains.append(one / two)
+            sixteen = 1.0 / (serial + (1.0 - serial) / 16)
+            print(f"{name:12}{one:7.1f} s{two:7.1f} s{gains[-1]:9.2f}{serial:9.2f}{sixteen:10.1f}", flush=True)
+    return 0 if statistics.median(gains) >= TWICE else 1
 
 
 def recorded(minutes: float, path: Path) -> None:
@@ -108,7 +143,10 @@ def main() -> int:
     parser.add_argument("--before", default=BEFORE, help="the older commit (default: %(default)s)")
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--growth", nargs="+", type=float, metavar="MINUTES")
+    parser.add_argument("--side-by-side", action="store_true")
     chosen = parser.parse_args()
+    if chosen.side_by_side:
+        return side_by_side(chosen.cases)
     return grow(chosen.growth) if chosen.growth else compare(chosen.cases, chosen.before, chosen.rounds)
 
 
