@@ -57,7 +57,7 @@ def recordings(rng: np.random.Generator, travel: float) -> tuple[list[Recording]
     for k, r in enumerate(references(rng, travel)):
         u, y = simulated(r, round(1.0 / RATE / STEP), gain, b, a_2, c_2, g, phase)
         y = np.round((y + 0.3 * count * rng.standard_normal(y.size)) / count) * count
-        made.append(from_arrays(np.arange(u.size) / RATE, u, y, name=f"rec{k + 1}"))
+        made.append(from_arrays((np.arange(u.size) / RATE).tolist(), u, y, name=f"rec{k + 1}"))
     return made, g
 
 

@@ -92,8 +92,8 @@ def main() -> None:
             right += score(name, [SHARED / "cases" / f for f in files], numbers, must, may, arguments.jobs)
         else:
             numbers, must, may, _ = truth_of(name)
-            files = sorted((SHARED / "menagerie" / name).glob("rec*.csv"))
-            right += score(name, files, numbers, must, may, arguments.jobs)
+            recordings = sorted((SHARED / "menagerie" / name).glob("rec*.csv"))
+            right += score(name, recordings, numbers, must, may, arguments.jobs)
     print(f"{right} of {len(wanted)} right")
 
 
