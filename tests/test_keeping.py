@@ -194,3 +194,10 @@ def test_a_result_is_saved_by_the_same_rules(here):
             return {"a.txt": lambda path: path.write_text("a")}
 
     assert Small({}).save(here / "new") == [here / "new/a.txt"] and names(here / "new") == {"a.txt"}
+
+
+def test_what_a_command_writes_is_what_it_checks(here, monkeypatch):
+    from ers_mj.commands import diagnose
+    from ers_mj.report.diagnosis_report import NEXT_INPUT
+
+    assert NEXT_INPUT in diagnose.RESULTS

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ers_mj.door.reading import Given
     from ers_mj.report.display import Unit
 
-RESULTS = ("diagnosis.json", "report.html", "model.toml", "plant.xml", "next_input.csv")
+RESULTS = ("diagnosis.json", "report.html", "model.toml", "plant.xml", "next_recording.csv")
 FITS = (("training", "train"), ("held out", "heldout"), ("recalibrated", "recalibrated"))
 
 
@@ -110,8 +110,8 @@ def _told(document: dict, kept: Kept) -> list[str]:
 
 
 def _told_rest(document: dict) -> list[str]:
-    """What a quick look left out, and what to record next."""
-    lines = _section("left out by --quick", [str(part["sentence"]) for part in document.get("left_out") or []])
+    """What was left out, and what to record next."""
+    lines = _section("left out", [str(part["sentence"]) for part in document.get("left_out") or []])
     following = (document.get("next_recording") or {}).get("sentence")
     return lines + _section("record next", [following] if following else [])
 

@@ -21,7 +21,7 @@ from ers_mj.commands.recordings import reader
 from ers_mj.door.saving import as_json
 from ers_mj.errors import InputError
 
-RESULTS = ("identify.json", "report.html")
+RESULTS = ("identify.json", "report.html", "model.toml")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:

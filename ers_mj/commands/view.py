@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 from ers_mj.commands.keeping import Kept, keep_file
 from ers_mj.commands.options import mapping, number, pair, whole
 from ers_mj.commands.output import Progress
-from ers_mj.data.whole import write_whole
-from ers_mj.door.saving import as_json, refuse_file
+from ers_mj.door.saving import as_json, refuse_file, write_file
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -218,7 +217,7 @@ def _render(replay: Replay, out: Path, width: int | None) -> tuple[dict, Kept]:
             images.append(image)
             progress("rendering", len(images) / replay.t.size)
     content = png_bytes(images[0]) if kind == ".png" else gif_bytes(images, FILM.fps)
-    kept = keep_file(out, lambda file: write_whole(file, content))
+    kept = keep_file(out, lambda file: write_file(file, content))
     return {"render": kept.told(str(out)), "width": width, "height": height, "bytes": len(content)}, kept
 
 

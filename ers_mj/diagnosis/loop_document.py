@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of, with_diagnosis
+from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of
 from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
 from ers_mj.diagnosis.localisation import Place, Ranked, Samples, places, residual_map, shaded
 from ers_mj.diagnosis.loop_advice import next_recording
@@ -16,6 +16,7 @@ from ers_mj.diagnosis.loop_rows import improved, parameters
 from ers_mj.diagnosis.loop_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
 from ers_mj.diagnosis.sentences import shown
+from ers_mj.diagnosis.told_model import with_diagnosis
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.position_loop.fit import fitted, gain

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from ers_mj.data.whole import final
+from ers_mj.data.whole import final, write_whole
 from ers_mj.errors import InputError, Unwritable
 from ers_mj.passing import part_name, passing, sweep
 
@@ -112,6 +112,16 @@ def make_room(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         raise Unwritable.at(path, error) from None
+
+
+def write_file(path: Path, content: str | bytes) -> None:
+    """One file, whole or not at all, in a folder that is made where there is none.
+
+    Raises:
+        Unwritable: it cannot be written.
+    """
+    make_room(path)
+    write_whole(path, content)
 
 
 def today() -> str:

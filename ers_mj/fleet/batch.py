@@ -16,9 +16,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ers_mj.data.whole import write_whole
 from ers_mj.door.results import Progress, silent
-from ers_mj.door.saving import refuse_folder, refuse_unwritable, today, write_results
+from ers_mj.door.saving import refuse_folder, refuse_unwritable, today, write_file, write_results
 from ers_mj.errors import ErsError
 from ers_mj.fleet.diagnosing import COLUMNS, Row, Settings, diagnosed, failed, fingerprint, read_servo
 from ers_mj.fleet.manifest import Servo
@@ -96,7 +95,7 @@ def conduct(
             row, files = (failed(done.name, done.lost), {}) if done.lost else done.value
             _keep(batch, row, files)
             progress(f"{len(batch.rows)} of {len(servos)} servos, last {done.name}", len(batch.rows) / len(servos))
-        write_whole(folder / "batch.csv", batch.table().encode())
+        write_file(folder / "batch.csv", batch.table().encode())
         return batch
 
 
@@ -104,7 +103,7 @@ def _began(folder: Path) -> str:
     """The day on which the batch began."""
     path = folder / KEPT / BEGAN
     if not path.exists():
-        write_whole(path, today().encode())
+        write_file(path, today().encode())
     return path.read_text("utf-8")
 
 
@@ -128,7 +127,7 @@ def _keep(batch: Batch, row: Row, files: dict[str, bytes]) -> None:
     if files:
         write_results(batch.folder / name, {file: _writer(content) for file, content in files.items()})
         kept = {"asked": batch.asked[name], "row": row}
-        write_whole(batch.folder / KEPT / f"{name}.json", json.dumps(kept).encode())
+        write_file(batch.folder / KEPT / f"{name}.json", json.dumps(kept).encode())
 
 
 def _writer(content: bytes) -> Callable[[Path], None]:
