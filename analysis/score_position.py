@@ -16,10 +16,13 @@ from ers_mj.diagnosis.pipeline import diagnose
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 INHERENT = {"gravity_imbalance", "input_delay", "voltage_saturation"}
+# pdplay's README says 0.020; a simulation with its own gains, inertias and contact (analysis/pdplay_gap.py) leaves the
+# noise alone at a gap of 0.0300, friction 0.25 tanh(w/0.01) N m on the motor and 0.05 on the load, and 20 times the
+# noise at 0.020 whatever else is free: friction that creeps below breakaway is in it, too.
 CASES = {
-    "posservo_saturating": (["posservo_saturating.csv"], {"K": 3600.0, "L": 360.0}, {"voltage_saturation"}),
-    "pdplay": (["pdplay_1200rows.csv", "pdplay_2000rows.csv"], {"gap": 0.020}, {"backlash"}),
-    "pdloop_delay": (["pdloop_delay.csv"], {"K": 1000.0, "tau_s": 0.009}, {"input_delay"}),
+    "posservo_saturating": (["posservo_saturating.csv"], {"K": 3600.0, "L": 360.0}, {"voltage_saturation"}, set()),
+    "pdplay": (["pdplay_1200rows.csv", "pdplay_2000rows.csv"], {"gap": 0.030}, {"backlash"}, {"presliding"}),
+    "pdloop_delay": (["pdloop_delay.csv"], {"K": 1000.0, "tau_s": 0.009}, {"input_delay"}, set()),
 }
 
 
@@ -34,7 +37,8 @@ def truth_of(case: str) -> tuple[dict[str, float], set[str], set[str], dict]:
         must.add("gravity_imbalance")
     if truth["class"] == "saturated":
         numbers["L"] = truth["force_limit"][1] / inertia
-    may = {"presliding"} if expected.get("friction_visible") else set()  # MuJoCo's dry friction creeps
+    creeps = expected.get("creep_distinguishable_from_dry_friction") is not False  # MuJoCo's dry friction creeps
+    may = {"presliding"} if expected.get("friction_visible") and creeps else set()
     return numbers, must, may, truth
 
 
@@ -84,12 +88,12 @@ def main() -> None:
     right = 0
     for name in wanted:
         if name in CASES:
-            files, numbers, must = CASES[name]
-            right += score(name, [SHARED / "cases" / f for f in files], numbers, must, set(), arguments.jobs)
+            files, numbers, must, may = CASES[name]
+            right += score(name, [SHARED / "cases" / f for f in files], numbers, must, may, arguments.jobs)
         else:
             numbers, must, may, _ = truth_of(name)
-            files = sorted((SHARED / "menagerie" / name).glob("rec*.csv"))
-            right += score(name, files, numbers, must, may, arguments.jobs)
+            recordings = sorted((SHARED / "menagerie" / name).glob("rec*.csv"))
+            right += score(name, recordings, numbers, must, may, arguments.jobs)
     print(f"{right} of {len(wanted)} right")
 
 

@@ -33,7 +33,6 @@ from ers_mj.position_loop.runs import Run, speed_of
 INTEGRAL, DERIVATIVE, WITHIN = "integral action", "derivative action", "dead time within the loop"
 STARTING = "starting force"  # of the firmware: the least that its motor is driven with
 SPRING, CONSTANT = "spring", "constant load"  # the second may as well be an offset of the sensor: it has no name
-BURIED = 20.0  # of MuJoCo's default constraint, that of a limit
 LAWS = (GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, EndStop, Cogging)
 
 
@@ -48,12 +47,29 @@ OWN = {
 
 
 @dataclass(frozen=True)
+class DefaultConstraint:
+    """What MuJoCo's default solref (0.02 s, 1) and solimp (0.9 to 0.95) make of a joint's friction and limit."""
+
+    creep: float = 947.0  # [1/s] below breakaway: force over inertia and speed, 2 / (0.95 * 0.02 s) * 0.9 / (1 - 0.9)
+    heavy: float = 10.0  # 1 / (1 - 0.9): how much slower the body answers there,
+    buried: float = 20.0  # 1 / (1 - 0.95): and within a limit,
+    frequency: float = 36.0  # [Hz] of which it bounces there,
+    damping: float = 4.0  # and its damping ratio
+
+
+MUJOCO = DefaultConstraint()
+
+
+@dataclass(frozen=True)
 class Sizes:
     """From where candidates are begun."""
 
     integrals: tuple[float, ...] = (0.5, 3.0)  # [1/s] of K
-    creeps: tuple[tuple[float, float], ...] = ((947.0, 10.0), (947.0, 1.0), (150.0, 1.0))  # [1/s], and how heavy:
-    # MuJoCo's own constraint first
+    creeps: tuple[tuple[float, float], ...] = (
+        (MUJOCO.creep, MUJOCO.heavy),
+        (MUJOCO.creep, 1.0),
+        (150.0, 1.0),
+    )  # [1/s], and how heavy
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
     bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K
     pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
@@ -178,8 +194,9 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
 
 def stops(model: LoopModel, low: float, high: float) -> list[LoopModel]:
     """A model with stops there: springs, and MuJoCo's constraint."""
-    spring, sunk = np.array([low, high, 40.0, 0.3]), np.array([low, high, 36.0, 4.0])
-    return [model.with_effect(EndStop.name, spring), model.fixed(buried=BURIED).with_effect(EndStop.name, sunk)]
+    spring = np.array([low, high, 40.0, 0.3])
+    sunk = np.array([low, high, MUJOCO.frequency, MUJOCO.damping])
+    return [model.with_effect(EndStop.name, spring), model.fixed(buried=MUJOCO.buried).with_effect(EndStop.name, sunk)]
 
 
 def _transmissions(model: LoopModel, error: float) -> list[Term]:
