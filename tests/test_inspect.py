@@ -80,8 +80,9 @@ def test_the_command_tells_writes_and_prints_json(swing, tmp_path, capsys):
 def test_nothing_is_compiled(swing, tmp_path):
     write_recording(tmp_path / "rec.csv", swing)
     script = (
-        "import sys; from ers_mj import cli; code = cli.main(['inspect', sys.argv[1], '--json'])\n"
+        "import sys; from ers_mj import cli; code = cli.main(['inspect', *sys.argv[1:]])\n"
         "assert 'numba' not in sys.modules; sys.exit(code)"
     )
-    done = subprocess.run([sys.executable, "-c", script, str(tmp_path / "rec.csv")], capture_output=True, check=False)
+    asked = [str(tmp_path / "rec.csv"), "--out", str(tmp_path / "out")]
+    done = subprocess.run([sys.executable, "-c", script, *asked], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr

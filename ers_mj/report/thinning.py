@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ers_mj.diagnosis.evidence import RecordView
+if TYPE_CHECKING:
+    from ers_mj.diagnosis.evidence import RecordView
 
 
 def decimate(t: np.ndarray, x: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
