@@ -65,6 +65,7 @@ FAMILIES = {
     "control/controllers": ("base", "finite_time", "pid"),
     "identification/minimisers": ("base", "iga"),
     "proving/concealed": ("base",),
+    "proving/families": ("base",),
 }  # whose members read their base and the named helpers of it, and no other member
 FILES = [p for p in PACKAGE.rglob("*.py") if p.parent != PACKAGE or p.stem not in ("__init__", "__main__")]
 

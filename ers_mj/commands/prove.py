@@ -31,18 +31,26 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "prove",
         help="conceal effects, diagnose them blind, score",
         description=(
-            "Measure what the diagnosis can do. Servos are drawn, effects concealed in them in other forms than the"
-            " library's, recorded in\nMuJoCo; the truth is sealed and its hash printed; each case is diagnosed by a"
-            " process that gets its files only; the truth is\nopened and the answers scored. A quarter of the cases"
-            " hides nothing, half one effect, 15 % several, 10 % one that the\nlibrary does not have. Stopped with"
-            " Ctrl-C, the same command goes on where it was."
+            "Measure what the diagnosis can do. Servos of several families are drawn, effects concealed in them,"
+            " recorded in MuJoCo\nor by an integrator of the proof's own; the truth is sealed and its hash printed;"
+            " each case is diagnosed by a process\nthat gets its files only; the truth is opened, the answers scored."
+            " A quarter of the cases hides nothing, half one effect,\n15 % several, 10 % one that the library does not"
+            " have. Stopped with Ctrl-C, the same command goes on where it was."
         ),
         epilog=(
-            "examples:\n  ers prove --cases 40 --seed 7 --out proof\n  ers prove --real ../shared/data --cases 15 --out"
-            " proof-real\n  ers prove --cases 20 --export cases\n  ers prove --score answers --truth cases.truth.json"
+            "examples:\n  ers prove --cases 40 --seed 7 --out proof\n"
+            "  ers prove --families screw,position --cases 8 --seed 7\n"
+            "  ers prove --real ../shared/data --cases 15 --out proof-real\n"
+            "  ers prove --cases 20 --export cases\n  ers prove --score answers --truth cases.truth.json"
         ),
     )
     parser.add_argument("--cases", type=whole(1), metavar="N", help=f"how many (default {CASES})")
+    parser.add_argument(
+        "--families",
+        metavar="NAME,...",
+        help="kinds of servos, in turn (default all): rudder, hobby, direct, screw, throttle, strain_wave, gimbal,"
+        " position",
+    )
     parser.add_argument(
         "--real",
         metavar="FOLDER",
@@ -127,11 +135,13 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
             "cases": len(plans),
             "folder": str(Path(arguments.real).absolute()),
         }
-    from ers_mj.proving import case
+    from ers_mj.proving import world
 
-    cases = case.plans(arguments.cases or CASES, arguments.seed)
-    tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in cases]
-    return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(cases)}
+    families = world.chosen(arguments.families and [name.strip() for name in arguments.families.split(",")])
+    cases = world.plans(arguments.cases or CASES, arguments.seed, families)
+    tasks = [Task(f"case-{plan.index + 1:03d}", world.make, (plan, arguments.seed)) for plan in cases]
+    settings = {"kind": "simulated", "seed": arguments.seed, "cases": len(cases), "families": ",".join(families)}
+    return tasks, settings
 
 
 def _versions(proof: Proof) -> dict[str, str]:
@@ -164,6 +174,7 @@ def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> li
 
 def _told(results: dict) -> list[str]:
     """What a terminal shows when all is done."""
+    from ers_mj.report.proof_families import told_families
     from ers_mj.report.proof_report import headline, table_of
 
     counts = ", ".join(f"{n} {kind}" for kind, n in results["counts"].items() if n)
@@ -176,6 +187,7 @@ def _told(results: dict) -> list[str]:
         lines.append(
             f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]"
         )
+    lines += told_families(results)
     lines += _told_real(results) if "concealed_in_real" in results else _told_confusion(results["confusion"])
     over, cpu, pair, wall = (results[name] for name in ("error_over_floor", "cpu_s", "cpu_s_of_a_pair", "wall_s"))
     lines += (

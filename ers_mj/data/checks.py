@@ -7,7 +7,7 @@ import numpy as np
 
 from ers_mj.data.columns import COLUMNS, CONSTANT, MEASURED
 from ers_mj.data.consistency.sheet import Fault
-from ers_mj.data.sensor_faults import at_extreme, decimal_grain, frozen_spans, held_spans, varied
+from ers_mj.data.sensor_faults import at_extreme, converter_step, decimal_grain, frozen_spans, held_spans, varied
 from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
 
@@ -23,6 +23,8 @@ class Limits:
     least_jitter: float = 0.01  # rms share of the step from which jitter is worth a sentence
     largest: float = 1e25  # of any column: no sensor gives more, and its powers are still numbers
     least_travel: float = 1e-25  # of an output, below which it is constant
+    ends: tuple[int, ...] = (32767, 32768)  # counts at which a register of 16 bits ends
+    fewest_at_end: int = 3  # samples there
 
 
 LIMITS = Limits()
@@ -143,6 +145,12 @@ def problems_of(
         *_told_jitter(t, labels["t"]),
         *_told_clipped("limit", t, u, labels["u"], [s for s in held_spans(u) if at_extreme(u, s) and varied(u, s)]),
         *_told_clipped("clipped", t, y, labels["y"], [s for s in frozen if at_extreme(y, s)]),
+        *(
+            fault
+            for field in MEASURED
+            if field in printed
+            for fault in _told_register(t, printed[field], labels[field])
+        ),
         *_told_stuck(t, labels["y"], [s for s in frozen if not at_extreme(y, s) and np.ptp(u[s]) > 0]),
         *_told_constant(t, u, labels["u"]),
         *_told_converter(labels["y"], step),
@@ -186,6 +194,28 @@ def _told_clipped(kind: str, t: np.ndarray, x: np.ndarray, label: str, spans: li
     limits = listed(f"{limit:.6g}" for limit in sorted({float(x[span.start]) for span in spans}))
     sentence = f"{label} looks clipped at {limits}: {_told_spans(spans, len(x))}"
     return [_of_spans(kind, t, label, spans, sentence)]
+
+
+def _told_register(t: np.ndarray, x: np.ndarray, label: str) -> list[Fault]:
+    """A column that stays at the last count of a register of 16 bits (moteus logs speeds and positions so): what lay
+    beyond it is lost, and no flag says so.
+    """
+    if not np.isfinite(x).any():
+        return []
+    size = np.abs(x)
+    at = np.flatnonzero(size == np.nanmax(size))
+    if at.size < LIMITS.fewest_at_end:
+        return []
+    levels = np.unique(x[np.isfinite(x)])
+    grain = decimal_grain(levels)
+    step = float(np.gcd.reduce(np.rint(levels / grain).astype(np.int64))) * grain if grain else converter_step(x)
+    if not step or round(size[at[0]] / step) not in LIMITS.ends:
+        return []
+    sentence = (
+        f"{label} stays at {x[at[0]]:.6g}, {round(size[at[0]] / step)} steps of {step:.4g}: the end of a 16-bit"
+        f" register, which clips without a flag, in {at.size} samples"
+    )
+    return [Fault("clipped", label, sentence, int(at.size), _region(t, at[0], at[-1]))]
 
 
 def _told_stuck(t: np.ndarray, label: str, spans: list[slice]) -> list[Fault]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -91,6 +91,11 @@ class Trace:
     def sample_time(self) -> float:
         """Median step [s]."""
         return float(np.median(np.diff(self.t)))
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The blocks of this trace alone."""
+        return Blocks.of([self])
 
     @cached_property
     def runs(self) -> Kept:
@@ -272,7 +277,13 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
     head without one sample that goes along, is none: it is how a polynomial meets a rudder that is thrown from rest.
     """
     known = np.isfinite(y)
-    t, y = t[known] - t[0], y[known]
+    return _start_seen((t[known] - t[0]).tobytes(), y[known].tobytes(), sigma)
+
+
+@lru_cache(512)  # asked for again and again of the same beginnings
+def _start_seen(times: bytes, outputs: bytes, sigma: float) -> tuple[float, float]:
+    """``start_seen`` of the known samples, from the first on."""
+    t, y = np.frombuffer(times), np.frombuffer(outputs)
     if t.size < BEGINNING.fewest_seen:
         return 0.0, 0.0
     found = []

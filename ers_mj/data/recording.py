@@ -28,6 +28,7 @@ from ers_mj.data.columns import (
     choose_columns,
     input_name,
     kind_of,
+    refuse_left_out,
     refuse_unknown_unit,
 )
 from ers_mj.data.consistency import consistent
@@ -216,6 +217,7 @@ def from_columns(
 def _of_table(loaded: Loaded, asked: Asking, name: str, **origin: Any) -> Recording:
     """The recording in a table of named columns, as it was asked for."""
     table = loaded.table
+    refuse_left_out(loaded.left_out, asked, name)
     choice = choose_columns(table.column_names, asked, name, loaded.units)
     sources = {field: choice.sources[contract] for field, contract in choice.roles().items()}
     printed, factors = _printed(table, sources, name)

@@ -40,6 +40,20 @@ TABLE_1: Mapping[str, float] = MappingProxyType(
         "n": 22.26,  # motor turns a rudder turn
     }
 )
+SHEET_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "J": "kg m^2",
+        "B": "N m s/rad",
+        "K_t": "N m/A",
+        "K_e": "V s/rad",
+        "k_s": "N m/rad",
+        "T_LH": "N m",
+        "F_c": "N m",
+        "R": "ohm",
+        "L": "H",
+        "n": "-",
+    }
+)
 LUMPED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 SIGNED = ("theta_0", "b")  # may be negative: where the spring rests, and the sense of the input
 NEVER_ZERO = ("J", "R", "n", "K_t", "b", "sample_rate_hz")

@@ -13,6 +13,7 @@ import hashlib
 import importlib
 import io
 import os
+import re
 import sys
 import traceback
 import zlib
@@ -38,6 +39,9 @@ READERS = {
     ".bin": "ardupilot",
 }
 
+CUT_OFF = re.compile(
+    "truncated|could not read bytes|unpack requires|not a zip file|Unterminated|end magic|reach(ed)? EOF"
+)
 STDERR = 2  # as the system numbers it
 ON_DISK = ("ros", "can_log", "ardupilot")  # formats whose libraries take paths
 
@@ -65,46 +69,54 @@ def load(
 
 
 def _read(module: str, file: File) -> Loaded:
-    """The file by this reader; what its library prints is not for our output, and what it raises, it raises at
-    whatever its parser met.
-    """
+    """The file by this reader; what its library raises, it raises at whatever its parser met."""
     reader = importlib.import_module(f"ers_mj.data.formats.{module}")
-    try:
-        with _hushed(module in ON_DISK):
+    with _quiet(module in ON_DISK):
+        try:
             return reader.load(file)
-    except ErsError:
-        raise
-    except MemoryError:
-        raise InputError(f"{file.name}: takes more memory than there is, cut it") from None
-    except Exception as error:
-        _let_go(error)
-        raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({reason(error)})") from None
+        except ErsError:
+            raise
+        except MemoryError:
+            raise InputError(f"{file.name}: takes more memory than there is, cut it") from None
+        except Exception as error:
+            traceback.clear_frames(error.__traceback__)  # and with them what the library has left half read
+            told = re.sub(r"'?<_io\.\w+ object at 0x[0-9a-f]+>'?", "it", reason(error))
+        gc.collect(1)  # it may hold itself
+    hint = ": it seems cut off, copy it again" if CUT_OFF.search(told) else ""
+    raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({told}){hint}")
 
 
 @contextlib.contextmanager
-def _hushed(in_c: bool) -> Iterator[None]:
-    """Without what is printed meanwhile, by Python or, on standard error, ``in_c`` as well."""
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
-        stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
-        with contextlib.suppress(OSError):  # it may be closed
-            kept = os.dup(STDERR) if in_c else None
-            if kept is not None:
-                stack.callback(os.close, kept)
-                stack.callback(os.dup2, kept, STDERR)
-                nothing = os.open(os.devnull, os.O_WRONLY)
-                stack.callback(os.close, nothing)
-                os.dup2(nothing, STDERR)
-        yield
-
-
-def _let_go(error: Exception) -> None:
-    """Free what a library left half made, whose end may fail once more and print that."""
-    hook = sys.unraisablehook
-    sys.unraisablehook = lambda _: None
+def _no_errors_of_c() -> Iterator[None]:
+    """Without standard error, as the system has it."""
     try:
-        traceback.clear_frames(error.__traceback__)
-        gc.collect(1)  # it may hold itself
+        kept = os.dup(STDERR)
+    except OSError:  # it is closed
+        yield
+        return
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, STDERR)
+    try:
+        yield
+    finally:
+        os.dup2(kept, STDERR)
+        for handle in (kept, nothing):
+            os.close(handle)
+
+
+@contextlib.contextmanager
+def _quiet(in_c: bool) -> Iterator[None]:
+    """What a library prints, and what its destructors raise over a damaged file, is not for our output; nor, ``in_c``,
+    what it prints past Python.
+    """
+    hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
+    try:
+        with contextlib.ExitStack() as stack:
+            stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+            stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
+            if in_c:
+                stack.enter_context(_no_errors_of_c())
+            yield
     finally:
         sys.unraisablehook = hook
 

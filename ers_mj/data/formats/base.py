@@ -43,11 +43,13 @@ class Loaded:
         table: its columns.
         notes: what was skipped or assumed, a sentence each.
         units: column -> unit, where the file says one.
+        left_out: what of the file is no column -> why not.
     """
 
     table: pa.Table
     notes: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ def load(file: File) -> Loaded:
     refuse_large(file.name, len(columns))
     refuse_twice(columns, file.name)
     text, units = _without_units(text, columns, delimiter)
+    text = _without_part(text, delimiter)
     table = _cells(text.body, columns, delimiter, file.name)
     if delimiter in ";\t|":
         table = pa.table([pc.replace_substring(cells, ",", ".") for cells in table.columns], names=columns)
@@ -144,6 +145,14 @@ def _without_units(text: Text, columns: list[str], delimiter: str) -> tuple[Text
     units = {column: cell for column, cell in zip(columns, cells) if cell}
     told = f"its second line gives units: {first.strip()}"
     return replace(text, body="".join(rest), notes=(*text.notes, told)), units
+
+
+def _without_part(text: Text, delimiter: str) -> Text:
+    """Without a last row that was cut off, as a logger that was stopped leaves it."""
+    rows, end, last = text.body.rpartition("\n")
+    if not end or not last.strip() or last.count(delimiter) >= text.header.count(delimiter):
+        return text
+    return replace(text, body=rows + end, notes=(*text.notes, "the last row is cut off and left out"))
 
 
 def _cells(body: str, columns: list[str], delimiter: str, name: str) -> pa.Table:

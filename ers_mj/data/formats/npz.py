@@ -16,6 +16,8 @@ FORMAT = "numpy file"
 
 def load(file: File) -> Loaded:
     """Each array a column; arrays (N, k) become lists."""
+    if not file.content.startswith((b"PK", b"\x93NUMPY")):
+        raise InputError(f"{file.name}: is no numpy file (it does not begin as one)")
     try:
         if zipfile.is_zipfile(io.BytesIO(file.content)):
             parts = zipfile.ZipFile(io.BytesIO(file.content)).infolist()
