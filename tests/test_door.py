@@ -114,6 +114,8 @@ def test_ten_lines_from_arrays_to_margins_and_mujoco(found, monkeypatch, capsys)
 def test_a_quick_look_names_what_it_leaves_out(found):
     document = found.to_dict()
     assert found.effects == ("drive_dead_zone",)
+    told = found.model.datasheet
+    assert told.verdict == found.verdict and {"b", "drive_dead_zone.d"} <= set(told.intervals)
     assert [part["part"] for part in document["left_out"]] == [part for part, _ in QUICK.left_out()]
     shown = found._repr_html_()
     assert shown.startswith("<iframe") and "svg" in shown and SEARCH.left_out() == ()
@@ -125,7 +127,7 @@ def test_a_diagnosis_shows_saves_and_hands_on_its_model(found, tmp_path):
     assert "missing_physics: drive_dead_zone" in repr(found) and found.sentence in repr(found)
     files = found.save(tmp_path / "res")
     assert sorted(file.name for file in files) == ["diagnosis.json", "model.toml", "plant.xml", "report.html"]
-    assert "A quick look" in (tmp_path / "res/report.html").read_text()
+    assert "Left out: " in (tmp_path / "res/report.html").read_text()
     with pytest.raises(ers.InputError, match="holds files already"):
         found.save(tmp_path / "res")
     found.save(tmp_path / "res", force=True)

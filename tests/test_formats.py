@@ -192,3 +192,11 @@ def test_rows_out_of_order_are_put_in_order(tmp_path, kind):
     late = np.arange(N)
     late[[200, 201]] = 201, 200
     checked(WRITERS[kind](tmp_path, {name: x[late] for name, x in COLUMNS.items()}), NEAR.get(kind, 1e-9))
+
+
+def test_a_folder_is_refused_with_what_it_holds(tmp_path):
+    (tmp_path / "data/chunk-000").mkdir(parents=True)
+    WRITERS["Parquet"](tmp_path / "data/chunk-000", COLUMNS)
+    assert "is a folder and no bag of ROS 2, a file was expected, it holds data/chunk-000/rec.parquet" in refusal(
+        tmp_path
+    )

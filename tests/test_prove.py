@@ -20,7 +20,7 @@ from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.play import MOTOR_SHARE
 from ers_mj.plants.reduced import lumped
-from ers_mj.proving import asking, case, conduct, quick, real, recorder, scoring, sealing
+from ers_mj.proving import asking, case, conduct, plans, quick, real, recorder, scoring, sealing, world
 from ers_mj.proving.catalogue import CATALOGUE, LISTED
 from ers_mj.proving.forms import TEXTBOOK, draw_shape
 from ers_mj.proving.parameters import covered
@@ -97,10 +97,10 @@ def test_forms_are_not_the_librarys(name):
 
 
 def test_kinds_come_in_their_shares_and_the_seed_decides():
-    plans = case.plans(40, 5)
-    assert [sum(p.kind == kind for p in plans) for kind in case.KINDS] == [10, 20, 6, 4]
-    assert plans == case.plans(40, 5) != case.plans(40, 6)
-    assert all((len(p.labels) > 1) == (p.kind == "several") for p in plans)
+    drawn = case.plans(40, 5)
+    assert [sum(p.kind == kind for p in drawn) for kind in plans.KINDS] == [10, 20, 6, 4]
+    assert drawn == case.plans(40, 5) != case.plans(40, 6)
+    assert all((len(p.labels) > 1) == (p.kind == "several") for p in drawn)
     assert case.shares(4) == {"null": 1, "single": 2, "several": 1, "outside": 0}
 
 
@@ -529,11 +529,16 @@ def test_a_rig_as_it_is_raises_no_false_alarm():
 
 def test_the_command_prints_the_contracts_keys(tmp_path, asked, monkeypatch, capsys):
     monkeypatch.setattr(
-        case,
+        world,
         "make",
         lambda plan, seed: (
             {"rec1.csv": "x"},
-            {**made(f"case-{plan.index + 1:03d}", seed)[1], "kind": plan.kind, "labels": list(plan.labels)},
+            {
+                **made(f"case-{plan.index + 1:03d}", seed)[1],
+                "family": plan.family,
+                "kind": plan.kind,
+                "labels": list(plan.labels),
+            },
         ),
     )
     assert main(["prove", "--cases", "8", "--json", "--jobs", "1"]) == 0
@@ -551,8 +556,13 @@ def test_the_command_prints_the_contracts_keys(tmp_path, asked, monkeypatch, cap
         "false_flag_rate",
         "subsystem_recall",
         "confusion",
+        "exact",
+        "coverage",
     } <= set(printed)
-    assert main(["prove", "--cases", "8", "--jobs", "1", "--out", str(tmp_path / "p")]) == 0
+    assert list(printed["families"]) == list(world.NAMES)
+    assert all(part["cases"] == 1 and "exact" in part for part in printed["families"].values())
+    rudders = ["prove", "--families", "rudder", "--cases", "8", "--jobs", "1", "--out", str(tmp_path / "p")]
+    assert main(rudders) == 0
     lines = capsys.readouterr().out.splitlines()
     assert {
         "concealed -> named first",
@@ -568,6 +578,7 @@ def test_the_command_prints_the_contracts_keys(tmp_path, asked, monkeypatch, cap
         (["--cases", "0"], "0 is not between 1"),
         (["--cases", "two"], "is not a whole number"),
         (["--limit", "1"], "is not above 1"),
+        (["--families", "screw,rotor"], "'rotor' is no family, there are rudder"),
         (["--real", "nowhere"], "there is no such file"),
         (["--out", ""], "--out is empty"),
     ],

@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import minimize, nnls
+from scipy.signal import lfilter, savgol_filter
 from scipy.special import stdtrit
 
+from ers_mj.data.smoothing import parabolic
 from ers_mj.effects.base import recursive
+from ers_mj.selection.recursion import two_poles
+from ers_mj.solvers.nonnegative import nonnegative
 from ers_mj.solvers.simplex import lowest
 from ers_mj.solvers.student import quantile
 
@@ -34,6 +38,32 @@ def test_the_simplex_asks_for_no_more_than_it_may():
         within=0,
     )
     assert len(asked) == 7
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_least_squares_without_negative_numbers_are_scipys(seed):
+    random = np.random.default_rng(seed)
+    design = random.normal(size=(60, 6))
+    design = np.column_stack([design, -design[:, :2]])
+    right = design @ random.normal(size=8) + random.normal(size=60)
+    theirs, ours = nnls(design, right)[0], nonnegative(design, right)
+    assert ours.min() >= 0
+    assert design @ ours == pytest.approx(design @ theirs, abs=1e-9)
+
+
+@pytest.mark.parametrize(("window", "step"), [(9, None), (5, 1e-3), (25, 2e-3)])
+def test_parabolas_through_neighbours_are_scipys(window, step):
+    y = np.cumsum(np.random.default_rng(2).normal(size=120))
+    theirs = savgol_filter(y, window, 2) if step is None else savgol_filter(y, window, 2, deriv=1, delta=step)
+    assert parabolic(y, window, step) == pytest.approx(theirs, abs=1e-8 / (step or 1.0))
+
+
+def test_two_poles_filter_as_scipy_does():
+    random = np.random.default_rng(3)
+    driven = random.normal(size=200) + 1j * random.normal(size=200)
+    out = np.empty(200, complex)
+    two_poles(driven, 0.995, 0.9, out)
+    assert out == pytest.approx(lfilter([1.0], [1.0, -1.895, 0.995 * 0.9], driven), abs=1e-10)
 
 
 def test_a_recursion_is_the_sum_of_what_is_left_of_every_impulse():

@@ -110,8 +110,8 @@ def _told(document: dict, kept: Kept) -> list[str]:
 
 
 def _told_rest(document: dict) -> list[str]:
-    """What a quick look left out, and what to record next."""
-    lines = _section("left out by --quick", [str(part["sentence"]) for part in document.get("left_out") or []])
+    """What was left out, and what to record next."""
+    lines = _section("left out", [str(part["sentence"]) for part in document.get("left_out") or []])
     following = (document.get("next_recording") or {}).get("sentence")
     return lines + _section("record next", [following] if following else [])
 

@@ -251,7 +251,8 @@ def _told_missing(field: str, columns: list[str]) -> str:
     known += [c for c, kind in INPUTS.items() if kind == "position"] if field == "u" else []
     if alike := [c for c in columns if c not in COLUMNS and re.match(LOOKS_LIKE[field], c)]:
         return f"the {noun} {listed(alike)} has an unknown unit, known are {listed(known)} (or choose with --map)"
-    return f"there is no {noun}, {listed(known)} was expected and the columns are {listed(columns)}"
+    expected = f"{listed(known)} was expected or --map {known[0]}=COLUMN"
+    return f"there is no {noun}, {expected}, and the columns are {listed(columns)}"
 
 
 def refuse_unknown_unit(noun: str, unit: str, field: str, name: str) -> None:

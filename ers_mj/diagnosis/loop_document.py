@@ -18,9 +18,12 @@ from ers_mj.diagnosis.remainder import beyond_training, remainder
 from ers_mj.diagnosis.sentences import shown
 from ers_mj.diagnosis.told_model import with_diagnosis
 from ers_mj.effects import BY_NAME
+from ers_mj.effects.gravity_imbalance import GravityImbalance
+from ers_mj.position_loop.fit import fitted, gain
 from ers_mj.position_loop.intervals import Told
 from ers_mj.position_loop.model import LETTERS, LoopModel
 from ers_mj.position_loop.runs import Run, speed_of
+from ers_mj.position_loop.terms import SPRING, without
 from ers_mj.servo.simulation import unit_of
 
 BESIDE = (
@@ -130,7 +133,17 @@ def _alternatives(case: LoopCase, name: str) -> list[dict]:
                 for c in ranked[1:]
                 if c.name in BY_NAME and weights[c.name] / total > case.policy.tied
             ]
-    return []
+    return _spring_instead(case) if BY_NAME[name].is_weight else []
+
+
+def _spring_instead(case: LoopCase) -> list[dict]:
+    """A spring in a weight's place, where it does nearly as well: over a small travel their moments are the same."""
+    model = without(case.model, GravityImbalance.name).having(a_1=0.0, hold=case.model["hold"])
+    more = gain(fitted(model, case.selector.data), case.chosen)
+    probability = 1.0 / (1.0 + math.exp(min(more, 700.0)))
+    why = f"a spring in its place explains {abs(more):.1f} {'less' if more > 0 else 'more'}"
+    is_tied = probability > case.policy.tied
+    return [{"effect": SPRING, "probability": probability, "why_not_excluded": why}] if is_tied else []
 
 
 def _last_round(case: LoopCase) -> list:

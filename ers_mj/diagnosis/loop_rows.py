@@ -15,6 +15,7 @@ from ers_mj.position_loop.model import LETTERS, LoopModel
 from ers_mj.servo.datasheet import LOOP, Datasheet
 
 ROWS = ("K", "D", "I", "L", "tau_s", "dead_time_s", "R", "a_1", "a_2", "c_2")
+SELDOM = ("least",)
 COMBINED_UNITS = {"a_2+D": "1/s", "c_2/K": "{y}", "(a_2+D)/K": "s", "L/K": "{y}", "I/K": "1/s"}
 UNKNOWN = {"value": None, "ci95": [None, None], "datasheet": None, "identifiable": False}
 NOTHING = Told(0.0, (0.0, 0.0), True)
@@ -25,7 +26,7 @@ def parameters(found: Intervals, y: str, data: Data, known: Mapping[str, float] 
     tell; beside them what is ``known`` beforehand.
     """
     rows = {}
-    for letter in ROWS:
+    for letter in (*ROWS, *(x for x in SELDOM if x in found.model.free)):
         rows[letter] = _row(_letter(found, letter), LETTERS[letter].unit.format(y=y))
     if found.model["dead_time_s"] > 0.0:  # the latency is the whole loop's, not the command's
         rows["tau_s"] = dict(rows["dead_time_s"])

@@ -15,6 +15,7 @@ from ers_mj.decisions import explained
 from ers_mj.decisions.thresholds import POLICY
 from ers_mj.errors import InputError
 from ers_mj.estimation.fit import Along, fit, hopped
+from ers_mj.estimation.initial_guess import guesses
 from ers_mj.estimation.initial_state import with_starts, without_spikes
 from ers_mj.estimation.objective import Fit, run_of, tau_of
 from ers_mj.estimation.scales import ampere_in, free_in, scales_of
@@ -141,13 +142,12 @@ def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Seq
     it was met.
 
     From afar tangents and finite differences may lead to different valleys. The lower one is the baseline, the other
-    may be the less bent.
+    may be the less bent; where the first explains all, no other is looked for.
     """
     traces = with_starts(model, traces)
-    first, second = sorted(
-        (fit(model, traces, along=Along(by_tangents=by_tangents)) for by_tangents in (True, False)),
-        key=lambda found: found.cost,
-    )
+    first = fit(model, traces)
+    second = first if _explains(first) else fit(model, traces, along=Along(by_tangents=False))
+    first, second = sorted((first, second), key=lambda found: found.cost)
     traces = with_starts(first.model, without_spikes(first.model, traces))
     found = fit(first.model, traces, tau=tau_of(first.misfit))
     others = [dict(second.model.values)] if second.cost - found.cost > POLICY.valley else []
@@ -175,8 +175,6 @@ def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angl
 
 def _acts_the_other_way(traces: Sequence[Trace], b: float) -> bool:
     """Whether a regression says that the input acts the other way than a datasheet says."""
-    from ers_mj.estimation.initial_guess import guesses  # brings scipy.signal, as in search
-
     best = next(iter(guesses(traces)), None)
     return best is not None and best.values["b"] * b < 0
 

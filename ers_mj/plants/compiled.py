@@ -28,6 +28,7 @@ import numba
 import numpy as np
 from numba.core import cgutils, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
 from ers_mj.passing import remove
@@ -324,10 +325,14 @@ def _cache_of(piece: Piece) -> FunctionCache:
     class Kept(FunctionCache):
         _impl_class = staticmethod(lambda _: _Place(piece))
 
-        def load_overload(self, signature, context):
-            """What is kept; nothing where that is not whole."""
+        def load_overload(self, signature, target):
+            """What is kept; nothing where that is not whole. As numba's, without reading all that numba knows how to
+            compile (and scipy.linalg for it): what is kept is linked, and who compiles reads it then.
+            """
+            rtsys.initialize(target)
             try:
-                return super().load_overload(signature, context)
+                with self._guard_against_spurious_io_errors():
+                    return self._load_overload(signature, target)
             except Exception as error:  # pickle raises whatever the bytes say
                 _tell(f"{self.cache_path} is not whole ({type(error).__name__}), what is missing is compiled again")
                 self._cache_file = _Place(piece).fresh()

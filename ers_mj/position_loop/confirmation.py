@@ -17,7 +17,7 @@ from ers_mj.position_loop.fit import Data, Fit, fitted
 from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run
 from ers_mj.position_loop.selection import Left, Selection, Selector
-from ers_mj.position_loop.terms import INTEGRAL, SPRING, without
+from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, without
 
 FIRST, LAST = 0.7, 0.3  # shares of the only recording that are fitted and held out; the last that is recalibrated on
 COARSER = 3  # blocks of a run that are judged as one
@@ -110,7 +110,7 @@ def bare_fit(selector: Selector, selection: Selection) -> Fit:
 
 def judged(selection: Selection) -> list[Left]:
     """The terms that held-out data must confirm: the names, and those laws without one that a name could stand for."""
-    names = {x.name for x in selection.named} | {INTEGRAL, SPRING}
+    names = {x.name for x in selection.named} | {INTEGRAL, STARTING, SPRING}
     return [x for x in selection.left if x.name in names]
 
 

@@ -17,6 +17,7 @@ RUN = 5  # neighbouring blocks that are taken as one
 FEWEST = 3  # left-out refits from which they count
 TOLD = 0.7  # half width of a logarithm up to which a number is told
 INEXACT, CLOCK = 0.0025, 0.00025  # standard deviations of what firmware and simulation do in steps: relative, and [s]
+RATES = ("K", "D", "I", "a_2")
 COMBINED = ("a_2+D", "c_2/K", "(a_2+D)/K", "L/K", "I/K")
 
 
@@ -46,7 +47,7 @@ class Intervals:
         model = fit.model
         if "L" in model.free and "D" not in model.free:  # a term that was left out leaves doubt in what it moves
             model = fitted(model.having(D=0.0), data, 8).model
-        layout = model.layout()
+        layout, rate = model.layout(), max(model["a_2"] + model["D"], 0.0)
         j = jacobian(model, data)
         e = data.residuals(model)
         groups = data.block // RUN
@@ -59,7 +60,7 @@ class Intervals:
         spread += inverse * float(np.mean(e * e))
         if len(left_out) >= FEWEST and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
-        spread += np.diag([_inexact(f, q) ** 2 for f, q in zip(layout, model.vector(layout), strict=True)])
+        spread += np.diag([_inexact(f, q, rate) ** 2 for f, q in zip(layout, model.vector(layout), strict=True)])
         return Intervals(model, tuple(layout), spread, quantile(max(n - len(layout), 1), 0.975))
 
     def told(self, owner: str, name: str) -> Told | None:
@@ -116,11 +117,14 @@ class Intervals:
         return Told(value, (value * math.exp(-half), value * math.exp(half)), half < TOLD)
 
 
-def _inexact(f: Free, z: float) -> float:
-    """Standard deviation of a transformed number by what steps leave untold."""
+def _inexact(f: Free, z: float, rate: float) -> float:
+    """Standard deviation of a transformed number by what steps leave untold: a motion that is damped at a ``rate``
+    [1/s] and goes on in steps of h has rates wrong by rate h / 2.
+    """
     if f.name in ("tau_s", "dead_time_s"):
         return CLOCK / f.size
-    return INEXACT * (1.0 if f.positive else abs(z))
+    relative = math.hypot(INEXACT, 0.5 * rate * CLOCK) if f.name in RATES else INEXACT
+    return relative * (1.0 if f.positive else abs(z))
 
 
 def _jackknife(model: LoopModel, layout: Sequence[Free], left_out: Sequence[LoopModel]) -> np.ndarray:

@@ -25,6 +25,7 @@ from ers_mj.position_loop.terms import (
     DERIVATIVE,
     INTEGRAL,
     SPRING,
+    STARTING,
     Term,
     delayed_within,
     is_there,
@@ -54,7 +55,8 @@ class Effort:
     far: int = 25  # steps of their best ones
     tried: int = 10  # steps of a candidate's best starts
     promise: float = 0.3  # of what is asked for, from which a law is refitted
-    finalists: int = 3  # candidates that are refitted to the end
+    finalists: int = 3  # candidates that are refitted to the end,
+    near: float = 0.3  # those that gain this share of what the best one gains at first
     enough: float = 1.15  # noise levels of error that one body may leave before two are tried
     speeds: tuple[float, ...] = (0.9, 1.0, 1.15)  # of the largest seen, to which the reference is limited
     inset: float = 0.06  # of the travel, beyond which a stop may act
@@ -232,7 +234,8 @@ class Selector:
     def _ranked(self, current: Fit, candidates: Sequence[Term]) -> list[Compared]:
         seen = current if self.screen is self.data else fitted(current.model, self.screen, EFFORT.tried)
         quick = sorted(self._map(partial(self._tried, seen), candidates), key=lambda c: -c.gain)
-        ready = [c for c in quick[: EFFORT.finalists] if c.gain > 0.0]
+        least = EFFORT.near * max((c.gain for c in quick), default=0.0)
+        ready = [c for c in quick[: EFFORT.finalists] if c.gain > max(least, 0.0)]
         full = list(self._map(partial(self._finished, current), ready))
         return sorted([*full, *quick[len(ready) :]], key=lambda c: -c.gain)
 
@@ -263,7 +266,9 @@ class Selector:
         return Compared(term.name, fit, gain(current, fit))
 
     def _finished(self, current: Fit, candidate: Compared) -> Compared:
-        fit = best(other_shares(candidate.fit.model), self.data, EFFORT.full, EFFORT.several)
+        others = other_shares(candidate.fit.model)
+        model = best(others, self.screen, EFFORT.tried, EFFORT.several).model if len(others) > 1 else others[0]
+        fit = fitted(model, self.data, EFFORT.full)
         return replace(candidate, fit=fit, gain=gain(current, fit))
 
     def _with_closed_form(self, term: Term, model: LoopModel) -> Term:
@@ -327,7 +332,10 @@ class Selector:
         return self.policy.loop_gain
 
     def _parts(self, model: LoopModel) -> list[str]:
-        return [*present(model), *(name for name in (INTEGRAL, DERIVATIVE, SPRING, CONSTANT) if is_there(model, name))]
+        return [
+            *present(model),
+            *(name for name in (INTEGRAL, DERIVATIVE, STARTING, SPRING, CONSTANT) if is_there(model, name)),
+        ]
 
     def _left_out(self, current: Fit, name: str) -> Left:
         """The best refit without a term, from where the answer stands and from its own closed form."""

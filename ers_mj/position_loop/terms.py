@@ -31,6 +31,7 @@ from ers_mj.position_loop.model import SIDES, LoopModel
 from ers_mj.position_loop.runs import Run, speed_of
 
 INTEGRAL, DERIVATIVE, WITHIN = "integral action", "derivative action", "dead time within the loop"
+STARTING = "starting force"  # of the firmware: the least that its motor is driven with
 SPRING, CONSTANT = "spring", "constant load"  # the second may as well be an offset of the sensor: it has no name
 BURIED = 20.0  # of MuJoCo's default constraint, that of a limit
 LAWS = (GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, EndStop, Cogging)
@@ -40,6 +41,7 @@ OWN = {
     INTEGRAL: ("I",),
     DERIVATIVE: ("D",),
     WITHIN: ("dead_time_s",),
+    STARTING: ("least",),
     SPRING: ("a_1",),
     CONSTANT: ("hold",),
 }  # letters without an effect
@@ -54,6 +56,7 @@ class Sizes:
     # MuJoCo's own constraint first
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
     bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K
+    pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
     speeds: tuple[float, ...] = (1.0, 0.8)  # of the largest speed that is seen
     gaps: tuple[float, ...] = (0.4, 1.5)  # of the error that is left
@@ -101,7 +104,7 @@ def without(model: LoopModel, name: str) -> LoopModel:
     if name in model.names:
         gone = model.without_effect(name).lacking("grease")
         return replace(gone, side=SIDES[0]) if BY_NAME[name].subsystem == "transmission" else gone
-    if name in (INTEGRAL, SPRING, CONSTANT):
+    if name in (INTEGRAL, STARTING, SPRING, CONSTANT):
         return model.lacking(*OWN[name])
     if name == DERIVATIVE:
         return model.having(a_2=model["a_2"] + max(model["D"], 0.0)).lacking("D")
@@ -137,6 +140,7 @@ def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
         Term(InputDelay.name, (model.having(tau_s=0.01),)),
         Term(WITHIN, delayed_within(model)),
         Term(DriveDeadZone.name, tuple(model.having(band=x * model["c_2"] / model["K"]) for x in SIZES.bands)),
+        Term(STARTING, tuple(model.having(least=x * model["c_2"]) for x in SIZES.pushes if model["c_2"] > 0.0)),
         Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
     ]
     if "L" in model.free:

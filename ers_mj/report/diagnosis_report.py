@@ -124,9 +124,9 @@ def _tone(document: Mapping) -> str:
 
 
 def _left_out(document: Mapping) -> str:
-    """What a quick look left out."""
+    """What was left out: of a quick look, or as the budget ended."""
     told = [str(part.get("sentence")) for part in document.get("left_out") or ()]
-    return f'<p class="note">A quick look: {page.text("; ".join(told))}.</p>' if told else ""
+    return f'<p class="note">Left out: {page.text("; ".join(told))}.</p>' if told else ""
 
 
 def _made(made: Made) -> str:

@@ -100,8 +100,11 @@ class Search:
     in_mujoco: bool = True
     advised: bool = True
 
-    def left_out(self) -> tuple[tuple[str, str], ...]:
-        """The parts of a diagnosis that this search leaves out against the usual one, each with a sentence."""
+    def left_out(self, is_cut_short: bool = False) -> tuple[tuple[str, str], ...]:
+        """The parts of a diagnosis that this search leaves out against the usual one, each with a sentence.
+
+        ``is_cut_short``: the budget ended it.
+        """
         parts = (
             ("sweep", not self.sweeps, "effects that no first-order promise shows were not looked for"),
             (
@@ -110,6 +113,11 @@ class Search:
                 "what was named was not weighed against pairs and exchanges of effects",
             ),
             ("rounds", self.last < SEARCH.last, "the search was ended after a tenth of the usual time at most"),
+            (
+                "budget",
+                is_cut_short and self.last >= SEARCH.last,
+                "the search ended at its budget of simulation: this is the answer so far",
+            ),
             ("MuJoCo", not self.in_mujoco, "the held-out recordings were not run in MuJoCo"),
             ("next recording", not self.advised, "the next recording was not designed"),
         )

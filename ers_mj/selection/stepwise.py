@@ -7,7 +7,6 @@ offers; what is named is looked at again.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -39,7 +38,7 @@ Progress = Callable[[str, float], None]
 @dataclass(frozen=True)
 class Selection:
     """The chosen model, the baseline it grew from, each round's candidates, the tau at which the last was judged, the
-    traces with the starts that the chosen model gives them, and what was done, move by move.
+    traces with the starts that the chosen model gives them, what was done, and if a budget ended it.
     """
 
     base: Fit
@@ -48,6 +47,7 @@ class Selection:
     tau: float
     traces: Sequence[Trace]
     trail: tuple[Move, ...] = ()
+    cut_short: bool = False
 
 
 def select(
@@ -93,7 +93,7 @@ class _Stepwise:
         self.given: tuple[str, ...] = ()  # effects of the baseline
 
     def run(self) -> Selection:
-        while self._may_go_on():
+        while not (cut_short := not self._may_go_on()):
             if self._taken() >= self.bench.policy.most_effects:
                 if not self._look_again(("pair", self._pair)):
                     break
@@ -111,8 +111,8 @@ class _Stepwise:
                 self.tried.add("review")
             else:
                 self._add(because)
-        bench = self.bench
-        return Selection(self.base, self.current, tuple(self.rounds), bench.tau, bench.traces, tuple(self.trail))
+        bench, rounds, trail = self.bench, tuple(self.rounds), tuple(self.trail)
+        return Selection(self.base, self.current, rounds, bench.tau, bench.traces, trail, cut_short)
 
     # -- how far it goes -----------------------------------------------------------------------------------------------
 
@@ -203,7 +203,7 @@ class _Stepwise:
         """The promising candidates; in the first round a baseline that holds the output otherwise among them."""
         bench, current, is_first = self.bench, self.current, not self.rounds
         slow = () if self._may_sweep() else bending_and_twisting(current.model)
-        last = bench.budget.raced if is_dear(current) else math.inf
+        last = bench.budget.raced if is_dear(current) else bench.budget.longest
         anchors = self.anchors if is_first else ()
         ranked = candidates(bench.without((*current.model.names, *slow)), current, anchors, bar.faint, last)
         if self.held is None or not is_first:

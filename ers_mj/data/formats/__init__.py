@@ -57,6 +57,10 @@ def load(
     if os.path.isfile(path / "metadata.yaml"):  # a bag of ROS 2
         whole = b"".join(p.read_bytes() for p in sorted(path.iterdir()) if p.is_file())
         return _read("ros", File(path, b"", name, wanted or {}, beside)), hashlib.sha256(whole).hexdigest()
+    if os.path.isdir(path):
+        inside = sorted(str(p.relative_to(path)) for p in path.rglob("*") if p.suffix.lower() in READERS)
+        told = f", it holds {listed(inside, 4)}" if inside else ""
+        raise InputError(f"{name}: is a folder and no bag of ROS 2, a file was expected{told}")
     packed = read_content(path)
     content, inner = (_unpacked(packed, name), path.with_suffix("")) if path.suffix.lower() == ".gz" else (packed, path)
     suffix = inner.suffix.lower()
@@ -87,38 +91,24 @@ def _read(module: str, file: File) -> Loaded:
 
 
 @contextlib.contextmanager
-def _no_errors_of_c() -> Iterator[None]:
-    """Without standard error, as the system has it."""
-    try:
-        kept = os.dup(STDERR)
-    except OSError:  # it is closed
-        yield
-        return
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, STDERR)
-    try:
-        yield
-    finally:
-        os.dup2(kept, STDERR)
-        for handle in (kept, nothing):
-            os.close(handle)
-
-
-@contextlib.contextmanager
 def _quiet(in_c: bool) -> Iterator[None]:
-    """What a library prints, and what its destructors raise over a damaged file, is not for our output; nor, ``in_c``,
-    what it prints past Python.
+    """Without what a library prints meanwhile, by Python or, on standard error, ``in_c`` as well, and without what its
+    destructors raise over a damaged file.
     """
     hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
-    try:
-        with contextlib.ExitStack() as stack:
-            stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
-            stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
-            if in_c:
-                stack.enter_context(_no_errors_of_c())
-            yield
-    finally:
-        sys.unraisablehook = hook
+    with contextlib.ExitStack() as stack:
+        stack.callback(setattr, sys, "unraisablehook", hook)
+        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
+        with contextlib.suppress(OSError):  # it may be closed
+            kept = os.dup(STDERR) if in_c else None
+            if kept is not None:
+                stack.callback(os.close, kept)
+                stack.callback(os.dup2, kept, STDERR)
+                nothing = os.open(os.devnull, os.O_WRONLY)
+                stack.callback(os.close, nothing)
+                os.dup2(nothing, STDERR)
+        yield
 
 
 def _unpacked(content: bytes, name: str) -> bytes:
