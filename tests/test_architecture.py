@@ -34,9 +34,10 @@ MAY_READ = {
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
     "proving": ("data", "errors", "plants", "workers"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
+    "export": ("control", "effects", "errors", "plants", "position_loop", "servo"),
     "door": (
-        "control", "data", "diagnosis", "effects", "errors", "estimation", "identification", "plants", "position_loop",
-        "report", "selection", "servo", "validation", "view",
+        "control", "data", "diagnosis", "effects", "errors", "estimation", "export", "identification", "plants",
+        "position_loop", "report", "selection", "servo", "validation", "view",
     ),
     "fleet": ("data", "door", "errors", "servo", "workers"),
     "commands": (

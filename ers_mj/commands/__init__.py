@@ -11,6 +11,7 @@ from ers_mj.commands import (
     demo,
     diagnose,
     excite,
+    export,
     frequency,
     gains,
     identify,
@@ -39,5 +40,6 @@ COMMANDS = (
     frequency,
     watch,
     excite,
+    export,
     cache,
 )

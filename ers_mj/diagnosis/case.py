@@ -27,6 +27,7 @@ from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.comparison import Candidate
 from ers_mj.selection.confirmation import Confirmed
 from ers_mj.selection.cross_validation import Score, pooled, recalibrated, scored
+from ers_mj.selection.measure import FREE_RUN
 from ers_mj.selection.posterior import probabilities
 from ers_mj.selection.stepwise import Selection
 from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere
@@ -105,11 +106,24 @@ class Case:
             "recalibrated_rmse_after_rad": self._again[1].rmse,
             "mujoco_heldout_rmse_before_rad": self.multibody[0],
             "mujoco_heldout_rmse_after_rad": self.multibody[1],
+            **self._free_run,
             "noise_floor_rad": self.noise,
             "heldout_from": c.sentence,
             "mujoco_heldout_from": ran,
             "selection_cost_before": self.start.fit.cost,
             "selection_cost_after": self.selection.chosen.cost,
+        }
+
+    @property
+    def _free_run(self) -> dict[str, float]:
+        """The held-out errors of one free run, to be set beside those of others, where windows are the measure."""
+        c = self.confirmed
+        if c.measure == FREE_RUN:
+            return {}
+        ends = ("before", c.base_models), ("after", c.models)
+        return {
+            f"heldout_free_run_rmse_{when}_rad": pooled([scored(m, f.held_out) for m, f in zip(some, c.parts)]).rmse
+            for when, some in ends
         }
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -109,7 +109,8 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         case.recordings[0].input_unit,
         spectrum,
     )
-    return Diagnosis(document, evidence, _improved(case), case.rig.plant(model if case.told_effects else base))
+    model_told = with_diagnosis(_improved(case), document)
+    return Diagnosis(document, evidence, model_told, case.rig.plant(model if case.told_effects else base))
 
 
 def _remainder(case: Case) -> dict:
@@ -372,6 +373,19 @@ def _improved(case: Case) -> Datasheet:
     ]
     parameters = dict(case.datasheet.parameters) if case.datasheet is not None else {}
     return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
+
+
+def with_diagnosis(sheet: Datasheet, document: dict) -> Datasheet:
+    """The model with the verdict that made it, and the intervals of what was identified of it."""
+    held = {**sheet.lumped, **sheet.loop, **sheet.baseline}
+    rows = {name: row["ci95"] for name, row in document["parameters"].items() if name in held and row["identifiable"]}
+    for missing in document["missing"]:
+        given = dict(sheet.effects).get(missing["effect"], {})
+        told = missing["parameters"].items()
+        rows |= {f"{missing['effect']}.{name}": row["ci95"] for name, row in told if name in given}
+    ends = {key: [math.nan if x is None else float(x) for x in row] for key, row in rows.items()}
+    known = {key: (low, high) for key, (low, high) in ends.items() if -math.inf < low <= high < math.inf}
+    return replace(sheet, verdict=document["verdict"], intervals=known)
 
 
 def versions_of() -> dict:

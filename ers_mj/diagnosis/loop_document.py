@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of
+from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of, with_diagnosis
 from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
 from ers_mj.diagnosis.localisation import Place, Ranked, Samples, places, residual_map, shaded
 from ers_mj.diagnosis.loop_advice import next_recording
@@ -55,7 +55,7 @@ def told(case: LoopCase) -> Diagnosis:
         case.recordings[0].input_unit,
     )
     model = case.model if case.told_effects or not case.names else case.base
-    return Diagnosis(document, evidence, improved(model), case.plant())
+    return Diagnosis(document, evidence, with_diagnosis(improved(model), document), case.plant())
 
 
 # -- the effects ----------------------------------------------------------------------------------------------------

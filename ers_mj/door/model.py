@@ -1,11 +1,9 @@
-"""A servo's model as other tools take it: to simulate, to step, to compare with a recording, for python-control and for
-MuJoCo.
-"""
+"""A servo's model as other tools take it: to simulate, to step, to compare with a recording, and to export."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -29,6 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from ers_mj.control.stepping import Stepper
+    from ers_mj.door.exporting import Exported
     from ers_mj.plants.joint import JointLines
     from ers_mj.plants.mechanical import MechanicalPlant
     from ers_mj.plants.reduced import ReducedModel
@@ -42,8 +41,7 @@ class Model:
 
     Args:
         datasheet: a path (a datasheet or model.toml), "table1", a mapping laid out as the TOML, a datasheet, a model.
-        output_unit: rad, m or V: the unit that Eq. (6)'s letters are in.
-        input_unit: V, % of duty, N m or A.
+        output_unit, input_unit: rad, m or V, which Eq. (6)'s letters are in; V, % of duty, N m or A.
         inductance: whether the winding's time constant acts; by default where a diagnosis has found one, and not that
             of a bare datasheet.
 
@@ -116,8 +114,8 @@ class Model:
             recording: one, or a path to one, in the model's units.
 
         Returns:
-            Measured less simulated (N,) [output unit], NaN where nothing was measured: a free run under the recording's
-            input, from the output and speed that fit its first 50 ms (or 10 samples) best.
+            Measured less simulated (N,) [output unit], NaN where nothing was measured: a free run under its input, from
+            the output and speed that fit its first 50 ms (or 10 samples) best.
 
         Raises:
             InputError: it is in other units, or the motion leaves all bounds.
@@ -141,8 +139,7 @@ class Model:
 
         Args:
             rate_hz: of its samples [Hz].
-            theta: where the servo starts [output unit]; theta_0 by default.
-            omega: its speed there [output unit/s].
+            theta, omega: where the servo starts [output unit], theta_0 by default, and its speed there [output unit/s].
 
         Returns:
             The first reading [output unit].
@@ -191,8 +188,7 @@ class Model:
         with their slopes (`losses("control")` says what does not).
 
         Args:
-            theta: the point [output unit]; theta_0 by default.
-            omega: its speed [output unit/s].
+            theta, omega: the point [output unit] and its speed [output unit/s]; theta_0 by default.
             rate_hz: of a loop: the plant from sample to sample, dead times exact. None: continuous.
             pade: order of the approximations that stand for dead times in continuous time.
 
@@ -293,6 +289,18 @@ class Model:
             actuator=actuator,
             is_angle=self.output_unit == "rad",
         )
+
+    def export(self, folder: str | os.PathLike[str], to: Sequence[str] = ("mujoco",), force: bool = False) -> Exported:
+        """Write the model for other tools, and LOSSES.md (`ers export` lists the targets).
+
+        Raises:
+            InputError: no such target, or the folder holds files and no `force` is given.
+        """
+        from ers_mj.door.exporting import export
+        from ers_mj.export.servo import servo_of
+
+        servo = servo_of(self._datasheet, self.output_unit, self.input_unit, self.signals, self.inductance)
+        return export(servo, folder, to, force)
 
     def losses(self, target: str) -> tuple[str, ...]:
         """What a conversion cannot carry, a sentence each.

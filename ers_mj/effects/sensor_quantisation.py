@@ -4,7 +4,7 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Sensor
 
-WHOLE = 0.01  # bits from a whole number, within which the step of an encoder is read from rounded numbers
+WHOLE = 1e-3  # bits from a whole number, within which the step of an encoder is read from rounded numbers
 
 
 class SensorQuantisation(Sensor):

@@ -15,6 +15,17 @@ from ers_mj.plants.position_loop import LoopNumbers
 CONTROL_STEP = 5e-4  # [s] for which the stepped controller holds its drive
 
 
+def firmware_alone(q: LoopNumbers) -> tuple[str, ...]:
+    """What of a firmware's loop no position actuator of MuJoCo has."""
+    found = {
+        "integral action": q.I > 0.0,
+        "the limit of the reference's speed": math.isfinite(q.R),
+        "the dead band": q.band > 0.0 or q.least > 0.0,
+        "the limit of the motor's torque": math.isfinite(q.most),
+    }
+    return tuple(name for name, is_so in found.items() if is_so)
+
+
 @dataclass(frozen=True)
 class LoopedPlant:
     """A MuJoCo plant whose input is an acceleration of its motor (b = 1), and the loop that commands it."""
@@ -39,17 +50,14 @@ class LoopedPlant:
     @property
     def absent(self) -> tuple[str, ...]:
         """What a position actuator cannot carry."""
-        q = self.loop
-        found = {
-            "integral action": q.I > 0.0,
-            "the limit of the reference's speed": math.isfinite(q.R),
-            "the dead band": q.band > 0.0 or q.least > 0.0,
-            "creeping friction": math.isfinite(q.creep),
-            "the limit of the motor's torque": math.isfinite(q.most),
-            "a dead time within the loop (the whole actuator is late)": q.dead_time > 0.0,
-            "the loop's sensor on the load": self.plant._lowered.has_motor_side and q.at_motor == 0.0,
-        }
-        return tuple(name for name, is_so in found.items() if is_so)
+        on_load = self.plant._lowered.has_motor_side and self.loop.at_motor == 0.0
+        creeps, late = math.isfinite(self.loop.creep), self.loop.dead_time > 0.0
+        return (
+            *firmware_alone(self.loop),
+            *(("creeping friction",) if creeps else ()),
+            *(("a dead time within the loop (the whole actuator is late)",) if late else ()),
+            *(("the loop's sensor on the load",) if on_load else ()),
+        )
 
     def spec(self) -> mujoco.MjSpec:
         """The model with a position actuator in place of the motor: kp, kv, forcerange, delay."""

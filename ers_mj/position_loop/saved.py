@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.position_loop import LoopNumbers
 from ers_mj.position_loop.model import LETTERS, LoopModel
 from ers_mj.position_loop.runs import Run
 from ers_mj.servo.datasheet import Datasheet
@@ -27,11 +29,22 @@ def model_of(datasheet: Datasheet) -> LoopModel:
     return LoopModel({**lumped, **datasheet.loop}, (), kernel_effects(datasheet.effects), datasheet.loop_sensor)
 
 
-def looped_plant(datasheet: Datasheet, is_angle: bool = True) -> LoopedPlant:
-    """The servo in MuJoCo, its loop around one joint of inertia 1."""
+def loop_of(datasheet: Datasheet) -> tuple[Coefficients, tuple[tuple[str, np.ndarray], ...], LoopNumbers]:
+    """The plant behind the loop, of an input of 1 acceleration, the effects in it, and the firmware's numbers.
+
+    Raises:
+        InputError: as `model_of` does.
+    """
     model, still = model_of(datasheet), np.zeros(2)
     run = Run("still", np.array([0.0, 1.0]), still, still, still > 0, still < 1, 1.0, 0.0, (0.0, 0.0), 0.0)
-    return LoopedPlant(MechanicalPlant(*model.plant_of(run), is_angle=is_angle, timestep=MUJOCO_STEP), model.of(run)[0])
+    c, effects = model.plant_of(run)
+    return c, tuple(effects), model.of(run)[0]
+
+
+def looped_plant(datasheet: Datasheet, is_angle: bool = True) -> LoopedPlant:
+    """The servo in MuJoCo, its loop around one joint of inertia 1."""
+    c, effects, numbers = loop_of(datasheet)
+    return LoopedPlant(MechanicalPlant(c, effects, is_angle=is_angle, timestep=MUJOCO_STEP), numbers)
 
 
 def simulate_loop(

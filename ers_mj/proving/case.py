@@ -1,4 +1,4 @@
-"""One case of the proof: a servo is drawn, something is concealed in it, MuJoCo records it; what is handed out, and the
+"""One rudder of the proof: it is drawn, something is concealed in it, MuJoCo records it; what is handed out, and the
 truth.
 """
 
@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.proving.catalogue import LISTED, OUTSIDE
+from ers_mj.proving.plans import KINDS, Plan, several
 from ers_mj.proving.plant import DEG, TABLE_1
 from ers_mj.proving.recorder import record
 from ers_mj.proving.sampling import Run, Setup
 from ers_mj.proving.servo import draw_servo
-from ers_mj.proving.sizing import ALIKE, TWO_MASS, Ruler, pooled, refit
+from ers_mj.proving.sizing import TWO_MASS, Ruler, pooled, refit
 from ers_mj.proving.strength import clutter, conceal
-
-KINDS = {"null": 0.25, "single": 0.5, "several": 0.15, "outside": 0.1}
 
 
 @dataclass(frozen=True)
@@ -34,15 +33,6 @@ class Making:
 MAKING = Making()
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a case is to be: its number from 0, its kind, the labels concealed in it."""
-
-    index: int
-    kind: str
-    labels: tuple[str, ...]
-
-
 def plans(count: int, seed: int) -> list[Plan]:
     """Kinds in their shares, singles and laws outside the library through their lists, all in random order."""
     rng = np.random.default_rng([seed, 0])
@@ -50,7 +40,7 @@ def plans(count: int, seed: int) -> list[Plan]:
     lists = {"single": _cycle(rng, LISTED, count), "outside": _cycle(rng, OUTSIDE, count)}
     out = []
     for index, kind in enumerate(kinds):
-        labels = (lists[kind].pop(0),) if kind in lists else _several(rng) if kind == "several" else ()
+        labels = (lists[kind].pop(0),) if kind in lists else several(rng, LISTED) if kind == "several" else ()
         out.append(Plan(index, kind, labels))
     return out
 
@@ -66,15 +56,6 @@ def shares(count: int) -> dict[str, int]:
 
 def _cycle(rng: np.random.Generator, names: tuple[str, ...], count: int) -> list[str]:
     return [str(name) for _ in range(count // len(names) + 1) for name in rng.permutation(names)]
-
-
-def _several(rng: np.random.Generator) -> tuple[str, ...]:
-    """Two or three effects that can be told apart and joined in one servo."""
-    many = 2 if rng.random() < 0.7 else 3
-    while True:
-        names = {str(name) for name in rng.choice(LISTED, many, replace=False)}
-        if not any(len(names & alike) > 1 for alike in ALIKE):
-            return tuple(sorted(names))
 
 
 @dataclass(frozen=True)
@@ -94,7 +75,8 @@ class Made:
 
 def make(plan: Plan, seed: int) -> tuple[dict[str, str], dict]:
     """({file name: text} that is handed out, the truth) of one case; it does not depend on the others."""
-    rng = np.random.default_rng([seed, 1, plan.index])
+    number = plan.index if plan.number is None else plan.number
+    rng = np.random.default_rng([seed, 1, number])
     made = _made(plan, rng)
     sensor = made.servo["sensor"]
     files = {"datasheet.toml": _datasheet(sensor["sample_rate_hz"])}
@@ -153,6 +135,7 @@ def _truth(plan: Plan, seed: int, made: Made) -> dict:
     ]
     return {
         "case": f"case-{plan.index + 1:03d}",
+        "family": plan.family,
         "kind": plan.kind,
         "labels": list(plan.labels),
         "effects": made.concealed,

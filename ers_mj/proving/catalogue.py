@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ers_mj.proving.concealed import drive, friction, load, outside, sensor, transmission
+from ers_mj.proving.concealed import drive, friction, load, loop, outside, sensor, transmission
 from ers_mj.proving.concealed.base import spells
 from ers_mj.proving.plant import DEG
 
@@ -16,6 +16,9 @@ CATALOGUE = {e.name: e for part in (friction, transmission, drive, load, sensor,
 """Every effect by name; `listed` tells those of the contract from those that no library can name."""
 
 LISTED = tuple(name for name, effect in CATALOGUE.items() if effect.listed)
+IN_LOOP = {e.name: e for e in loop.ENTRIES}
+"""What acts on the reference of a servo's own loop; `bench` sets it."""
+
 OUTSIDE = tuple(name for name, effect in CATALOGUE.items() if not effect.listed)
 
 
@@ -24,6 +27,8 @@ def put_effects(plant, effects, record):
     (from 0).
     """
     for effect in effects:
+        if effect["label"] in IN_LOOP:
+            continue
         if effect["label"] not in CATALOGUE:
             raise ValueError(f"effect {effect['label']!r} is not known; there are {', '.join(CATALOGUE)}")
         CATALOGUE[effect["label"]].put(plant, effect["strength"], effect["shape"], record)

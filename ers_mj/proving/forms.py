@@ -10,8 +10,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ers_mj.proving.concealed.base import CONTACT, RIGID, Effect, between, choose
-from ers_mj.proving.concealed.drive import DEAD, LIMIT
+from ers_mj.proving.concealed.drive import DEAD, LIMIT, SAG
 from ers_mj.proving.concealed.friction import HYPERBOLIC, LOAD, STRIBECK
+from ers_mj.proving.concealed.load import GUST, HINGE, PULSE
+from ers_mj.proving.concealed.sensor import LAG, ROUND
+from ers_mj.proving.concealed.transmission import SHAFT
 
 TEXTBOOK: Mapping[str, Callable[[dict], bool]] = {
     "presliding": lambda s: s["delta"] == 1.0 and s["v_d_rad_s"] == 0.0,
@@ -54,3 +57,42 @@ def _twist(rng: np.random.Generator, name: str) -> dict:
     if name == "inductance":
         return {"saturation_per_A": between(rng, 0.03, 0.2)}
     return {}
+
+
+PLAIN: Mapping[str, Mapping[str, object]] = {
+    "stribeck": {"form": STRIBECK[1]},
+    "presliding": {"form": "LuGre, constant bristle damping", "v_d_rad_s": 0.0, "delta": 1.0},
+    "load_dependent_friction": {"form": LOAD[0]},
+    "asymmetric_friction": {"viscous_per_coulomb": 0.0},
+    "quadratic_drag": {"exponent": 2.0},
+    "backlash": {"form": CONTACT[0]},
+    "shaft_compliance": {"form": SHAFT[0]},
+    "transmission_ripple": {"second_harmonic": 0.0},
+    "cogging": {"second_harmonic": 0.0},
+    "voltage_saturation": {"form": "hard", "exponent": 0.0},
+    "current_limit": {"form": LIMIT[0]},
+    "drive_dead_zone": {"form": DEAD[1]},
+    "supply_sag": {"form": SAG[1], "tau_s": 0.0},
+    "hinge_moment_cubic": {"form": HINGE[0]},
+    "end_stop": {"form": CONTACT[0]},
+    "load_disturbance": {"form": PULSE[0]},
+    "periodic_gust": {"form": GUST[0]},
+    "sensor_lag": {"form": LAG[1]},
+    "sensor_quantisation": {"form": ROUND[0]},
+    "thermal_drift": {"fast_share": 0.0},
+}
+"""Effect -> what makes a drawn shape the package's own form; an effect that stands neither here nor in REDRAWN has one
+form only.
+"""
+REDRAWN = ("position_dependent_friction", "sensor_nonlinearity")  # forms whose other numbers follow from them
+OWN = 0.5  # share of the shapes that `draw_either` draws in the package's own form
+
+
+def draw_either(rng: np.random.Generator, effect: Effect, context: dict) -> dict:
+    """A shape in the package's own form or in another, as `own_form` in it says; one-formed effects have the own."""
+    if rng.random() >= OWN and effect.name in (*PLAIN, *REDRAWN):
+        return draw_shape(rng, effect, context) | {"own_form": False}
+    shape = effect.draw(rng, context)
+    while effect.name in REDRAWN and not TEXTBOOK[effect.name](shape):
+        shape = effect.draw(rng, context)
+    return {**shape, **PLAIN.get(effect.name, {}), "own_form": effect.listed}

@@ -92,6 +92,8 @@ def torque_constant(p, y):
 def current_rate(p, y, u, gain):
     """[A/s] L i' = v - R i - K_e n w - brush drop."""
     i = y[CUR]
+    if p.torque_s > 0.0:  # a drive that is told a torque: its current follows, whatever the speed
+        return (terminal_voltage(p, y, u, gain) - i) / p.torque_s
     has_motor = p.two > 0.0 or p.rod > 0.0
     speed = y[WM] if has_motor else y[W]
     angle = y[THM] if has_motor else y[TH]
@@ -231,7 +233,7 @@ def load_torque(p, y, t):
     x, w = y[TH] - p.theta_0, y[W]
     tau = -p.k_s * x + p.bias
     if p.grav != 0.0:
-        tau -= p.grav * np.sin(y[TH] + p.grav_ph)
+        tau -= p.grav * np.sin(p.grav_k * y[TH] + p.grav_ph)
     if p.k3 != 0.0:
         tau -= hinge(p, x)
     if p.stop_k > 0.0:

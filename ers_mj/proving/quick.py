@@ -140,10 +140,10 @@ def settle(p, y, t):
 
 @njit(cache=True)
 def march(plant, given, substeps, stand):
-    """(5, samples): measured, clean, true angle, u and current at the sample times."""
+    """(6, samples): measured, clean, true angle, u, current and speed at the sample times."""
     p = plant[0]
     h, samples = given.dt / substeps, given.u.size
-    out, y, work, memory = np.zeros((5, samples)), np.zeros(STATES), np.zeros((4, STATES)), np.zeros(3)
+    out, y, work, memory = np.zeros((6, samples)), np.zeros(STATES), np.zeros((4, STATES)), np.zeros(3)
     y[TH] = y[THM] = y[LAG] = y[APP] = p.theta_0
     y[BUS] = p.sag_V
     delay, late = int(round(p.delay_s / h)), int(round(p.lag_s / h))

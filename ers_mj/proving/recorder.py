@@ -96,7 +96,7 @@ def record(
     laws, data = m.laws, _begun(m)
     grid, late = _grid(laws[0], h, substeps)
     given, states = setup.given(effects, u, samples, dt), _relaxed(laws[0], late)
-    views, memory, out = _views(m, data), np.zeros(3), np.zeros((5, samples))
+    views, memory, out = _views(m, data), np.zeros(3), np.zeros((6, samples))
     with unlogged():
         for count in range(-round(STAND_S / h), 0):
             push(laws, count, grid, states, out, 1.0, views)

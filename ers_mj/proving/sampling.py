@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from ers_mj.proving.catalogue import samples_of
-from ers_mj.proving.plant import CONTROLLER, CUR, LAG, TH
+from ers_mj.proving.plant import CONTROLLER, CUR, LAG, TH, W
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Setup:
         return Given(
             u=np.zeros(samples) if closed else np.asarray(u, float),
             target=np.asarray(self.theta_ref, float) if closed else np.zeros(samples),
-            gains=np.array([controller[name] for name in CONTROLLER]) if closed else np.zeros(len(CONTROLLER)),
+            gains=np.array([controller.get(name, 0.0) for name in CONTROLLER]) if closed else np.zeros(len(CONTROLLER)),
             closed=closed,
             noise=np.zeros(samples) if self.noise is None else np.asarray(self.noise, float),
             stuck=stuck,
@@ -84,8 +84,8 @@ class Given(NamedTuple):
 
 
 class Run(NamedTuple):
-    """One simulated recording, (samples,) each; `theta` [rad] is measured, `clean` lacks noise and ordinary
-    converter.
+    """One simulated recording, (samples,) each; `theta` [rad] is measured, `clean` lacks noise and ordinary converter,
+    `omega` [rad/s] is the true speed.
     """
 
     theta: np.ndarray
@@ -93,6 +93,7 @@ class Run(NamedTuple):
     true: np.ndarray
     u: np.ndarray
     i_A: np.ndarray
+    omega: np.ndarray
 
 
 @njit(cache=True)
@@ -139,8 +140,9 @@ def pid(c, memory, target, angle, dt):
     last).
     """
     error = target - angle
-    memory[1] = (c[3] * memory[1] + c[2] * (error - memory[2])) / (c[3] + dt)
-    memory[2] = error
+    lead = -angle if c[10] > 0.0 else error
+    memory[1] = (c[3] * memory[1] + c[2] * (lead - memory[2])) / (c[3] + dt)
+    memory[2] = lead
     x = target - c[9]
     u = c[0] * error + memory[0] + memory[1] + c[5] * c[6] * (c[8] * x + c[7] * np.tanh(x / 0.01))
     if abs(u) < c[4] or u * error < 0.0:
@@ -150,7 +152,7 @@ def pid(c, memory, target, angle, dt):
 
 @njit(cache=True)
 def take(p, y, k, out, ring, step, late, given, memory):
-    """Write sample k into out (5, samples): measured, clean, true angle, the u [V] from now on, current."""
+    """Write sample k into out (6, samples): measured, clean, true angle, the u [V] from now on, current, speed."""
     clean = sensed(p, y, ring, step, late)
     held = out[0, k - 1] if k > 0 else clean
     held_clean = out[1, k - 1] if k > 0 else clean
@@ -158,9 +160,9 @@ def take(p, y, k, out, ring, step, late, given, memory):
     out[1, k] = held_clean if stuck else quantise(p, clean + spike)
     raw = quantise(p, clean + spike + given.noise[k])
     raw = np.round(raw / p.adc_step) * p.adc_step if p.adc_step > 0.0 else raw
-    out[0, k], out[2, k], out[4, k] = (held if stuck else raw), y[TH], y[CUR]
+    out[0, k], out[2, k], out[4, k], out[5, k] = (held if stuck else raw), y[TH], y[CUR], y[W]
     if k == 0:
-        memory[2] = given.target[0] - out[0, 0]
+        memory[2] = (0.0 if given.gains[10] > 0.0 else given.target[0]) - out[0, 0]
     u = pid(given.gains, memory, given.target[k], out[0, k], given.dt) if given.closed else given.u[k]
     printed = given.printed
     out[3, k] = np.round(u * printed) / printed + 0.0 if printed > 0.0 else u

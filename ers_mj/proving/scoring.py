@@ -36,6 +36,7 @@ SUBSYSTEMS = {
     "sensor": {"sensor_lag", "sensor_nonlinearity", "sensor_quantisation", "sensor_dropout"},
 }
 """All else, friction included, is load."""
+ARM = "gravity_imbalance"  # of what a family always has, the one that an answer must name
 NOTHING, NO_ANSWER, UNEXPLAINED, OUTSIDE, SEVERAL = "nothing", "no answer", "unexplained", "outside", "several"
 EDGES = (0.0, 0.5, 1.0, 2.0, 5.0, 12.0, 30.0, np.inf)  # [sigma] of the accuracy against visibility
 SURE = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)  # edges of the reliability diagram
@@ -55,10 +56,15 @@ def row_of(truth: Mapping, answer: Mapping) -> dict:
     """What counts of one case: truth and answer side by side."""
     document = answer.get("document") or {}
     fit, remainder = document.get("fit") or {}, document.get("remainder") or {}
-    missing = document.get("missing") or []
+    inherent = truth.get("inherent") or []
+    every = document.get("missing") or []
+    missing = [m for m in every if m["effect"] not in inherent]
     where = [entry.get("label") for entry in document.get("where") or [] if entry.get("axis") == "subsystem"]
     return {
         "case": truth["case"],
+        "family": truth.get("family"),
+        "sheet": truth.get("sheet"),
+        "faults": [fault["kind"] for fault in truth.get("faults", [])],
         "kind": truth["kind"],
         "labels": truth["labels"],
         "linkage": truth.get("linkage"),
@@ -69,6 +75,8 @@ def row_of(truth: Mapping, answer: Mapping) -> dict:
         "visibility": _or_nan(truth["visibility_after_refit_sigma"]),
         "each": {e["label"]: e.get("quick_visibility_sigma") for e in truth.get("effects", [])},
         "named": [m["effect"] for m in missing],
+        "inherent": inherent,
+        "inherent_named": [m["effect"] for m in every if m["effect"] in inherent],
         "verdict": document.get("verdict") or NO_ANSWER,
         "error": answer.get("error"),
         "significant": bool(remainder.get("significant")),
@@ -113,8 +121,30 @@ def right(row: Mapping, same: Callable[[str], object] = class_of) -> bool:
     return bool(row["named"]) and same(row["named"][0]) in {same(label) for label in row["labels"]}
 
 
+def exact(row: Mapping) -> bool:
+    """Whether the names are the concealed effects and no other, by class."""
+    return {class_of(name) for name in row["named"]} == {class_of(label) for label in row["labels"]}
+
+
 def scored(rows: Sequence[Mapping]) -> dict:
-    """All that the contract asks for, and the counts behind every share."""
+    """All that the contract asks for, the counts behind every share, and the same by family."""
+    families = dict.fromkeys(row["family"] for row in rows if row.get("family"))
+    parts = {name: [row for row in rows if row.get("family") == name] for name in families}
+    return {
+        **shares(rows),
+        "families": {name: shares(part) for name, part in parts.items()},
+        "coverage": {name: coverage(part) for name, part in parts.items()},
+        "accuracy": accuracy([row for row in rows if row["kind"] == "single"]),
+        "reliability": reliability(rows),
+        "error_over_floor": _over_floor(rows),
+        "parameters": _parameters(rows),
+        "failures": [f"{r['case']}: {r['error']}" for r in rows if r["error"]],
+        **_costs(rows, [row for row in rows if row["kind"] == SEVERAL]),
+    }
+
+
+def shares(rows: Sequence[Mapping]) -> dict:
+    """Every share of these cases, with its counts and interval."""
     by = {kind: [r for r in rows if r["kind"] == kind] for kind in ("null", "single", SEVERAL, OUTSIDE)}
     nulls, singles = by["null"], by["single"]
     counted = {
@@ -122,6 +152,7 @@ def scored(rows: Sequence[Mapping]) -> dict:
         "false_alarm_rate": (sum(bool(r["named"]) for r in nulls), len(nulls)),
         **_found(by[SEVERAL]),
         **_flagged(rows, by[OUTSIDE]),
+        **_inherent(rows),
         "subsystem_recall": (sum(r["where"] == [subsystem_of(r["labels"][0])] for r in singles), len(singles)),
     }
     return {
@@ -131,12 +162,6 @@ def scored(rows: Sequence[Mapping]) -> dict:
         "confusion": confusion(rows),
         "of": {name: list(pair) for name, pair in counted.items()},
         "ci95": {name: list(wilson(k, n)) for name, (k, n) in counted.items() if n and k <= n},
-        "accuracy": accuracy(singles),
-        "reliability": reliability(rows),
-        "error_over_floor": _over_floor(rows),
-        "parameters": _parameters(rows),
-        "failures": [f"{r['case']}: {r['error']}" for r in rows if r["error"]],
-        **_costs(rows, by[SEVERAL]),
     }
 
 
@@ -146,11 +171,21 @@ Counted = dict[str, tuple[int, int]]
 
 def _named(singles: Sequence[Mapping]) -> Counted:
     visible = [r for r in singles if r["visibility"] >= 1.0]  # [sigma]
+    clear = [r for r in singles if r["visibility"] >= 3.0]
     return {
         "top1": (sum(right(r, str) for r in singles), len(singles)),
         "top1_class": (sum(map(right, singles)), len(singles)),
         "top1_class_visible": (sum(map(right, visible)), len(visible)),
+        "top1_class_clear": (sum(map(right, clear)), len(clear)),
+        "exact": (sum(map(exact, singles)), len(singles)),
+        "exact_clear": (sum(map(exact, clear)), len(clear)),
     }
+
+
+def _inherent(rows: Sequence[Mapping]) -> Counted:
+    """The arms whose gravity is named."""
+    arms = [r for r in rows if ARM in r.get("inherent", ())]
+    return {"arm_recall": (sum(ARM in r["inherent_named"] for r in arms), len(arms))}
 
 
 def _found(several: Sequence[Mapping]) -> Counted:
@@ -278,6 +313,21 @@ def _parameters(rows: Iterable[Mapping]) -> dict:
             name: _coverage([e for e in mine if e["name"] == name]) for name in dict.fromkeys(e["name"] for e in mine)
         }
     return out
+
+
+def coverage(rows: Iterable[Mapping]) -> dict:
+    """By parameter and over `all`: how often the 95 % interval of what is called identifiable holds the truth, where
+    nothing from outside the library is concealed; what is zero in truth is no parameter, and theta_0 is known.
+    """
+    entries = [
+        e
+        for r in rows
+        if r["kind"] != OUTSIDE
+        for e in r["parameters"]
+        if e["true"] and e["name"] != "theta_0" and e.get("identifiable", True) and e["inside"] is not None
+    ]
+    names = sorted({e["name"] for e in entries})
+    return {"all": _coverage(entries)} | {name: _coverage([e for e in entries if e["name"] == name]) for name in names}
 
 
 def _coverage(entries: Sequence[Mapping]) -> dict:

@@ -78,10 +78,17 @@ def refit(servo, runs, rounds=5):
             for r, with_it in zip(servo["records"], runs)
         ]
 
-    x, parts, damping = np.zeros(len(FREE)), residuals(np.zeros(len(FREE))), 1e-3
+    return [float(np.sqrt(np.mean(part**2))) for part in levenberg(residuals, len(FREE), rounds)]
+
+
+def levenberg(residuals, free, rounds):
+    """Residuals (a list of arrays) at the least sum of their squares, begun at zero, by Levenberg-Marquardt over x
+    (free,); 4 dampings a round, and no further where a round gains less than a thousandth.
+    """
+    x, parts, damping = np.zeros(free), residuals(np.zeros(free)), 1e-3
     for _ in range(rounds):
         flat = np.concatenate(parts)
-        columns = [(np.concatenate(residuals(x + 1e-4 * e)) - flat) / 1e-4 for e in np.eye(len(FREE))]
+        columns = [(np.concatenate(residuals(x + 1e-4 * e)) - flat) / 1e-4 for e in np.eye(free)]
         jac = np.stack(columns, 1)
         normal, slope = jac.T @ jac, jac.T @ flat
         for _ in range(4):
@@ -94,7 +101,7 @@ def refit(servo, runs, rounds=5):
                 break
         if gain < 1e-3 * np.sum(flat**2):
             break
-    return [float(np.sqrt(np.mean(part**2))) for part in parts]
+    return parts
 
 
 class Ruler:
@@ -102,6 +109,7 @@ class Ruler:
 
     def __init__(self, servo: dict):
         self.servo, self.sigma = servo, servo["sensor"]["noise_sigma_eff_rad"]
+        self.ordinary_inductance = servo["params"]["L"]
         self.runs = [run(servo, record, k, [], ROUGH) for k, record in enumerate(servo["records"])]
         columns = []
         for e in np.eye(len(FREE)):

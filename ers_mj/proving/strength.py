@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from ers_mj.proving.catalogue import CATALOGUE
+from ers_mj.proving.catalogue import CATALOGUE, IN_LOOP
 from ers_mj.proving.concealed.base import Effect
 from ers_mj.proving.forms import draw_shape
-from ers_mj.proving.sizing import Ruler
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class Visibility:
     barely: float = 0.3  # clutter that shows more is left out
     near: float = 0.15  # of the logarithm of the target, at which a search ends
     tries: int = 7  # of a search
+    wider: float = 0.03  # of the least strength, where the plant is not the rudder
 
 
 VISIBILITY = Visibility()
@@ -42,12 +43,29 @@ STRUCTURAL = (
 """
 
 
-def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) -> dict:
-    """An effect of drawn shape, its strength tuned to a drawn visibility after refit."""
-    effect = CATALOGUE[name]
+class Ruler(Protocol):
+    """What measures effects on one servo [sigma]: at once, or by the refit itself."""
+
+    ordinary_inductance: float  # [H]
+
+    def projected(self, effects: list[dict]) -> float: ...
+
+    def refitted(self, effects: list[dict]) -> float: ...
+
+
+Shape = Callable[[np.random.Generator, Effect, dict], dict]
+
+
+def conceal(
+    rng: np.random.Generator, ruler: Ruler, name: str, context: dict, shape_of: Shape = draw_shape, wider: float = 1.0
+) -> dict:
+    """An effect of drawn shape, its strength tuned to a drawn visibility after refit; the least strength of the
+    catalogue times `wider` bounds it.
+    """
+    effect = (CATALOGUE | IN_LOOP)[name]
     target = float(np.exp(rng.uniform(np.log(VISIBILITY.least), np.log(VISIBILITY.most))))
-    shape = draw_shape(rng, effect, context)
-    low, high = np.log(_lowest(effect, ruler)), np.log(effect.high)
+    shape = shape_of(rng, effect, context)
+    low, high = np.log(_lowest(effect, ruler, wider)), np.log(effect.high)
     as_list = lambda s: [{"label": name, "strength": float(np.exp(s)), "shape": shape}]
     guess, _ = nearest(lambda s: ruler.projected(as_list(s)), target, 0.5 * (low + high), low, high, VISIBILITY.tries)
     found, left = nearest(lambda s: ruler.refitted(as_list(s)), target, guess, low, high, 3)
@@ -58,9 +76,10 @@ def conceal(rng: np.random.Generator, ruler: Ruler, name: str, context: dict) ->
     }
 
 
-def _lowest(effect: Effect, ruler: Ruler) -> float:
+def _lowest(effect: Effect, ruler: Ruler, wider: float) -> float:
     """The least strength that counts; an inductance must stand out from the ordinary one."""
-    return max(effect.low, 2.5 * ruler.servo["params"]["L"]) if effect.name == "inductance" else effect.low
+    low = effect.low * wider
+    return max(low, 2.5 * ruler.ordinary_inductance) if effect.name == "inductance" else low
 
 
 def nearest(
@@ -89,9 +108,11 @@ def _next(seen: list[tuple[float, float]], low: float, high: float) -> float:
     return step if low < step < high else 0.5 * (low + high)
 
 
-def clutter(rng: np.random.Generator, ruler: Ruler, taken: list[str], context: dict) -> list[dict]:
+def clutter(
+    rng: np.random.Generator, ruler: Ruler, taken: list[str], context: dict, among: Iterable[str] = CATALOGUE
+) -> list[dict]:
     """Up to three further effects that stay well below the noise."""
-    names = [name for name in CATALOGUE if name not in (*STRUCTURAL, *taken)]
+    names = [name for name in among if name in CATALOGUE and name not in (*STRUCTURAL, *taken)]
     out = []
     for name in rng.choice(names, int(rng.integers(4)), replace=False):
         effect = CATALOGUE[str(name)]

@@ -43,7 +43,8 @@ TABLE_1: Mapping[str, float] = MappingProxyType(
 LUMPED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 SIGNED = ("theta_0", "b")  # may be negative: where the spring rests, and the sense of the input
 NEVER_ZERO = ("J", "R", "n", "K_t", "b", "sample_rate_hz")
-SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect")
+SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect", "diagnosis")
+VERDICTS = ("consistent", "parameters_only", "missing_physics", "unexplained")
 KINDS, SENSORS = ("P", "PD", "PI", "PID"), ("load", "link", "motor")  # of a firmware's loop, and where its sensor sits
 LOOP = (
     "K", "D", "I", "L", "tau_s", "dead_time_s", "R", "band", "least", "most", "creep", "heavy", "buried", "share",
@@ -64,6 +65,8 @@ class Datasheet:
         loop: the firmware's loop under a position command, by LOOP's letters; empty where there is none.
         loop_kind, loop_sensor: one of KINDS, and one of SENSORS: loop and log on the load, the loop on the motor and
             the log on the load (link), both on the motor.
+        verdict: one of VERDICTS, or empty where no diagnosis made it.
+        intervals: the 95 % interval of what was identified, by letter or "effect.parameter", in the units of its value.
         name: where it comes from.
     """
 
@@ -75,10 +78,12 @@ class Datasheet:
     loop: Mapping[str, float] = field(default_factory=dict)
     loop_kind: str = "P"
     loop_sensor: str = "load"
+    verdict: str = ""
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     name: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        for attribute in ("parameters", "lumped", "baseline", "loop"):
+        for attribute in ("parameters", "lumped", "baseline", "loop", "intervals"):
             object.__setattr__(self, attribute, MappingProxyType(dict(getattr(self, attribute))))
         effects = tuple((name, MappingProxyType(dict(values))) for name, values in self.effects)
         object.__setattr__(self, "effects", effects)
@@ -87,7 +92,8 @@ class Datasheet:
         """Travel to another process as plain dictionaries."""
         effects = tuple((name, dict(values)) for name, values in self.effects)
         plain = dict(self.parameters), dict(self.lumped), self.sample_rate_hz, effects, dict(self.baseline)
-        return type(self), (*plain, dict(self.loop), self.loop_kind, self.loop_sensor, self.name)
+        told = self.verdict, dict(self.intervals)
+        return type(self), (*plain, dict(self.loop), self.loop_kind, self.loop_sensor, *told, self.name)
 
     def to_lumped(self) -> dict[str, float]:
         """Those of Eq. (6)'s parameters, of tau_e, emf_share and ampere that follow from what is given.
@@ -160,6 +166,7 @@ def datasheet_of(document: Mapping[str, Any], path: str | os.PathLike[str] = "da
         effects=tuple(_effect(entry, path) for entry in _entries(document, path)),
         baseline=_numbers(document.get("baseline", {}), f"{path}: [baseline]"),
         **_loop(document.get("loop", {}), f"{path}: [loop]"),
+        **_diagnosis(document.get("diagnosis", {}), f"{path}: [diagnosis]"),
         name=path.name,
     )
     _refuse_none_or_both(sheet, "baseline" in document, path)
@@ -223,6 +230,27 @@ def _loop(table: object, where: str) -> dict[str, Any]:
     if not loop.get("K", 0.0) > 0.0:
         raise InputError(f"{where} has no K above zero, which every position loop has")
     return {"loop": loop, "loop_kind": words["kind"], "loop_sensor": words["sensor"]}
+
+
+def _diagnosis(table: object, where: str) -> dict[str, Any]:
+    """What a diagnosis said of the model: its verdict and its intervals."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} is {_kind(table)}, a table was expected")
+    _refuse_unknown(table, ("verdict", "ci95"), "key", where)
+    verdict, intervals = table.get("verdict", ""), table.get("ci95", {})
+    if verdict not in ("", *VERDICTS):
+        raise InputError(f"{where} has verdict = {verdict!r}, one of {', '.join(VERDICTS)} was expected")
+    if not isinstance(intervals, Mapping):
+        raise InputError(f"{where} has ci95 = {_kind(intervals)}, a table was expected")
+    found = {}
+    for key, ends in intervals.items():
+        if not isinstance(ends, list | tuple) or len(ends) != 2:
+            raise InputError(f"{where} ci95 {key} is no pair of numbers, as in [1.0, 2.0]")
+        low, high = (_number(x, f"{where} ci95 {key}") for x in ends)
+        if low > high:
+            raise InputError(f"{where} ci95 {key} ends at {high:g}, below its beginning at {low:g}")
+        found[key] = (low, high)
+    return {"verdict": verdict, "intervals": found}
 
 
 def _entries(document: Mapping[str, Any], path: Path) -> list[object]:
@@ -303,6 +331,11 @@ def write_model(path: str | os.PathLike[str], datasheet: Datasheet) -> None:
         lines += _lines(title, datasheet.loop)
     for name, values in datasheet.effects:
         lines += ["[[effect]]", f"name = {_quoted(name)}", *_lines("[effect.parameters]", values)]
+    if datasheet.verdict:
+        lines += ["[diagnosis]", f"verdict = {_quoted(datasheet.verdict)}", ""]
+    if datasheet.intervals:
+        ends = (f"{_key(key)} = [{low!r}, {high!r}]" for key, (low, high) in datasheet.intervals.items())
+        lines += ["[diagnosis.ci95]", *ends, ""]
     write_whole(Path(path), "\n".join(lines))
 
 

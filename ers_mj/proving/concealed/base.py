@@ -2,7 +2,8 @@
 
 Forms differ on purpose from one case to the next, and from the textbook form, so that a library is not proven on its
 own formulas. `context` describes the servo and its effect-free records: params, peak_V, peak_A, travel (rad about
-theta_0), records, durations, dt.
+theta_0), records, durations; of other plants than the rudder also stiffness and turns,
+by how much their contacts are stiffer and their teeth finer.
 """
 
 from __future__ import annotations

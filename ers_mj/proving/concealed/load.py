@@ -24,8 +24,8 @@ def draw_gravity(rng, context):
 
 
 def put_gravity(p, s, shape, record):
-    """Strength: m g l [N m] in m g l sin(theta + phase)."""
-    p["grav"], p["grav_ph"] = s, shape["phase"]
+    """Strength: m g l [N m] in m g l sin(wave theta + phase); wave 1 but where the angle has a unit of its own."""
+    p["grav"], p["grav_ph"], p["grav_k"] = s, shape["phase"], shape.get("wave", 1.0)
 
 
 HINGE = ("k3 x^3", "6 k3 (x - sin x)", "k3 x^3/(1 + 2 x^2)")
@@ -45,7 +45,7 @@ def draw_stop(rng, context):
     """One side or both, springy or Hunt-Crossley."""
     return {
         "form": choose(rng, *CONTACT),
-        "k": between(rng, 800.0, 3000.0),
+        "k": between(rng, 800.0, 3000.0) * context.get("stiffness", 1.0),
         "zeta": float(rng.uniform(0.1, 0.4)),
         "side": choose(rng, "upper", "lower", "both"),
         "free_travel_deg": [float(x / DEG) for x in context["travel"]],

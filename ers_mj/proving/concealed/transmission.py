@@ -14,7 +14,7 @@ def draw_backlash(rng, context):
     """Stiffness and damping of the flanks, share of the dry friction on the motor's side."""
     return {
         "form": choose(rng, *CONTACT),
-        "contact_k": between(rng, 1200.0, 3000.0),
+        "contact_k": between(rng, 1200.0, 3000.0) * context.get("stiffness", 1.0),
         "contact_zeta": float(rng.uniform(0.1, 0.25)),
         "motor_friction_share": float(rng.uniform(0.15, 0.4)),
     }
@@ -73,7 +73,7 @@ def put_ratio(p, s, shape, record):
 
 def draw_ripple(rng, context):
     """Teeth a turn of the output, and a share of the second harmonic in half of the cases."""
-    turns = float(choose(rng, 18.0, 22.26, 36.0, rng.uniform(14.0, 60.0)))
+    turns = float(choose(rng, 18.0, 22.26, 36.0, rng.uniform(14.0, 60.0))) * context.get("turns", 1.0)
     return {
         "cycles_per_output_rev": turns,
         "phase": angle(rng),

@@ -1,0 +1,59 @@
+"""`ers export`: a model where it is used."""
+
+from __future__ import annotations
+
+import argparse
+
+from ers_mj.commands.options import add_out, one_of, results_folder, several
+from ers_mj.commands.output import bold, written
+from ers_mj.door.saving import as_json
+
+TARGETS = ("mujoco", "control", "fmu", "mjlab", "newton", "randomisation", "lookup")
+OUTPUT_UNITS, INPUT_UNITS = ("rad", "m", "V"), ("V", "%", "N m", "A")
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    """Add this command to the command line."""
+    parser = commands.add_parser(
+        "export",
+        help="write a model for the tools where it is used",
+        description=(
+            "Write a model for other tools: joint.xml (MuJoCo), model_control.py (python-control), model.fmu (FMI 2.0,"
+            " C source), mjlab_actuator.py, newton_actuator.py, randomisation.json (ranges and sampled servos) and"
+            " lookup.csv (tables for Simulink), with LOSSES.md: what each cannot carry."
+        ),
+        epilog="example: ers export ers-out/model.toml --to mujoco,fmu --out exported",
+    )
+    parser.add_argument(
+        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
+    )
+    parser.add_argument(
+        "--to",
+        type=several(one_of(TARGETS), "target"),
+        default=list(TARGETS),
+        metavar="NAME,...",
+        help=f"{', '.join(TARGETS)} (default all)",
+    )
+    parser.add_argument("--output-unit", choices=OUTPUT_UNITS, default="rad", help="of the model (default rad)")
+    parser.add_argument("--input-unit", choices=INPUT_UNITS, default="V", help="of the model (default V)")
+    add_out(parser)
+    parser.add_argument("--json", action="store_true", help="print files and losses as one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the files; 0."""
+    folder = results_folder(arguments.out, arguments.force, as_json=False)
+    assert folder is not None
+    from ers_mj.door.model import load_model
+
+    model = load_model(arguments.model, arguments.output_unit, arguments.input_unit)
+    found = model.export(folder, arguments.to, force=True)
+    if arguments.json:
+        print(as_json(found.to_dict()))
+        return 0
+    for name, losses in found.losses.items():
+        print(bold(name))
+        print("\n".join(f"  {sentence}" for sentence in losses) or "  nothing is left out")
+    print("\n".join(written(found.files)))
+    return 0

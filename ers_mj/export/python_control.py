@@ -1,0 +1,110 @@
+"""`model_control.py`: a module that stands alone, for python-control."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+from string import Template
+
+import numpy as np
+
+from ers_mj.export.base import Target, Written
+from ers_mj.export.portable import STATE, WITHIN, Portable
+from ers_mj.export.servo import Servo
+
+PADE = 4  # order of the approximations that stand for dead times in linear()
+NOT_RECORDED = (
+    "python-control's input_output_response interpolates a continuous system's input and steps over short pulses: what"
+    " plant() returns is discrete, and its input is held from sample to sample"
+)
+
+
+class PythonControl(Target):
+    """The whole servo as a discrete NonlinearIOSystem, and the slipping one as a StateSpace."""
+
+    name, file, tool = "control", "model_control.py", "python-control"
+
+    def write(self, servo: Servo) -> Written:
+        return Written(
+            module_of(servo, servo.portable).encode(), (*servo.portable.left_out, *_linear_losses(servo), NOT_RECORDED)
+        )
+
+
+def module_of(servo: Servo, p: Portable) -> str:
+    """The module's text, of a servo with these numbers and laws."""
+    from ers_mj import __version__
+
+    into, out = servo.signals
+    values = {
+        "title": f"{servo.name}: a servo's model, for python-control.",
+        "version": __version__,
+        "input": into,
+        "output": out,
+        "unit": servo.output_unit,
+        "rest": repr(servo.rest),
+        "step": repr(p.step),
+        "numbers": shown(p.numbers),
+        "constants": shown({name: x.tolist() for name, x in p.constants.items()}),
+        "remembering": repr(p.remembering),
+        "tables": shown({name: x.tolist() for name, x in p.tables.items()}),
+        "state": repr(STATE),
+        "within": repr(WITHIN),
+        "scheme": p.text.rstrip(),
+        **{name: repr(matrix.tolist()) for name, matrix in zip("ABCD", linear_of(servo), strict=True)},
+    }
+    text = (files("ers_mj.export") / "model_control.txt").read_text(encoding="utf-8")
+    return Template(text).substitute(values)
+
+
+def shown(table: Mapping[str, object]) -> str:
+    """A dictionary as Python reads it, a line an entry, infinite numbers by their names."""
+    lines = [f"    {key!r}: {_number(x)}," for key, x in table.items()]
+    return "\n".join(["{", *lines, "}"])
+
+
+def _number(x: object) -> str:
+    return re.sub(r"\binf\b", "math.inf", repr(x))
+
+
+def linear_of(servo: Servo) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(A, B, C, D) of the slipping servo about its rest, closed by its firmware's loop where it has one."""
+    import control
+
+    from ers_mj.control.frequency.linear import continuous, matrices
+
+    if servo.loop is None:
+        system = continuous(servo.plant, servo.rest, 1.0, PADE)
+        return system.A, system.B, system.C, system.D
+    q = servo.loop
+    A, B, C = matrices(servo.plant, servo.rest, 1.0)
+    B, seen = B[:, :1], 2 if q.at_motor > 0 and A.shape[0] >= 4 else 0
+    back = np.zeros((1, A.shape[0]))
+    back[0, seen], back[0, seen + 1] = q.K, q.D
+    shown = np.zeros((1, A.shape[0]))
+    shown[0, 2 if q.log_at_motor > 0 and A.shape[0] >= 4 else 0] = 1.0
+    A, into = A - B @ back, q.K * B
+    if q.I > 0:
+        A = np.block([[A, q.I * B], [-np.eye(1, A.shape[0], seen), np.zeros((1, 1))]])
+        into, shown = np.vstack([into, [[1.0]]]), np.append(shown, [[0.0]], axis=1)
+    system = control.ss(A, into, shown, 0)
+    if q.tau + q.dead_time > 0:
+        system = system * control.ss(control.tf(*control.pade(q.tau + q.dead_time, PADE)))
+    return system.A, system.B, system.C, system.D
+
+
+def _linear_losses(servo: Servo) -> list[str]:
+    from ers_mj.control.frequency.linear import left_out
+
+    c, q = servo.lowered, servo.loop
+    dry = c.c_2_plus + c.c_2_minus > 0 or c.c_1 > 0
+    late = c.delay > 0 or q is not None and q.tau + q.dead_time > 0
+    limits = q is not None and bool(np.isfinite([q.L, q.R, q.most]).any() or q.band > 0 or q.least > 0)
+    found = {
+        "dry friction and preload, constant while it slips, are not in it": dry,
+        f"a dead time is Pade's approximation of order {PADE}": late,
+        "the dead time within the firmware's loop stands before it": q is not None and q.dead_time > 0,
+        "the firmware's limits and dead band are not in it": limits,
+    }
+    shaped = [f"{name.replace('_', ' ')} is not in it: it is not linear" for name in left_out(servo.plant)]
+    return [f"linear() alone: {told}" for told in (*(text for text, is_so in found.items() if is_so), *shaped)]
