@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ers_mj.commands.options import add_out, one_of, results_folder, several
+from ers_mj.commands.options import add_model, add_out, one_of, results_folder, several
 from ers_mj.commands.output import bold, written
 from ers_mj.door.saving import as_json
 
@@ -24,9 +24,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ),
         epilog="example: ers export ers-out/model.toml --to mujoco,fmu --out exported",
     )
-    parser.add_argument(
-        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
-    )
+    add_model(parser, "datasheet or model.toml (default table1)")
     parser.add_argument(
         "--to",
         type=several(one_of(TARGETS), "target"),
