@@ -1,9 +1,9 @@
 """Pool finished proofs: `python analysis/pool_proofs.py FOLDER [FOLDER ...]`, each the --out of an `ers prove` of its
 own seed.
 
-Prints the table of `ers prove` over the cases of all of them, what is found of several by what an effect leaves by
-itself, which effects from outside the library are flagged (those apart that have a suspect's law, see
-ers_mj/selection/confounders.py), and the time by kind of case.
+Prints the tables of `ers prove` over the cases of all of them, whole and by family, what is found of several by what
+an effect leaves by itself, which effects from outside the library are flagged (those apart that have a suspect's law,
+see ers_mj/selection/confounders.py), and the time by kind of case.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pathlib import Path
 
 from ers_mj.errors import InputError
 from ers_mj.proving.scoring import class_of, scored
+from ers_mj.report.proof_families import told_families
 from ers_mj.report.proof_report import headline, table_of
 
 KINDS = ("null", "single", "several", "outside")
@@ -48,6 +49,7 @@ def told(proofs: Sequence[Mapping]) -> list[str]:
     seeds = ", ".join(f"{proof['seed']} ({len(proof['rows'])} cases)" for proof in proofs)
     lines = [headline(results), f"{len(rows)} cases of seeds {seeds}", ""]
     lines += [f"  {what:58}{count:>14}   {share}" for what, count, share in table_of(results)]
+    lines += told_families(results)
     lines += ["", "effects found, of several, by what they leave by themselves [sigma]"]
     hits = [
         (v, class_of(label) in {class_of(name) for name in row["named"]})

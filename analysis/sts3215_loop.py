@@ -14,6 +14,8 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from ers_mj.data.recording import Recording, from_arrays
+from ers_mj.decisions.thresholds import POLICY
+from ers_mj.position_loop.confirmation import confirmed
 from ers_mj.position_loop.runs import runs_of
 from ers_mj.position_loop.selection import Selector
 
@@ -58,7 +60,11 @@ def main() -> None:
     chosen = selector.run(lambda text, share: print(f"{time.time() - begun:.0f} s {text}", flush=True))
     for ranked in chosen.rounds:
         print("round", [(c.name, round(c.gain, 1), round(c.fit.misfit, 1)) for c in ranked[:6]])
+    print("found", [(x.name, round(x.gain, 1)) for x in chosen.left], flush=True)
+    chosen, judged = confirmed(selector, chosen, (), POLICY)
     model = chosen.chosen.model
+    print(f"{time.time() - begun:.0f} s {judged.sentence}: {judged.before.mae:.4f} to {judged.after.mae:.4f} rad")
+    print("without", {name: round(score.mae, 4) for name, score in judged.without.items()})
     print("left out", [(x.name, round(x.gain, 1)) for x in chosen.left])
     print({k: round(float(v), 4) for k, v in model.values.items() if k in model.free}, model.effects)
     for name in ("train", "heldout", "brutal"):

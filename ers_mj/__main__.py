@@ -1,5 +1,18 @@
-"""``python -m ers_mj`` is ``ers``."""
+"""``python -m ers_mj`` is ``ers``: signals are heeded from here on, before anything else is loaded."""
 
-from ers_mj.cli import main
+from ers_mj.stopping import guarded
 
-raise SystemExit(main())
+
+def main() -> int:
+    """The command line; its exit code."""
+    return guarded(_command)
+
+
+def _command() -> int:
+    from ers_mj.cli import main
+
+    return main()
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import shlex
 import sys
@@ -13,10 +14,12 @@ from typing import NoReturn
 # before numpy comes: threads are for recordings and effects, not for small matrices
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from ers_mj import __version__
+from ers_mj import __version__, stopping
 from ers_mj.commands import COMMANDS
 from ers_mj.commands.output import quietly
 from ers_mj.errors import ErsError, InputError
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # of a place that takes no more
 
 
 class Parser(argparse.ArgumentParser):
@@ -75,21 +78,40 @@ def _recordings_first(argv: list[str]) -> list[str]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 a check failed, 2 bad input, 130 interrupted."""
-    for stream in (sys.stdout, sys.stderr):  # a terminal without a degree sign gets a question mark
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")
+    _ready_streams()
     try:
         given = list(sys.argv[1:] if argv is None else argv)
         arguments = parse(given)
         arguments.told = shlex.join(["ers", *given])  # on the page that this call makes
         with quietly(arguments.quiet, getattr(arguments, "json", False)):
-            return arguments.run(arguments)
+            code = arguments.run(arguments)
+            sys.stdout.flush()  # here, where a full disk still gets its sentence
+            return code
     except ErsError as error:
         print(f"ers: {error}", file=sys.stderr)
         return 2
+    except MemoryError:
+        print("ers: this takes more memory than there is, shorter recordings would do", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
-        print("ers: stopped, nothing was written", file=sys.stderr)
-        return 130
+        stopping.tell(", nothing was written")
+        return stopping.STOPPED
     except BrokenPipeError:  # the reader of our output has left
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        if error.filename is not None or error.errno not in FULL:
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"ers: standard output cannot be written ({error.strerror})", file=sys.stderr)
+        return 2
+
+
+def _ready_streams() -> None:
+    """A terminal without a degree sign gets a question mark; a stream that was closed swallows what is printed."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")

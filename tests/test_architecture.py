@@ -11,13 +11,15 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ers_mj"
 MAY_READ = {
     "errors": (),
+    "passing": (),
+    "stopping": ("passing",),
     "comparing": ("errors",),
     "workers": ("errors",),
     "decisions": (),
     "solvers": (),
-    "data": ("decisions", "errors"),
+    "data": ("decisions", "errors", "passing"),
     "effects": ("decisions", "errors"),
-    "plants": ("effects", "errors"),
+    "plants": ("effects", "errors", "passing"),
     "servo": ("data", "effects", "errors", "plants"),
     "estimation": ("data", "decisions", "effects", "errors", "servo", "solvers"),
     "identification": ("data", "errors", "estimation", "plants", "servo", "solvers"),
@@ -32,19 +34,19 @@ MAY_READ = {
     "control": ("data", "effects", "errors", "plants", "servo", "workers"),
     "validation": ("plants", "servo"),
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
-    "proving": ("data", "errors", "plants", "workers"),
+    "proving": ("data", "errors", "passing", "plants", "workers"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "export": ("control", "effects", "errors", "plants", "position_loop", "servo"),
     "door": (
-        "control", "data", "diagnosis", "effects", "errors", "estimation", "export", "identification", "plants",
-        "position_loop", "report", "selection", "servo", "validation", "view",
+        "control", "data", "diagnosis", "effects", "errors", "estimation", "export", "identification", "passing",
+        "plants", "position_loop", "report", "selection", "servo", "validation", "view",
     ),
     "fleet": ("data", "door", "errors", "servo", "workers"),
     "commands": (
-        "comparing", "control", "data", "door", "errors", "experiment_design", "fleet", "online", "plants", "proving",
-        "report", "servo", "validation", "view", "workers",
+        "comparing", "control", "data", "door", "errors", "experiment_design", "fleet", "online", "passing", "plants",
+        "proving", "report", "servo", "stopping", "validation", "view", "workers",
     ),
-    "cli": ("commands", "errors"),
+    "cli": ("commands", "errors", "stopping"),
 }  # fmt: skip
 WRITERS = {
     "commands",
@@ -53,6 +55,7 @@ WRITERS = {
     "report",
     "view",
     "proving",
+    "stopping",
     "cli",
 }  # beside these only the tables of data/ open a file to write
 FAMILIES = {
@@ -62,6 +65,7 @@ FAMILIES = {
     "control/controllers": ("base", "finite_time", "pid"),
     "identification/minimisers": ("base", "iga"),
     "proving/concealed": ("base",),
+    "proving/families": ("base",),
 }  # whose members read their base and the named helpers of it, and no other member
 FILES = [p for p in PACKAGE.rglob("*.py") if p.parent != PACKAGE or p.stem not in ("__init__", "__main__")]
 

@@ -232,26 +232,113 @@ def test_a_folder_open_to_others_is_refused(tmp_path, level, mode):
     assert "open to others" in refusal(folder)
 
 
-def test_a_folder_of_another_user_is_refused(tmp_path, monkeypatch):
-    folder = tmp_path / "ers_mj" / "code"
+def given_away(path, monkeypatch):
+    """Let a file or folder belong to another user, who is not the system."""
+    if os.getuid() == 0:
+        os.chown(path, 4711, -1)
+    else:
+        monkeypatch.setattr(os, "getuid", lambda: path.stat().st_uid + 1)
+
+
+@pytest.mark.parametrize("what", ["ers_mj/code", "ers_mj", "ers_mj/code/law.nbi", "."])
+def test_what_another_user_has_put_there_is_refused(what, tmp_path, monkeypatch):
+    folder = tmp_path / "home/ers_mj/code"
     assert refusal(folder) == ""
-    monkeypatch.setattr(os, "getuid", lambda: folder.stat().st_uid + 1)
+    (folder / "law.nbi").write_bytes(b"")
+    given_away(tmp_path / "home" / what, monkeypatch)
     assert "another user" in refusal(folder)
 
 
-def test_where_it_is_refused_a_fresh_private_folder_is_taken_and_said_once(home):
+def test_a_folder_that_others_may_rename_is_refused(tmp_path):
+    folder = tmp_path / "open" / "ers_mj" / "code"
+    assert refusal(folder) == ""
+    folder.parent.parent.chmod(0o777)
+    assert "open to others" in refusal(folder)
+
+
+WHERE = (
+    "import small; from ers_mj.plants.code_folder import code_folder; print(small.highest(5.0), "
+    "oct(code_folder().stat().st_mode & 0o777), code_folder())"
+)
+
+
+def test_where_it_is_refused_a_private_folder_that_lasts_is_taken(home):
     (home / "cache" / "ers_mj").mkdir()
     (home / "cache" / "ers_mj").chmod(0o777)
+    (home / "tmp").mkdir(mode=0o700)
     write(home, "x")
-    ask = (
-        "import os, small; from ers_mj.plants.code_folder import code_folder; print(small.highest(5.0), "
-        "oct(code_folder().stat().st_mode & 0o777), code_folder())"
-    )
-    first, said = run(home, ask)
-    second, _ = run(home, ask)
+    (first, said), (second, _) = (run(home, WHERE, TMPDIR=str(home / "tmp")) for _ in range(2))
+    assert first == second and first.split()[:2] == ["20.0", "0o700"] and said == ""
+    place = Path(first.split()[2])
+    assert place.parent.parent == home / "tmp" and list(place.glob("*.nbc")) and not kept(home)
+
+
+def test_where_that_is_refused_too_a_fresh_one_is_taken_and_said_once(home):
+    for folder in (home / "cache" / "ers_mj", home / "tmp" / f"ers_mj-{os.getuid()}"):
+        folder.mkdir(parents=True)
+        folder.chmod(0o777)
+    write(home, "x")
+    (first, said), (second, _) = (run(home, WHERE, TMPDIR=str(home / "tmp")) for _ in range(2))
     assert said.count("open to others") == 1 and "compiled code is kept in" in said
     assert first.split()[:2] == ["20.0", "0o700"] and first.split()[2] != second.split()[2]
     assert not Path(first.split()[2]).exists() and not kept(home)
+
+
+def without_writing(home) -> dict[str, str]:
+    """The environment of a process that sees the cache as on a disk that cannot be written, also by root."""
+    (home / "tmp").mkdir(mode=0o700, exist_ok=True)
+    (home / "sitecustomize.py").write_text(
+        "import errno, os, tempfile\nmade = tempfile.TemporaryFile\n"
+        "def refused(*given, dir=None, **more):\n"
+        f"    if str(dir).startswith({str(home / 'cache')!r}):\n"
+        "        raise OSError(errno.EROFS, os.strerror(errno.EROFS))\n"
+        "    return made(*given, dir=dir, **more)\n"
+        "tempfile.TemporaryFile = refused\n"
+    )
+    return {"TMPDIR": str(home / "tmp")}
+
+
+def test_a_cache_that_can_only_be_read_is_used_and_what_it_lacks_is_kept_elsewhere_once(home):
+    write(home, "x")
+    run(home, ASK)
+    before, more = kept(home), without_writing(home)
+    assert run(home, ASK, **more) == ("20.0", "") and not list((home / "tmp").rglob("*.nbc"))
+    write(home, "x + 1.0")
+    for _ in range(2):
+        assert run(home, ASK, **more) == ("22.0", "") and kept(home) == before
+    added = {path.name: path.stat().st_mtime_ns for path in (home / "tmp").rglob("*.nbc")}
+    assert added and run(home, ASK, **more)[0] == "22.0"
+    assert added == {path.name: path.stat().st_mtime_ns for path in (home / "tmp").rglob("*.nbc")}
+
+
+@pytest.mark.parametrize(
+    ("suffix", "damage", "is_writable"),
+    [("nbi", lambda x: b"", True), ("nbc", lambda x: x[: len(x) // 2], True), ("nbi", lambda x: bytes(len(x)), False)],
+)
+def test_a_cache_that_is_not_whole_is_said_and_mended_once(suffix, damage, is_writable, home):
+    write(home, "x")
+    run(home, ASK)
+    for path in (home / "cache").rglob(f"*.{suffix}"):
+        path.write_bytes(damage(path.read_bytes()))
+    more = {} if is_writable else without_writing(home)
+    told, said = run(home, ASK, **more)
+    assert told == "20.0" and "is not whole" in said
+    assert run(home, ASK, **more) == ("20.0", "")
+
+
+def test_a_full_disk_costs_the_next_call_a_compilation_and_no_more(home):
+    write(home, "x")
+    program = "import errno, builtins\nopened = builtins.open\n" + textwrap.dedent(
+        """
+        def full(file, mode="r", *given, **more):
+            if ".nb" in str(file) and "w" in mode:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            return opened(file, mode, *given, **more)
+        builtins.open = full
+        """
+    )
+    told, said = run(home, program + ASK)
+    assert told == "20.0" and said.count("No space left") == 1 and not kept(home)
 
 
 def test_the_first_call_says_what_it_compiles(home):

@@ -255,6 +255,47 @@ def test_a_reference_that_is_the_output_is_refused(followed, put):
         read_recording(put(followed | {"theta_ref_rad": followed["theta_rad"]}))
 
 
+@pytest.mark.parametrize(("shift", "words"), [(1, "1 row later"), (-2, "2 rows earlier")])
+def test_a_reference_that_is_the_output_of_a_row_beside_is_refused(followed, put, shift, words):
+    """Robots that were led by hand log the next position as the command."""
+    rng = np.random.default_rng(0)
+    theta = followed["theta_rad"] + 1e-3 * rng.normal(size=N)
+    with pytest.raises(InputError, match=f"theta_ref_rad equals theta_rad {words}: it is what was measured"):
+        read_recording(put(followed | {"theta_rad": theta, "theta_ref_rad": np.roll(theta, -shift)}))
+
+
+def servo(asked, limit=np.inf, gain=0.1, step=STEP):
+    """Reference (N,) as it is sent, at most ``limit`` from the output, and the output of a first-order servo."""
+    theta, sent, seen = 0.0, [], []
+    for goal in asked:
+        seen.append(theta)
+        sent.append(theta + np.clip(goal - theta, -limit, limit))
+        theta += gain * (sent[-1] - theta) + 0.002 * np.sin(50.0 * len(seen) * step)
+    return np.array(sent), np.array(seen)
+
+
+def test_a_reference_that_was_logged_behind_a_limit_of_its_distance_is_told(put):
+    t = STEP * np.arange(N)
+    sent, seen = servo(np.sign(np.sin(2 * t)) * (1.0 + 0.3 * np.sin(7 * t)), limit=0.2)
+    record = read_recording(put({"t_s": t, "theta_ref_rad": sent, "theta_rad": seen}))
+    assert kinds(record) == ["clipped"]
+    assert "stays 0.2 rad off theta_rad" in record.faults[0].sentence
+    free, seen = servo(np.sign(np.sin(2 * t)) * (1.0 + 0.3 * np.sin(7 * t)))
+    assert read_recording(put({"t_s": t, "theta_ref_rad": free, "theta_rad": seen})).faults == ()
+
+
+@pytest.mark.parametrize(("slew", "is_told"), [(2.0, True), (np.inf, False)])
+def test_a_reference_that_was_logged_behind_a_limit_of_its_speed_is_told(put, slew, is_told):
+    t = STEP * np.arange(N)
+    asked = np.repeat([0.0, 0.5, -0.3, 0.4, 0.9, -0.5, 0.1, 0.7, 0.2, 0.0], N // 10)
+    sent = [0.0]
+    for goal in asked[1:]:
+        sent.append(sent[-1] + np.clip(goal - sent[-1], -slew * STEP, slew * STEP))
+    record = read_recording(put({"t_s": t, "theta_ref_rad": np.array(sent), "theta_rad": servo(sent)[1]}))
+    assert record.faults == ()
+    assert any("behind a limit of its speed" in p for p in record.problems) is is_told
+
+
 def test_the_supply_and_a_drive_that_is_off_are_told(drive, put):
     vin = np.where(np.arange(N) == 300, 0.0, 12.0 + 0.1 * np.sin(drive["t_s"]))
     on = (np.arange(N) < 800).astype(float)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ers_mj.cli import main
-from ers_mj.data.recording import from_arrays, write_recording
+from ers_mj.data.recording import from_arrays, from_columns, write_recording
 from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.effects.backlash import Backlash
 from ers_mj.effects.gravity_imbalance import GravityImbalance
@@ -113,6 +113,25 @@ def test_a_limit_and_gravity_are_named_and_nothing_else():
     assert document["data"]["input_kind"] == "position"
     assert not document["remainder"]["significant"]
     assert document["fit"]["measure"] == "free_run"
+
+
+def test_a_recorded_duty_tells_the_input_gain_and_gains_differ_between_recordings():
+    recordings = []
+    for seed, kp, offset in ((1, 8.0, 0.0), (2, 32.0, 0.0), (3, 8.0, 0.01)):
+        t, r = steps_of(seed)
+        motion = LoopModel(LIMITED | {"K": LIMITED["K"] * kp / 8.0}, ()).motion(run_of(t, r))
+        noise = 3e-4 * np.random.default_rng(seed).standard_normal(t.size)
+        columns = {"t_s": t, "theta_ref_rad": r, "theta_rad": motion[:, 0] + noise + offset}
+        columns |= {"u_duty_pct": np.round(motion[:, 3] / 1.5, 1), "kp": np.full(t.size, kp)}
+        recordings.append(from_columns(columns, input_column="theta_ref_rad", second="u_duty_pct"))
+    document = diagnose(recordings, Datasheet(lumped={"a_2": 21.0}), jobs=1).document
+    assert document["parameters"]["b"]["value"] == pytest.approx(1.5, rel=0.02)
+    assert document["parameters"]["a_2"]["datasheet"] == 21.0
+    assert any("datasheet" in problem for problem in document["data"]["problems"])
+    states = {state["name"]: state["values"] for state in document["record_state"]}
+    assert states["gain"] == pytest.approx([1.0, 4.0, 1.0])
+    assert states["offset"][2] - states["offset"][0] == pytest.approx(0.01, abs=1e-3)
+    assert {m["effect"] for m in document["missing"]} == {"voltage_saturation", "input_delay"}
 
 
 def test_a_loop_that_is_never_at_its_limit_tells_sums_only():

@@ -32,7 +32,8 @@ def test_the_bar_tells_what_has_passed_and_what_is_left(monkeypatch):
     assert "1:15, 3:45 left  fitting" in told[2] and "1:06:15, 1:06:15 left" in told[3]
 
 
-def test_quiet_says_nothing_but_errors_and_json(capsys):
+def test_quiet_says_nothing_but_errors_and_json(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     assert cli.main(["cache", "--quiet"]) == 0 and capsys.readouterr() == ("", "")
     assert cli.main(["frequency", "--controller", "pid", "--json", "--quiet"]) == 0
     assert json.loads(capsys.readouterr().out)

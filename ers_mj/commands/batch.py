@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ers_mj import stopping
 from ers_mj.commands.diagnose import add_quick
-from ers_mj.commands.options import DEFAULT_OUT, add_cluster, add_common, add_out, crew_of
-from ers_mj.commands.output import Progress, bold, heed_terminate, tell, written
-from ers_mj.door.saving import as_json, report_writers, write_results
+from ers_mj.commands.keeping import DEFAULT_OUT, Kept, Place, keep, refuse_foreign
+from ers_mj.commands.options import add_cluster, add_common, add_out, crew_of
+from ers_mj.commands.output import Progress, bold, tell, written
+from ers_mj.door.saving import as_json, report_writers, write_results, write_text
 from ers_mj.errors import InputError
+from ers_mj.passing import passing
 
 if TYPE_CHECKING:
     from ers_mj.fleet.batch import Batch
     from ers_mj.fleet.manifest import Servo
+
+RESULTS = ("batch.csv", "batch.json", "report.html")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -50,34 +54,36 @@ def run(arguments: argparse.Namespace) -> int:
 
     servos = read_manifest(arguments.manifest)
     if arguments.out is None and arguments.json:
-        with tempfile.TemporaryDirectory(prefix="ers-batch-") as passing:
-            return _run(Path(passing), servos, arguments, keeps=False)
-    return _run(Path(arguments.out or DEFAULT_OUT), servos, arguments, keeps=True)
+        with passing(Path(tempfile.mkdtemp(prefix="ers-batch-"))) as folder:
+            return _run(folder, servos, arguments, None)
+    place = Place(Path(arguments.out or DEFAULT_OUT), arguments.out is None)
+    if place.is_default and not arguments.force:
+        refuse_foreign(place.folder, RESULTS)
+    return _run(place.folder, servos, arguments, place)
 
 
-def _run(folder: Path, servos: list[Servo], arguments: argparse.Namespace, keeps: bool) -> int:
+def _run(folder: Path, servos: list[Servo], arguments: argparse.Namespace, place: Place | None) -> int:
     from ers_mj.fleet.batch import conduct, refuse_out
     from ers_mj.fleet.diagnosing import Settings
 
     refuse_out(folder, arguments.force or arguments.out is None)
     threads = 1 if arguments.cluster else max(arguments.jobs // len(servos), 1)
     settings = Settings(arguments.seed, arguments.quick, threads, f"ers batch {Path(arguments.manifest).name}")
-    heed_terminate()
     hired = crew_of(arguments)
     try:
         with Progress() as progress:
             batch = conduct(folder, servos, settings, hired, tell=tell, progress=progress)
     except KeyboardInterrupt:
-        kept = f"{folder} keeps what was done, the same command goes on from there" if keeps else "nothing was kept"
-        print(f"ers: stopped; {kept}", file=sys.stderr)
-        return 130
+        state = f"{folder} keeps what was done, the same command goes on from there" if place else "nothing was kept"
+        stopping.tell(f"; {state}")
+        return stopping.STOPPED
     finally:
         hired.close()
     rows = [batch.rows[servo.name] for servo in servos]
     errors = sum(bool(row["error"]) for row in rows)
-    files = _write(folder, batch) if keeps else []
-    print(as_json({"servos": rows, "errors": errors}) if arguments.json else "\n".join(_told(rows, files)))
-    return 1 if errors else 0
+    kept = keep(place, lambda folder: _write(folder, batch))
+    print(as_json({"servos": rows, "errors": errors}) if arguments.json else "\n".join(_told(rows, kept)))
+    return kept.code or (1 if errors else 0)
 
 
 def _write(folder: Path, batch: Batch) -> list[Path]:
@@ -85,13 +91,14 @@ def _write(folder: Path, batch: Batch) -> list[Path]:
 
     rows = [batch.rows[servo.name] for servo in batch.servos]
     page = batch_page(rows, batch.documents(), batch.settings.made_by, batch.settings.made_on)
-    return [folder / "batch.csv", *write_results(folder, report_writers("batch.json", {"servos": rows}, page))]
+    table = {"batch.csv": lambda path: write_text(path, batch.table())}
+    return write_results(folder, table | report_writers("batch.json", {"servos": rows}, page))
 
 
 # -- in lines ---------------------------------------------------------------------------------------------------------
 
 
-def _told(rows: list[dict], files: list[Path]) -> list[str]:
+def _told(rows: list[dict], kept: Kept) -> list[str]:
     """What a terminal shows: a line a servo."""
     from ers_mj.report.batch_report import headline
 
@@ -102,4 +109,4 @@ def _told(rows: list[dict], files: list[Path]) -> list[str]:
         over = f"{after / floor:.3g}" if after is not None and floor else ""
         rest = row["error"] or row["effects"].replace(";", ", ")
         lines.append(f"{row['name']:{wide}}  {row['verdict'] or 'no answer':17}  {over:>13}  {rest}".rstrip())
-    return lines + written(files)
+    return lines + written(kept)

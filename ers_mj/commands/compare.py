@@ -6,9 +6,12 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
-from ers_mj.commands.options import add_out, results_folder
+from ers_mj.commands.keeping import Kept, keep, results_folder
+from ers_mj.commands.options import add_out
 from ers_mj.commands.output import bold, written
 from ers_mj.door.saving import as_json, plain, report_writers, write_results
+
+RESULTS = ("compare.json", "report.html")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -33,14 +36,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, compare, write, tell; 0 whatever differs."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     from ers_mj.comparing.differences import compare
     from ers_mj.comparing.documents import read_told
 
     document = plain(compare(read_told(arguments.a), read_told(arguments.b)))
-    files = _write(folder, document) if folder is not None else []
-    print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
-    return 0
+    kept = keep(place, lambda folder: _write(folder, document))
+    print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
+    return kept.code
 
 
 def _write(folder: Path, document: dict) -> list[Path]:
@@ -52,7 +55,7 @@ def _write(folder: Path, document: dict) -> list[Path]:
 # -- in lines ---------------------------------------------------------------------------------------------------------
 
 
-def _told(document: Mapping, files: list[Path]) -> list[str]:
+def _told(document: Mapping, kept: Kept) -> list[str]:
     """What a terminal shows: one table, what is beyond chance marked."""
     from ers_mj.report.compare_report import HEADS, cells
 
@@ -65,4 +68,4 @@ def _told(document: Mapping, files: list[Path]) -> list[str]:
         told = "  ".join(text.ljust(n) for text, n in zip(row, widths, strict=True)).rstrip()
         lines.append(bold(told) if line["significant"] else told)
     notes = [document["chance"]["sentence"], *document["notes"]]
-    return [*lines, "", *notes, *written(files)]
+    return [*lines, "", *notes, *written(kept)]

@@ -9,7 +9,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ers_mj.commands.options import crew_of, results_folder
+from ers_mj.commands.keeping import Kept, Place, results_folder
+from ers_mj.commands.options import crew_of
 from ers_mj.commands.output import Progress, bold, tell, written
 from ers_mj.door.saving import as_json, plain
 from ers_mj.errors import InputError
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
     from ers_mj.workers.base import Task
 
 Made = Callable[[argparse.Namespace], tuple[list["Task"], dict[str, Any]]]
-Told = Callable[[Path | None, dict, list[dict]], tuple[list[str], list[Path]]]
+RESULTS = ("results.json", "report.html", "summary.txt")
+Told = Callable[[Place | None, dict, list[dict]], tuple[list[str], Kept]]
 
 
 def add_contest(parser: argparse.ArgumentParser) -> None:
@@ -61,14 +63,14 @@ def exported(arguments: argparse.Namespace, tasks_of: Made) -> int:
     with held(folder, "ers prove --export"), closing(crew_of(arguments)) as hired, Progress() as progress:
         digest = export(folder, sealed, tasks, settings, hired, progress)
     found = {"cases": len(tasks), "folder": str(folder), "truth": str(sealed), "truth_sha256": digest}
-    lines = ["", bold(f"{len(tasks)} cases, their truth sealed with sha256 {digest}"), *written([folder, sealed])]
+    lines = ["", bold(f"{len(tasks)} cases, their truth sealed with sha256 {digest}"), *written(Kept((folder, sealed)))]
     print(as_json(found) if arguments.json else "\n".join(lines))
     return 0
 
 
 def scored(arguments: argparse.Namespace, told_of: Told) -> int:
     """Score, write, tell; 1 where an answer rests on altered files."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     from ers_mj import __version__
     from ers_mj.proving import scoring
     from ers_mj.proving.contest import answered
@@ -88,6 +90,6 @@ def scored(arguments: argparse.Namespace, told_of: Told) -> int:
     )
     for line in found.told:
         tell(f"ers: {line}")
-    lines, files = told_of(folder, results, found.rows)
-    print(as_json(results) if arguments.json else "\n".join([*lines, *written(files)]))
-    return 1 if found.altered else 0
+    lines, kept = told_of(place, results, found.rows)
+    print(as_json(results) if arguments.json else "\n".join([*lines, *written(kept)]))
+    return kept.code or (1 if found.altered else 0)

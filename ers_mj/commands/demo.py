@@ -6,8 +6,9 @@ import argparse
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from ers_mj.commands.diagnose import add_quick, diagnose_and_tell
-from ers_mj.commands.options import add_common, add_out, results_folder
+from ers_mj.commands.diagnose import RESULTS, add_quick, diagnose_and_tell
+from ers_mj.commands.keeping import results_folder
+from ers_mj.commands.options import add_common, add_out
 from ers_mj.errors import InputError
 
 SHIPPED = "demo_data"
@@ -29,10 +30,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """As `ers diagnose` on the shipped recordings."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     with as_file(files("ers_mj") / SHIPPED) as shipped:
         recordings, holdout = _shipped(shipped, "rec*.csv"), _shipped(shipped, "holdout*.csv")
-        return diagnose_and_tell(recordings, holdout, shipped / "datasheet.toml", folder, arguments)
+        return diagnose_and_tell(recordings, holdout, shipped / "datasheet.toml", place, arguments)
 
 
 def _shipped(folder: Path, pattern: str) -> list[Path]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_common, add_out, add_reading, add_recordings, results_folder
-from ers_mj.commands.output import Progress, bold
+from ers_mj.commands.keeping import Kept, Place, keep, results_folder
+from ers_mj.commands.options import add_common, add_out, add_reading, add_recordings
+from ers_mj.commands.output import Progress, bold, written
 from ers_mj.commands.recordings import reader
 from ers_mj.door.saving import as_json
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ers_mj.door.reading import Given
     from ers_mj.report.display import Unit
 
+RESULTS = ("diagnosis.json", "report.html", "model.toml", "plant.xml", "next_input.csv")
 FITS = (("training", "train"), ("held out", "heldout"), ("recalibrated", "recalibrated"))
 
 
@@ -58,18 +59,18 @@ def add_quick(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write, tell; 0 whatever the verdict."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     take = reader(arguments)
     recordings = [take(spec) for spec in arguments.recordings]
     holdout = [take(spec) for spec in arguments.holdout]
-    return diagnose_and_tell(recordings, holdout, arguments.datasheet, folder, arguments)
+    return diagnose_and_tell(recordings, holdout, arguments.datasheet, place, arguments)
 
 
 def diagnose_and_tell(
     recordings: Sequence[Given],
     holdout: Sequence[Given],
     datasheet: Known,
-    folder: Path | None,
+    place: Place | None,
     arguments: argparse.Namespace,
 ) -> int:
     """The part that `diagnose` and `demo` share: from recordings to files and words."""
@@ -86,16 +87,16 @@ def diagnose_and_tell(
             quick=arguments.quick,
         )
         found.made_by = getattr(arguments, "told", "")
-        files = found.save(folder, force=True, progress=progress) if folder is not None else []
+        kept = keep(place, lambda folder: found.save(folder, force=True, progress=progress))
     document = found.to_dict()
-    print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
-    return 0
+    print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
+    return kept.code
 
 
 # -- the diagnosis in lines ---------------------------------------------------------------------------------------
 
 
-def _told(document: dict, files: list[Path]) -> list[str]:
+def _told(document: dict, kept: Kept) -> list[str]:
     """What a terminal shows when all is done."""
     verdict = document.get("verdict") or "no verdict"
     lines = ["", f"{bold(verdict.upper())} ({verdict})", str(document.get("sentence") or ""), ""]
@@ -109,7 +110,7 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     lines += _section(
         "problems in the data", [str(problem) for problem in (document.get("data") or {}).get("problems") or []][:6]
     )
-    return lines + _told_rest(document) + _section("written", [str(path) for path in files])
+    return lines + _told_rest(document) + written(kept)[1:]
 
 
 def _told_rest(document: dict) -> list[str]:

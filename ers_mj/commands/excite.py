@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_model, number, one_of, several, table_file
+from ers_mj.commands.keeping import keep_file, table_file
+from ers_mj.commands.options import add_model, number, one_of, several
 from ers_mj.commands.output import Progress, bold
 from ers_mj.door.saving import as_json, make_room
 from ers_mj.errors import InputError
@@ -112,7 +114,7 @@ def _add_question(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Design, write, tell; 0."""
     out = table_file(arguments.out, arguments.force)
-    from ers_mj.data.recording import FEWEST_SAMPLES, write_recording
+    from ers_mj.data.recording import FEWEST_SAMPLES
     from ers_mj.experiment_design.optimal_input import planned, reference
     from ers_mj.experiment_design.question import Question, Rig
     from ers_mj.plants.inputs import INPUTS
@@ -140,11 +142,17 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress() as progress:
         before = reference(question, arguments.against)
         plan = planned(question, before, progress)
-    make_room(out)
-    write_recording(out, {"t_s": rig.t, "u_V": plan.u})
-    document = _document(arguments, question, before, plan)
+    kept = keep_file(out, lambda file: _write(file, {"t_s": rig.t, "u_V": plan.u}))
+    document = {"out": kept.told(arguments.out), **_document(arguments, question, before, plan)}
     print(as_json(document) if arguments.json else "\n".join(_told(document)))
-    return 0
+    return kept.code
+
+
+def _write(file: Path, columns: dict) -> None:
+    from ers_mj.data.recording import write_recording
+
+    make_room(file)
+    write_recording(file, columns)
 
 
 def _half_width(sigma: float) -> float:
@@ -169,7 +177,6 @@ def _document(arguments: argparse.Namespace, question: Question, before: Plan, p
         for name in question.wanted
     }
     return {
-        "out": arguments.out,
         "against": arguments.against,
         "current": arguments.current is not None,
         "criterion": arguments.criterion,

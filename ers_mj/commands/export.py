@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_model, add_out, one_of, results_folder, several
+from ers_mj.commands.keeping import folder_for, keep
+from ers_mj.commands.options import add_model, add_out, one_of, several
 from ers_mj.commands.output import bold, written
 from ers_mj.door.saving import as_json
 
+if TYPE_CHECKING:
+    from ers_mj.door.exporting import Exported
+
 TARGETS = ("mujoco", "control", "fmu", "mjlab", "newton", "randomisation", "lookup")
+RESULTS = (
+    *("joint.xml", "model_control.py", "model.fmu", "mjlab_actuator.py", "newton_actuator.py", "randomisation.json"),
+    *("lookup.csv", "LOSSES.md"),
+)
 OUTPUT_UNITS, INPUT_UNITS = ("rad", "m", "V"), ("V", "%", "N m", "A")
 
 
@@ -41,17 +51,24 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the files; 0."""
-    folder = results_folder(arguments.out, arguments.force, as_json=False)
-    assert folder is not None
     from ers_mj.door.model import load_model
 
+    place = folder_for(arguments.out, arguments.force, RESULTS)
+
     model = load_model(arguments.model, arguments.output_unit, arguments.input_unit)
-    found = model.export(folder, arguments.to, force=True)
+    found: dict = {}
+    kept = keep(place, lambda folder: _written(model.export(folder, arguments.to, force=True), found))
     if arguments.json:
-        print(as_json(found.to_dict()))
-        return 0
-    for name, losses in found.losses.items():
+        print(as_json(found))
+        return kept.code
+    for name, losses in found.get("losses", {}).items():
         print(bold(name))
         print("\n".join(f"  {sentence}" for sentence in losses) or "  nothing is left out")
-    print("\n".join(written(found.files)))
-    return 0
+    print("\n".join(written(kept)))
+    return kept.code
+
+
+def _written(exported: Exported, found: dict) -> tuple[Path, ...]:
+    """The files of an export; what it tells goes into `found`."""
+    found.update(exported.to_dict())
+    return exported.files

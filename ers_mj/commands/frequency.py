@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ers_mj.commands.keeping import Kept, keep, results_folder
 from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
 from ers_mj.commands.options import (
     add_out,
@@ -14,7 +15,6 @@ from ers_mj.commands.options import (
     angle_deg,
     number,
     one_of,
-    results_folder,
     several,
     swing_deg,
 )
@@ -36,6 +36,8 @@ COLUMNS = (
     ("peak |S|", "sensitivity_peak", ".2f"),
     ("bandwidth [Hz]", "bandwidth_hz", ".1f"),
 )
+
+RESULTS = ("frequency.json", "report.html")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -120,7 +122,7 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, write, tell; 0."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     from ers_mj.control.controllers import CONTROLLERS
     from ers_mj.control.frequency.study import study
 
@@ -141,9 +143,9 @@ def run(arguments: argparse.Namespace) -> int:
                 "versions": versions(),
             }
         )
-        files = _write(folder, document, found, progress) if folder is not None else []
-    print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
-    return 0
+        kept = keep(place, lambda folder: _write(folder, document, found, progress))
+    print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
+    return kept.code
 
 
 def _conditions(arguments: argparse.Namespace, datasheet: Datasheet) -> Conditions:
@@ -176,7 +178,7 @@ def _write(folder: Path, document: dict, found: Study, progress: Progress) -> li
 # -- in lines ---------------------------------------------------------------------------------------------------------
 
 
-def _told(document: dict, files: list[Path]) -> list[str]:
+def _told(document: dict, kept: Kept) -> list[str]:
     """What a terminal shows when all is done."""
     lines = ["", bold(document["sentence"]), "", bold(f"{'loop':26}" + "".join(f"{head:>18}" for head, *_ in COLUMNS))]
     for loop in document["loops"]:
@@ -192,7 +194,7 @@ def _told(document: dict, files: list[Path]) -> list[str]:
             *(f"  {sentence}" for r in document["recordings"] for sentence in r["sentences"]),
         ]
     lines += ["", *document["notes"]] if document["notes"] else []
-    return lines + written(files)
+    return lines + written(kept)
 
 
 def _cell(x: float | None, form: str) -> str:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from ers_mj.commands.keeping import Kept, keep, results_folder
 from ers_mj.commands.options import (
     add_common,
     add_out,
@@ -13,7 +13,6 @@ from ers_mj.commands.options import (
     number,
     one_of,
     pair,
-    results_folder,
     several,
     whole,
 )
@@ -21,6 +20,8 @@ from ers_mj.commands.output import Progress, bold, written
 from ers_mj.commands.recordings import reader
 from ers_mj.door.saving import as_json
 from ers_mj.errors import InputError
+
+RESULTS = ("identify.json", "report.html")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -106,7 +107,7 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, write, tell; 0 whatever comes out."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     read = reader(arguments)
     fixed, bounds = _values(arguments.fix, "--fix", _value), _values(arguments.bounds, "--bounds", _ends)
     from ers_mj.door.identifying import identify
@@ -127,10 +128,10 @@ def run(arguments: argparse.Namespace) -> int:
             seed=arguments.seed,
             jobs=arguments.jobs,
         )
-        files = found.save(folder, force=True, progress=progress) if folder is not None else []
+        kept = keep(place, lambda folder: found.save(folder, force=True, progress=progress))
     document = found.to_dict()
-    print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
-    return 0
+    print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
+    return kept.code
 
 
 def _values(pairs: list[tuple[str, str]], option: str, read) -> dict:
@@ -156,7 +157,7 @@ def _ends(name: str, text: str, option: str) -> tuple[float, float]:
     return _value(name, low, option), _value(name, high, option)
 
 
-def _told(document: dict, files: list[Path]) -> list[str]:
+def _told(document: dict, kept: Kept) -> list[str]:
     """What a terminal shows when all is done."""
     lines = [
         "",
@@ -180,4 +181,4 @@ def _told(document: dict, files: list[Path]) -> list[str]:
     lines += (
         ["", bold("be careful"), *(f"  {warning}" for warning in document["warnings"])] if document["warnings"] else []
     )
-    return lines + written(files)
+    return lines + written(kept)

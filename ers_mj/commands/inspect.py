@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_out, add_reading, add_recordings, results_folder
+from ers_mj.commands.keeping import Kept, keep, results_folder
+from ers_mj.commands.options import add_out, add_reading, add_recordings
 from ers_mj.commands.output import bold, written
 from ers_mj.commands.recordings import reader
 from ers_mj.door.saving import as_json, plain, report_writers, write_results
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from ers_mj.data.inspection import Inspection
 
 HEADS = ("channel", "refresh [s]", "lowest", "highest", "noise", "quantum", "at an end", "blank")
+
+RESULTS = ("inspect.json", "report.html")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -38,13 +41,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, tell, write; 0."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     read = reader(arguments)
     found = [read(spec).inspect() for spec in arguments.recordings]
     document = plain(_document(found))
-    files = _write(folder, document, found) if folder is not None else []
-    print(as_json(document) if arguments.json else "\n".join(_told(found, files)))
-    return 0
+    kept = keep(place, lambda folder: _write(folder, document, found))
+    print(as_json(document) if arguments.json else "\n".join(_told(found, kept)))
+    return kept.code
 
 
 def _document(found: list[Inspection]) -> dict:
@@ -67,12 +70,12 @@ def _write(folder: Path, document: dict, found: list[Inspection]) -> list[Path]:
 # -- in lines ---------------------------------------------------------------------------------------------------------
 
 
-def _told(found: list[Inspection], files: list[Path]) -> list[str]:
+def _told(found: list[Inspection], kept: Kept) -> list[str]:
     """What a terminal shows."""
     lines: list[str] = []
     for inspection in found:
         lines += _told_one(inspection)
-    return lines + written(files)
+    return lines + written(kept)
 
 
 def _told_one(inspection: Inspection) -> list[str]:

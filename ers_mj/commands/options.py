@@ -6,16 +6,13 @@ import argparse
 import math
 import os
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.door.saving import refuse_folder, refuse_table
+from ers_mj.commands.keeping import DEFAULT_OUT
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
     from ers_mj.workers.base import Crew
-
-DEFAULT_OUT = "ers-out"
 
 
 def number(least: float | None = None, above: float | None = None, most: float | None = None):
@@ -185,31 +182,3 @@ def refuse_unknown(option: str, names: Iterable[str], known: Iterable[str]) -> N
     for name in names:
         if name not in known:
             raise InputError(f"{option}: there is no {name[:40]!r}; there are {', '.join(known)}")
-
-
-def table_file(out: str, force: bool) -> Path:
-    """The CSV file that a recording or an input will go to, checked before any work starts.
-
-    Raises:
-        InputError: it is a folder, is of another format, exists already, or cannot be written.
-    """
-    file = Path(out)
-    if not out or file.is_dir():
-        raise InputError(f"--out {out or 'is empty'}: a file was expected, as in --out rec.csv")
-    refuse_table(file, force)
-    return file
-
-
-def results_folder(out: str | None, force: bool, as_json: bool) -> Path | None:
-    """The folder that results will go to, checked before any work starts; None where no file is to be written.
-
-    Raises:
-        InputError: the folder is a file, cannot be written, or was named and holds files.
-    """
-    if out is None and as_json:
-        return None
-    folder = Path(DEFAULT_OUT if out is None else out)
-    if out == "":
-        raise InputError("--out is empty, a folder was expected")
-    refuse_folder(folder, force or out is None)
-    return folder

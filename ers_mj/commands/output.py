@@ -6,12 +6,11 @@ import contextlib
 import io
 import os
 import shutil
-import signal
 import sys
-import threading
 import time
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
+
+from ers_mj.commands.keeping import Kept
 
 
 class Told:
@@ -72,9 +71,10 @@ def _clock(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
-def written(files: Sequence[Path]) -> list[str]:
+def written(kept: Kept) -> list[str]:
     """The lines that tell which files were written, none where there are none."""
-    return ["", bold("written"), *(f"  {path}" for path in files)] if files else []
+    title = "written, in the place of what was there" if kept.replaced else "written"
+    return ["", bold(title), *(f"  {path}" for path in kept.files)] if kept.files else []
 
 
 def bold(text: str) -> str:
@@ -86,9 +86,3 @@ def tell(line: str) -> None:
     """A line for a person while the work goes on, out of the way of --json."""
     if not Told.quiet:
         print(line if not sys.stderr.isatty() else f"\r\x1b[2K{line}", file=sys.stderr, flush=True)
-
-
-def heed_terminate() -> None:
-    """Let a plain kill stop as Ctrl-C does: nothing under way is left behind."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -5,17 +5,18 @@ truth.
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ers_mj import stopping
 from ers_mj.commands.contest import add_contest, exported, scored, wanted
-from ers_mj.commands.options import DEFAULT_OUT, add_cluster, add_common, add_out, crew_of, number, whole
-from ers_mj.commands.output import Progress, bold, heed_terminate, tell, written
-from ers_mj.door.saving import as_json, plain, refuse_unwritable, report_writers, write_results, write_text
-from ers_mj.errors import InputError
+from ers_mj.commands.keeping import Kept, Place, folder_for, keep
+from ers_mj.commands.options import add_cluster, add_common, add_out, crew_of, number, whole
+from ers_mj.commands.output import Progress, bold, tell, written
+from ers_mj.door.saving import as_json, plain, report_writers, write_results, write_text
+from ers_mj.passing import passing
 
 if TYPE_CHECKING:
     from ers_mj.proving.conduct import Proof
@@ -30,18 +31,26 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "prove",
         help="conceal effects, diagnose them blind, score",
         description=(
-            "Measure what the diagnosis can do. Servos are drawn, effects concealed in them in other forms than the"
-            " library's, recorded in\nMuJoCo; the truth is sealed and its hash printed; each case is diagnosed by a"
-            " process that gets its files only; the truth is\nopened and the answers scored. A quarter of the cases"
-            " hides nothing, half one effect, 15 % several, 10 % one that the\nlibrary does not have. Stopped with"
-            " Ctrl-C, the same command goes on where it was."
+            "Measure what the diagnosis can do. Servos of several families are drawn, effects concealed in them,"
+            " recorded in MuJoCo\nor by an integrator of the proof's own; the truth is sealed and its hash printed;"
+            " each case is diagnosed by a process\nthat gets its files only; the truth is opened, the answers scored."
+            " A quarter of the cases hides nothing, half one effect,\n15 % several, 10 % one that the library does not"
+            " have. Stopped with Ctrl-C, the same command goes on where it was."
         ),
         epilog=(
-            "examples:\n  ers prove --cases 40 --seed 7 --out proof\n  ers prove --real ../shared/data --cases 15 --out"
-            " proof-real\n  ers prove --cases 20 --export cases\n  ers prove --score answers --truth cases.truth.json"
+            "examples:\n  ers prove --cases 40 --seed 7 --out proof\n"
+            "  ers prove --families screw,position --cases 8 --seed 7\n"
+            "  ers prove --real ../shared/data --cases 15 --out proof-real\n"
+            "  ers prove --cases 20 --export cases\n  ers prove --score answers --truth cases.truth.json"
         ),
     )
     parser.add_argument("--cases", type=whole(1), metavar="N", help=f"how many (default {CASES})")
+    parser.add_argument(
+        "--families",
+        metavar="NAME,...",
+        help="kinds of servos, in turn (default all): rudder, hobby, direct, screw, throttle, strain_wave, gimbal,"
+        " position",
+    )
     parser.add_argument(
         "--real",
         metavar="FOLDER",
@@ -63,20 +72,18 @@ def run(arguments: argparse.Namespace) -> int:
         return exported(arguments, _tasks) if arguments.export is not None else scored(arguments, _shown)
     arguments.seed = arguments.seed or 0
     if arguments.out is None and arguments.json:
-        with tempfile.TemporaryDirectory(prefix="ers-prove-") as passing:
-            return _run(Path(passing), arguments, keeps=False)
-    folder = Path(DEFAULT_OUT if arguments.out is None else arguments.out)
-    if arguments.out == "":
-        raise InputError("--out is empty, a folder was expected")
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file, --out needs a folder")
-    refuse_unwritable(folder)
-    return _run(folder, arguments, keeps=True)
+        with passing(Path(tempfile.mkdtemp(prefix="ers-prove-"))) as folder:
+            return _run(folder, arguments, None)
+    from ers_mj.proving.sealing import WRITTEN, refuse_foreign
+
+    place = folder_for(arguments.out, arguments.force, WRITTEN, may_hold=True)
+    if place.is_default and not arguments.force:
+        refuse_foreign(place.folder)
+    return _run(place.folder, arguments, place)
 
 
-def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
+def _run(folder: Path, arguments: argparse.Namespace, place: Place | None) -> int:
     tasks, settings = _tasks(arguments)
-    heed_terminate()
     from ers_mj.proving.conduct import conduct
     from ers_mj.proving.real import scored_real
     from ers_mj.proving.scoring import row_of
@@ -95,21 +102,21 @@ def _run(folder: Path, arguments: argparse.Namespace, keeps: bool) -> int:
                 progress=progress,
             )
     except KeyboardInterrupt:
-        kept = (
+        state = (
             f"{folder} keeps what was done, the same command goes on from there"
-            if keeps
+            if place is not None
             else "nothing was kept, --out DIR would keep it"
         )
-        print(f"ers: stopped; {kept}", file=sys.stderr)
-        return 130
+        stopping.tell(f"; {state}")
+        return stopping.STOPPED
     rows = [row_of(truth, proof.answers[name]) for name, truth in proof.truths.items()]
     scores = scored_simulated(rows) if arguments.real is None else scored_real(rows)
     results = plain(
         {**scores, "seed": arguments.seed, "truth_sha256": proof.sha256, "rows": rows, "versions": _versions(proof)}
     )
-    told, files = _shown(folder if keeps else None, results, rows)
-    print(as_json(results) if arguments.json else "\n".join([*told, *written(files)]))
-    return 0
+    told, kept = _shown(place, results, rows)
+    print(as_json(results) if arguments.json else "\n".join([*told, *written(kept)]))
+    return kept.code
 
 
 def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
@@ -128,11 +135,13 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
             "cases": len(plans),
             "folder": str(Path(arguments.real).absolute()),
         }
-    from ers_mj.proving import case
+    from ers_mj.proving import world
 
-    cases = case.plans(arguments.cases or CASES, arguments.seed)
-    tasks = [Task(f"case-{plan.index + 1:03d}", case.make, (plan, arguments.seed)) for plan in cases]
-    return tasks, {"kind": "simulated", "seed": arguments.seed, "cases": len(cases)}
+    families = world.chosen(arguments.families and [name.strip() for name in arguments.families.split(",")])
+    cases = world.plans(arguments.cases or CASES, arguments.seed, families)
+    tasks = [Task(f"case-{plan.index + 1:03d}", world.make, (plan, arguments.seed)) for plan in cases]
+    settings = {"kind": "simulated", "seed": arguments.seed, "cases": len(cases), "families": ",".join(families)}
+    return tasks, settings
 
 
 def _versions(proof: Proof) -> dict[str, str]:
@@ -142,10 +151,10 @@ def _versions(proof: Proof) -> dict[str, str]:
     return {"ers-mj": __version__, **next((a["versions"] for a in answers if a.get("versions")), {})}
 
 
-def _shown(folder: Path | None, results: dict, rows: list[dict]) -> tuple[list[str], list[Path]]:
+def _shown(place: Place | None, results: dict, rows: list[dict]) -> tuple[list[str], Kept]:
     """The lines of a terminal, and what was written of them."""
     told = _told(results)
-    return told, _write(folder, results, rows, told) if folder is not None else []
+    return told, keep(place, lambda folder: _write(folder, results, rows, told))
 
 
 def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> list[Path]:
@@ -165,6 +174,7 @@ def _write(folder: Path, results: dict, rows: list[dict], told: list[str]) -> li
 
 def _told(results: dict) -> list[str]:
     """What a terminal shows when all is done."""
+    from ers_mj.report.proof_families import told_families
     from ers_mj.report.proof_report import headline, table_of
 
     counts = ", ".join(f"{n} {kind}" for kind, n in results["counts"].items() if n)
@@ -177,6 +187,7 @@ def _told(results: dict) -> list[str]:
         lines.append(
             f"  {b['from_sigma']:g} to {top:14}{b['right']:>4} of {b['of']:<4} [{b['ci95'][0]:.2f}, {b['ci95'][1]:.2f}]"
         )
+    lines += told_families(results)
     lines += _told_real(results) if "concealed_in_real" in results else _told_confusion(results["confusion"])
     over, cpu, pair, wall = (results[name] for name in ("error_over_floor", "cpu_s", "cpu_s_of_a_pair", "wall_s"))
     lines += (

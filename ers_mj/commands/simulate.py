@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 
-from ers_mj.commands.options import add_model, number, table_file, whole
+from ers_mj.commands.keeping import keep_file, table_file
+from ers_mj.commands.options import add_model, number, whole
 from ers_mj.door.saving import as_json
 
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
@@ -75,10 +76,10 @@ def run(arguments: argparse.Namespace) -> int:
         play=arguments.play,
         inductance=arguments.inductance == "on",
     )
-    found.save(out, arguments.force)
-    summary = {"out": arguments.out, **found.to_dict()}
+    kept = keep_file(out, lambda file: found.save(file, arguments.force))
+    summary = {"out": kept.told(arguments.out), **found.to_dict()}
     print(as_json(summary) if arguments.json else _told(summary))
-    return 0
+    return kept.code
 
 
 def _told(summary: dict) -> str:

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ers_mj.commands.keeping import Kept, keep, results_folder
 from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
 from ers_mj.commands.options import (
     add_cluster,
@@ -18,7 +19,6 @@ from ers_mj.commands.options import (
     crew_of,
     number,
     refuse_unknown,
-    results_folder,
     several,
     small_deg,
     swing_deg,
@@ -44,6 +44,8 @@ COLUMNS = (
     ("chatter [V]", "chatter_V", 1.0, ".3f"),
     ("energy [J]", "energy_J", 1.0, ".2f"),
 )
+
+RESULTS = ("trials.json", "report.html")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -155,7 +157,7 @@ def _add_scatter(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run every combination, write, tell; 0."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     from ers_mj.control.controllers import CONTROLLERS
     from ers_mj.control.paper_claims import headline
     from ers_mj.control.trial import try_out
@@ -183,9 +185,9 @@ def run(arguments: argparse.Namespace) -> int:
                 "versions": versions(),
             }
         )
-        files = _write(folder, document, trials, spreads, progress) if folder is not None else []
-    print(as_json(document) if arguments.json else "\n".join(_told(document, files)))
-    return 0
+        kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress))
+    print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
+    return kept.code
 
 
 def _crew(arguments: argparse.Namespace) -> Crew:
@@ -276,7 +278,7 @@ def _write(folder: Path, document: dict, trials: list[Trial], spreads: list[Spre
 # -- the trials in lines --------------------------------------------------------------------------------------------
 
 
-def _told(document: dict, files: list[Path]) -> list[str]:
+def _told(document: dict, kept: Kept) -> list[str]:
     """What a terminal shows when all is done."""
     lines = ["", bold(document["sentence"])]
     keys = list(dict.fromkeys((t["case"], t["plant"]) for t in document["trials"]))
@@ -292,7 +294,7 @@ def _told(document: dict, files: list[Path]) -> list[str]:
                 lines.append(f"  {t['controller']:24}{cells}")
     lines += _spread_lines(document)
     lines += ["", *document["notes"]] if document["notes"] else []
-    return lines + written(files)
+    return lines + written(kept)
 
 
 def _spread_lines(document: dict) -> list[str]:

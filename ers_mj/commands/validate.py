@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.options import add_jobs_and_json, add_out, number, one_of, results_folder, several
+from ers_mj.commands.keeping import Kept, keep, results_folder
+from ers_mj.commands.options import add_jobs_and_json, add_out, number, one_of, several
 from ers_mj.commands.output import Progress, bold, written
 from ers_mj.door.saving import as_json
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from ers_mj.validation.cases import Validation
 
 LINKAGES, SWITCH = ("constant", "rod"), ("off", "on")
+
+RESULTS = ("validation.json", "report.html")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -62,7 +64,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate both, compare, write, tell; 0."""
-    folder = results_folder(arguments.out, arguments.force, arguments.json)
+    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     from ers_mj.door.validating import validate
 
     with Progress() as progress:
@@ -75,23 +77,23 @@ def run(arguments: argparse.Namespace) -> int:
             jobs=arguments.jobs,
             progress=progress,
         )
-        files = found.save(folder, force=True, progress=progress) if folder is not None else []
+        kept = keep(place, lambda folder: found.save(folder, force=True, progress=progress))
     document = found.to_dict()
-    print(as_json(document) if arguments.json else "\n".join(_told(found.validation, document, files)))
-    return 0
+    print(as_json(document) if arguments.json else "\n".join(_told(found.validation, document, kept)))
+    return kept.code
 
 
 # -- the validation in lines ----------------------------------------------------------------------------------------
 
 
-def _told(found: Validation, document: dict, files: list[Path]) -> list[str]:
+def _told(found: Validation, document: dict, kept: Kept) -> list[str]:
     """What a terminal shows when all is done."""
     lines = ["", bold(document["sentence"]), "", *_told_table(found), ""]
     for key in dict.fromkeys((e["gap_rad"], e["linkage"], e["inductance"]) for e in document["where"]):
         entries = [e for e in document["where"] if (e["gap_rad"], e["linkage"], e["inductance"]) == key]
         lines += [f"  {e['axis']:10} {e['sentence']}" for e in entries] + [""]
     lines += [f"left out: {sentence}" for sentence in document["left_out"]]
-    return lines + written(files)[1:]
+    return lines + written(kept)[1:]
 
 
 def _told_table(found: Validation) -> list[str]:

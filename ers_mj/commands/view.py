@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ers_mj.commands.keeping import Kept, keep_file
 from ers_mj.commands.options import add_model, mapping, number, pair, whole
 from ers_mj.commands.output import Progress
-from ers_mj.door.saving import as_json, refuse_unwritable, write_whole
+from ers_mj.data.whole import write_whole
+from ers_mj.door.saving import as_json, refuse_file
 from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -96,9 +98,10 @@ def run(arguments: argparse.Namespace) -> int:
     if out is None:
         return _show(arguments)
     replay = _replay(arguments, is_film=out.suffix.lower() == ".gif")
-    summary = _summary(arguments, replay) | _render(replay, out, arguments.width)
+    rendered, kept = _render(replay, out, arguments.width)
+    summary = _summary(arguments, replay) | rendered
     print(as_json(summary) if arguments.json else _told(summary))
-    return 0
+    return kept.code
 
 
 def _show(arguments: argparse.Namespace) -> int:
@@ -121,9 +124,7 @@ def _checked_out(arguments: argparse.Namespace) -> Path | None:
     out = Path(arguments.render)
     if not arguments.render or out.is_dir() or out.suffix.lower() not in WIDTHS:
         raise InputError(f"--render {arguments.render or 'is empty'}: a file that ends in .png or .gif was expected")
-    if out.exists() and not arguments.force:
-        raise InputError(f"{out}: exists already, give --force to overwrite it")
-    refuse_unwritable(out)
+    refuse_file(out, arguments.force)
     return out
 
 
@@ -200,7 +201,7 @@ def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
 # -- a picture -----------------------------------------------------------------------------------------------------
 
 
-def _render(replay: Replay, out: Path, width: int | None) -> dict:
+def _render(replay: Replay, out: Path, width: int | None) -> tuple[dict, Kept]:
     from ers_mj.view.rendering import gif_bytes, png_bytes, replay_frames
 
     kind = out.suffix.lower()
@@ -211,8 +212,8 @@ def _render(replay: Replay, out: Path, width: int | None) -> dict:
             images.append(image)
             progress("rendering", len(images) / replay.t.size)
     content = png_bytes(images[0]) if kind == ".png" else gif_bytes(images, FILM.fps)
-    write_whole(out, content)
-    return {"render": str(out), "width": width, "height": height, "bytes": len(content)}
+    kept = keep_file(out, lambda file: write_whole(file, content))
+    return {"render": kept.told(str(out)), "width": width, "height": height, "bytes": len(content)}, kept
 
 
 def _summary(arguments: argparse.Namespace, replay: Replay) -> dict:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ers_mj.data.columns import COLUMNS, CONSTANT, MEASURED
 from ers_mj.data.consistency.sheet import Fault
-from ers_mj.data.sensor_faults import at_extreme, decimal_grain, frozen_spans, held_spans, varied
+from ers_mj.data.sensor_faults import at_extreme, converter_step, decimal_grain, frozen_spans, held_spans, varied
 from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
 
@@ -21,6 +21,10 @@ class Limits:
 
     most_missing: float = 0.20  # share of a column: a required one is refused, another one not used
     least_jitter: float = 0.01  # rms share of the step from which jitter is worth a sentence
+    largest: float = 1e25  # of any column: no sensor gives more, and its powers are still numbers
+    least_travel: float = 1e-25  # of an output, below which it is constant
+    ends: tuple[int, ...] = (32767, 32768)  # counts at which a register of 16 bits ends
+    fewest_at_end: int = 3  # samples there
 
 
 LIMITS = Limits()
@@ -34,16 +38,24 @@ def checked(values: dict[str, np.ndarray], labels: dict[str, str], name: str) ->
     for field, x in values.items():
         _refuse_length(x, labels[field], len(values["t"]), name)
         _refuse_infinite(x, labels[field], name)
+        _refuse_huge(x, labels[field], name)
     refuse_time(values["t"], labels["t"], name)
     for field in ("u", "y"):
         _refuse_missing(values[field], labels[field], name)
-    if np.nanmin(values["y"]) == np.nanmax(values["y"]):
-        raise InputError(f"{name}: the output {labels['y']} is constant at {np.nanmax(values['y']):.6g}")
+    refuse_still(values["y"], labels["y"], name)
     used = {field: x for field, x in values.items() if field not in CONSTANT and not _sparse(x)}
     fields = {field: x if field in MEASURED else _held(x) for field, x in used.items()}
     if "enable" in fields:
         fields["enable"] = fields["enable"] > 0.5
     return {field: locked(x) for field, x in (fields | {"valid": np.isfinite(values["y"])}).items()}
+
+
+def refuse_still(y: np.ndarray, label: str, name: str) -> None:
+    """Raise InputError where the output y (N,) is constant."""
+    known = y[np.isfinite(y)]
+    if not known.size or np.ptp(known) < LIMITS.least_travel:
+        told = f" at {known[0]:.6g}" if known.size else ""
+        raise InputError(f"{name}: the output {label} is constant{told}")
 
 
 def constants(values: dict[str, np.ndarray], labels: dict[str, str], name: str) -> dict[str, float]:
@@ -72,6 +84,12 @@ def _refuse_length(x: np.ndarray, label: str, count: int, name: str) -> None:
 def _refuse_infinite(x: np.ndarray, label: str, name: str) -> None:
     if np.isinf(x).any():
         raise InputError(f"{name}: {label} is infinite in data row {1 + int(np.argmax(np.isinf(x)))}")
+
+
+def _refuse_huge(x: np.ndarray, label: str, name: str) -> None:
+    if (huge := np.abs(x) > LIMITS.largest).any():
+        row = int(np.argmax(huge))
+        raise InputError(f"{name}: {label} is {x[row]:.3g} in data row {row + 1}, at most {LIMITS.largest:.0e} may be")
 
 
 def refuse_time(t: np.ndarray, label: str, name: str) -> None:
@@ -127,6 +145,12 @@ def problems_of(
         *_told_jitter(t, labels["t"]),
         *_told_clipped("limit", t, u, labels["u"], [s for s in held_spans(u) if at_extreme(u, s) and varied(u, s)]),
         *_told_clipped("clipped", t, y, labels["y"], [s for s in frozen if at_extreme(y, s)]),
+        *(
+            fault
+            for field in MEASURED
+            if field in printed
+            for fault in _told_register(t, printed[field], labels[field])
+        ),
         *_told_stuck(t, labels["y"], [s for s in frozen if not at_extreme(y, s) and np.ptp(u[s]) > 0]),
         *_told_constant(t, u, labels["u"]),
         *_told_converter(labels["y"], step),
@@ -170,6 +194,28 @@ def _told_clipped(kind: str, t: np.ndarray, x: np.ndarray, label: str, spans: li
     limits = listed(f"{limit:.6g}" for limit in sorted({float(x[span.start]) for span in spans}))
     sentence = f"{label} looks clipped at {limits}: {_told_spans(spans, len(x))}"
     return [_of_spans(kind, t, label, spans, sentence)]
+
+
+def _told_register(t: np.ndarray, x: np.ndarray, label: str) -> list[Fault]:
+    """A column that stays at the last count of a register of 16 bits (moteus logs speeds and positions so): what lay
+    beyond it is lost, and no flag says so.
+    """
+    if not np.isfinite(x).any():
+        return []
+    size = np.abs(x)
+    at = np.flatnonzero(size == np.nanmax(size))
+    if at.size < LIMITS.fewest_at_end:
+        return []
+    levels = np.unique(x[np.isfinite(x)])
+    grain = decimal_grain(levels)
+    step = float(np.gcd.reduce(np.rint(levels / grain).astype(np.int64))) * grain if grain else converter_step(x)
+    if not step or round(size[at[0]] / step) not in LIMITS.ends:
+        return []
+    sentence = (
+        f"{label} stays at {x[at[0]]:.6g}, {round(size[at[0]] / step)} steps of {step:.4g}: the end of a 16-bit"
+        f" register, which clips without a flag, in {at.size} samples"
+    )
+    return [Fault("clipped", label, sentence, int(at.size), _region(t, at[0], at[-1]))]
 
 
 def _told_stuck(t: np.ndarray, label: str, spans: list[slice]) -> list[Fault]:

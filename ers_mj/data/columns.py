@@ -238,6 +238,14 @@ def _refuse_mistyped(mapping: Mapping[str, str], name: str) -> None:
             raise InputError(f"{name}: --map gives {contract!r}, the names it knows are {listed(COLUMNS)}")
 
 
+def refuse_left_out(left_out: Mapping[str, str], asked: Asking, name: str) -> None:
+    """Raise InputError where what is mapped, or bears a required name, is no column of the file."""
+    required = [c for c, role in COLUMNS.items() if role.field in REQUIRED and c not in asked.mapping]
+    for column in (*asked.mapping.values(), *required):
+        if column in left_out:
+            raise InputError(f"{name}: {column} cannot be used, it {left_out[column]}")
+
+
 def _told_missing(field: str, columns: list[str]) -> str:
     noun, known = REQUIRED[field], [contract for contract, role in COLUMNS.items() if role.field == field]
     known += [c for c, kind in INPUTS.items() if kind == "position"] if field == "u" else []

@@ -165,7 +165,9 @@ def _channel(name: str, x: np.ndarray, record: Recorded) -> Channel:
 def _shares(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Edges (bins + 1,) over the range of x (N,), and the share of the samples between them."""
     known = x[np.isfinite(x)]
-    count, edges = np.histogram(known, bins=SEEING.bins)
+    low, high = float(np.min(known)), float(np.max(known))
+    least = 1e-9 * max(abs(low), abs(high), 1e-30)  # of a range that still has edges between its ends
+    count, edges = np.histogram(known, bins=SEEING.bins, range=(low, max(high, low + least)))
     return edges, count / known.size
 
 

@@ -12,6 +12,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +129,9 @@ def _parts(body: str, columns: Sequence[str], name: str) -> list[str | float | C
     except Unreadable:
         parts = []
     if not columns_of(parts):
-        raise InputError(f"{name}: --map asks for the column {body!r}, the columns are {listed(columns)}")
+        near = get_close_matches(body, columns, n=1)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        raise InputError(f"{name}: --map asks for the column {body!r}{hint}, the columns are {listed(columns)}")
     return parts
 
 

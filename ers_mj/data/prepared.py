@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -91,6 +91,11 @@ class Trace:
     def sample_time(self) -> float:
         """Median step [s]."""
         return float(np.median(np.diff(self.t)))
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The blocks of this trace alone."""
+        return Blocks.of([self])
 
     @cached_property
     def runs(self) -> Kept:
@@ -240,7 +245,10 @@ def make_trace(
     it.
     """
     t = s.t
-    block = np.minimum(((t - t[0]) / BLOCK).astype(np.int64), max(int((t[-1] - t[0]) / BLOCK) - 1, 0))
+    block = np.minimum(np.floor((t - t[0]) / BLOCK), max(np.floor((t[-1] - t[0]) / BLOCK) - 1, 0))
+    if block[-1] > t.size:  # blocks of one sample and none: those without are not laid out
+        block = np.unique(block, return_inverse=True)[1]
+    block = block.astype(np.int64)
     counts = np.bincount(block[s.valid], minlength=block[-1] + 1).astype(float)
     y = np.where(s.valid, s.y, np.nan)
     trace = Trace(name, t, s.u, y, s.valid, s.enable, s.load, sigma, quantum, start or (0.0, 0.0), block, counts)
@@ -269,7 +277,13 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
     head without one sample that goes along, is none: it is how a polynomial meets a rudder that is thrown from rest.
     """
     known = np.isfinite(y)
-    t, y = t[known] - t[0], y[known]
+    return _start_seen((t[known] - t[0]).tobytes(), y[known].tobytes(), sigma)
+
+
+@lru_cache(512)  # asked for again and again of the same beginnings
+def _start_seen(times: bytes, outputs: bytes, sigma: float) -> tuple[float, float]:
+    """``start_seen`` of the known samples, from the first on."""
+    t, y = np.frombuffer(times), np.frombuffer(outputs)
     if t.size < BEGINNING.fewest_seen:
         return 0.0, 0.0
     found = []

@@ -19,7 +19,7 @@ import pyarrow as pa
 
 from ers_mj.data.checks import FEWEST_SAMPLES as FEWEST_SAMPLES
 from ers_mj.data.checks import GAP as GAP
-from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_time
+from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_still, refuse_time
 from ers_mj.data.columns import (
     COLUMNS,
     CONSTANT,
@@ -28,6 +28,7 @@ from ers_mj.data.columns import (
     choose_columns,
     input_name,
     kind_of,
+    refuse_left_out,
     refuse_unknown_unit,
 )
 from ers_mj.data.consistency import consistent
@@ -38,8 +39,9 @@ from ers_mj.data.formats.base import Loaded
 from ers_mj.data.inspection import Inspection, inspected
 from ers_mj.data.mapping import Source
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec, write_whole
-from ers_mj.errors import InputError
+from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec
+from ers_mj.data.whole import write_whole
+from ers_mj.errors import InputError, brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +144,7 @@ class Recording:
 # -- the three ways in and out --------------------------------------------------------------------------
 
 
+@brief
 def read_recording(
     path_or_spec: str | os.PathLike[str],
     mapping: Mapping[str, str] | None = None,
@@ -173,6 +176,7 @@ def read_recording(
     return _of_table(replace(loaded, table=table), asked, name, path=str(path), sha256=digest)
 
 
+@brief
 def from_columns(
     columns: Mapping[str, Any],
     mapping: Mapping[str, str] | None = None,
@@ -213,6 +217,7 @@ def from_columns(
 def _of_table(loaded: Loaded, asked: Asking, name: str, **origin: Any) -> Recording:
     """The recording in a table of named columns, as it was asked for."""
     table = loaded.table
+    refuse_left_out(loaded.left_out, asked, name)
     choice = choose_columns(table.column_names, asked, name, loaded.units)
     sources = {field: choice.sources[contract] for field, contract in choice.roles().items()}
     printed, factors = _printed(table, sources, name)
@@ -333,6 +338,8 @@ class Read:
         rows = np.arange(fields["t"].size)
         first = Sheet(name, self.kind, fields, labels, self.units, rows, step * factors["y"], self.sure)
         sheet, faults = consistent(first)
+        if faults:
+            refuse_still(sheet.y, labels["y"], name)
         seen = {field: _seen(x[sheet.rows], field, first, sheet, factors[field]) for field, x in printed.items()}
         told = [*problems_of(dict(sheet.fields), seen, labels, step), *faults, *notes]
         return {
@@ -367,6 +374,7 @@ def _array(x: Any, field: str, name: str) -> np.ndarray:
     return array
 
 
+@brief
 def read_input(path: str | os.PathLike[str], column: str = "u_V") -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and input, each (N,), of a CSV or Parquet file with the columns t_s and ``column``.
 

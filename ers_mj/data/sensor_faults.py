@@ -15,6 +15,8 @@ class Holds:
     dither: float = 0.35  # of a step, from which noise moves the reading wherever within a step it lies
     coloured: float = 3.0  # how much longer coloured noise may let it stay
     fewest_turns: int = 5  # of the reading within neighbours, as noise makes them and motion does not
+    beside: int = 4  # changes on either side of a span that show a servo come to rest and start again
+    slowed: float = 0.5  # of the usual speed, below which it comes to rest
 
 
 HOLDS = Holds()
@@ -80,7 +82,7 @@ def frozen_spans(y: np.ndarray, grid: float) -> list[slice]:
     by_chance = 0.3 if grid else 1 / len(y)  # a grid below the noise repeats up to 28 % of the samples at rest
     repeats = np.clip(np.mean(np.diff(y) == 0), by_chance, 0.9)
     shortest = max(HOLDS.shortest, int(np.ceil(2 * np.log(len(y)) / -np.log(repeats))))
-    return [s for s in held_spans(y, shortest) if _dithered(y, s)]
+    return [s for s in held_spans(y, shortest) if _dithered(y, s) and not _rests(y, s, grid)]
 
 
 def unmoved_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
@@ -154,6 +156,23 @@ def _dithered(x: np.ndarray, span: slice) -> bool:
     """Whether x jerks to and fro on both sides of a span, as noise does whatever the motion under it (4 in 5 turns)."""
     jerks = [np.diff(change, n=2) for change in _around(x, span)]
     return all(np.count_nonzero(jerk[:-1] * jerk[1:] < 0) > 0.4 * max(len(jerk) - 1, 1) for jerk in jerks)
+
+
+def _rests(y: np.ndarray, span: slice, grid: float) -> bool:
+    """Whether y slows down one way into a span, or speeds up one way out of it, turns on neither side and does not leap
+    after it: a servo that sticks at the end of its way, whatever the timing of a bus makes of its motion. Noise would
+    turn it.
+    """
+    sides = y[max(0, span.start - HOLDS.neighbours) : span.start + 1][::-1], y[span.stop - 1 :][: HOLDS.neighbours + 1]
+    slows = False
+    for side in sides:
+        change = np.diff(side[np.isfinite(side)])
+        near, far = change[: HOLDS.beside], change[HOLDS.beside :]
+        if np.max(near, initial=0.0) > 0.75 * grid and np.min(near, initial=0.0) < -0.75 * grid:
+            return False
+        leaps = near.size > 1 and abs(near[0]) > LEAPS.least[2] * max(grid, np.max(np.abs(near[1:])))
+        slows |= far.size > 0 and abs(np.mean(near)) < HOLDS.slowed * abs(np.mean(far))
+    return bool(slows and not leaps)
 
 
 def _noise(y: np.ndarray) -> float:

@@ -1,9 +1,8 @@
-"""Tables of named columns: which rows, cells to numbers, and text to a file that appears whole.
+"""Tables of named columns: which rows, and cells to numbers.
 
 What cannot be read is refused with one sentence (`InputError`).
 """
 
-import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -109,10 +108,19 @@ def numbers(column: pa.ChunkedArray, label: str, name: str) -> np.ndarray:
     try:
         if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
             column = pc.replace_substring_regex(_texts(column), r"^\+", "")
-            column = pc.if_else(pc.is_in(pc.utf8_lower(column), pa.array(BLANK)), None, column)
-        return np.array(column.cast(pa.float64(), safe=False).to_numpy(), float)
+            column = pc.replace_substring_regex(column, f"(?i)^({'|'.join(BLANK)})$", "nan")
+        return _floats(column.cast(pa.float64(), safe=False))
     except pa.ArrowException:
         raise InputError(f"{name}: the column {label} {_told_text(column)}") from None
+
+
+def _floats(column: pa.ChunkedArray) -> np.ndarray:
+    """The numbers (N,), NaN where there is none: by way of DLPack where all are there, since pyarrow's own way imports
+    pandas.
+    """
+    if column.null_count or not len(column):
+        return np.array(column.to_numpy(), float)
+    return np.concatenate([np.from_dlpack(chunk) for chunk in column.chunks if len(chunk)])
 
 
 def _told_text(column: pa.ChunkedArray) -> str:
@@ -133,26 +141,18 @@ def cell_of(x: float) -> str:
     return "" if x != x else repr(x)
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write text to a neighbour of path, then put it in path's place: a reader never sees half of it.
-
-    Raises:
-        InputError: the path cannot be written.
-    """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({reason(error)})") from None
-    finally:
-        part.unlink(missing_ok=True)
+LONGEST_LIST = 190  # characters of names within a sentence
 
 
 def listed(names: Iterable, most: int = 24) -> str:
     """Names with commas; of many, the first ones, the last, and how many there are."""
     words = [str(name)[:40] for name in names]
-    return ", ".join(words) if len(words) <= most else f"{', '.join(words[:8])} ... {words[-1]} ({len(words)} in all)"
+    if len(words) <= most and len(", ".join(words)) <= LONGEST_LIST:
+        return ", ".join(words)
+    first = words[:8]
+    while len(", ".join(first)) > LONGEST_LIST // 2:
+        first.pop()
+    return f"{', '.join(first)} ... {words[-1]} ({len(words)} in all)"
 
 
 def reason(error: Exception) -> str:

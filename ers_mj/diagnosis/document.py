@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places,
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
 from ers_mj.diagnosis.sentences import sentence, shown
+from ers_mj.diagnosis.told_model import with_diagnosis
 from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
@@ -32,22 +33,9 @@ from ers_mj.selection.confirmation import delta_bic
 from ers_mj.selection.cross_validation import pooled
 from ers_mj.selection.moves import Move
 from ers_mj.selection.posterior import isolability
-from ers_mj.servo.datasheet import Datasheet
+from ers_mj.servo.datasheet import SHEET_UNITS, Datasheet
 from ers_mj.servo.model import BASE
 from ers_mj.servo.simulation import PER_INERTIA, unit_of
-
-SHEET_UNITS = {
-    "J": "kg m^2",
-    "B": "N m s/rad",
-    "K_t": "N m/A",
-    "K_e": "V s/rad",
-    "k_s": "N m/rad",
-    "T_LH": "N m",
-    "F_c": "N m",
-    "R": "ohm",
-    "L": "H",
-    "n": "-",
-}
 
 
 @dataclass(frozen=True)
@@ -375,27 +363,12 @@ def _improved(case: Case) -> Datasheet:
     return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
 
 
-def with_diagnosis(sheet: Datasheet, document: dict) -> Datasheet:
-    """The model with the verdict that made it, and the intervals of what was identified of it."""
-    held = {**sheet.lumped, **sheet.loop, **sheet.baseline}
-    rows = {name: row["ci95"] for name, row in document["parameters"].items() if name in held and row["identifiable"]}
-    for missing in document["missing"]:
-        given = dict(sheet.effects).get(missing["effect"], {})
-        told = missing["parameters"].items()
-        rows |= {f"{missing['effect']}.{name}": row["ci95"] for name, row in told if name in given}
-    ends = {key: [math.nan if x is None else float(x) for x in row] for key, row in rows.items()}
-    known = {key: (low, high) for key, (low, high) in ends.items() if -math.inf < low <= high < math.inf}
-    return replace(sheet, verdict=document["verdict"], intervals=known)
-
-
 def versions_of() -> dict:
-    import numba
-    import scipy
+    from importlib.metadata import version
 
     return {
         "ers-mj": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
+        **{package: version(package) for package in ("scipy", "numba")},
     }

@@ -14,12 +14,14 @@ from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.position_loop import beside
 from ers_mj.position_loop.confirmation import Confirmed, recalibrated
 from ers_mj.position_loop.fit import Fit
 from ers_mj.position_loop.intervals import Intervals
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run
 from ers_mj.position_loop.selection import Selection, Selector
+from ers_mj.servo.datasheet import Datasheet
 
 LAGS = 3  # samples over which what a model leaves is remembered
 HELD_SECONDS = 6.0  # [s] of held-out recordings that the MuJoCo plant runs
@@ -27,7 +29,7 @@ HELD_SECONDS = 6.0  # [s] of held-out recordings that the MuJoCo plant runs
 
 @dataclass(frozen=True)
 class LoopCase:
-    """Recordings, runs, what was selected and confirmed, and the intervals."""
+    """Recordings, runs, what was selected and confirmed, the intervals, and what was known of the servo before."""
 
     recordings: Sequence[Recording]
     holdout: Sequence[Recording]
@@ -35,6 +37,7 @@ class LoopCase:
     selection: Selection
     confirmed: Confirmed
     intervals: Intervals
+    datasheet: Datasheet | None = None
     seed: int = 0
     policy: Policy = POLICY
 
@@ -167,8 +170,19 @@ class LoopCase:
             "mujoco_heldout_rmse_after_rad": multibody[1],
             "noise_floor_rad": self.noise,
             "heldout_from": c.sentence,
+            **self._beside,
             "mujoco_heldout_from": f"of what was held out the MuJoCo plant ran the first {HELD_SECONDS:.0f} s",
         }
+
+    @property
+    def _beside(self) -> dict:
+        """Errors before and after of the drive signal that was recorded beside, in its own unit."""
+        out = {}
+        for word, model in (("before", self.base), ("after", self.model)):
+            left = beside.errors(model, self.runs, [model.motion(run) for run in self.runs])
+            if left:
+                out[f"second_train_rmse_{word}"] = math.sqrt(float(np.mean(np.concatenate([e for _, e in left]) ** 2)))
+        return out | ({"second": self.recordings[0].second_name} if out else {})
 
     def plant(self, model: LoopModel | None = None, run: Run | None = None) -> LoopedPlant:
         """The servo in MuJoCo: one joint of inertia 1 behind its loop."""

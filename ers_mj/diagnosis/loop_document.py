@@ -7,26 +7,35 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of, with_diagnosis
+from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of
 from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
 from ers_mj.diagnosis.localisation import Place, Ranked, Samples, places, residual_map, shaded
 from ers_mj.diagnosis.loop_advice import next_recording
 from ers_mj.diagnosis.loop_case import LoopCase
 from ers_mj.diagnosis.loop_rows import improved, parameters
+from ers_mj.diagnosis.loop_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
 from ers_mj.diagnosis.sentences import shown
+from ers_mj.diagnosis.told_model import with_diagnosis
 from ers_mj.effects import BY_NAME
 from ers_mj.position_loop.intervals import Told
 from ers_mj.position_loop.model import LETTERS, LoopModel
 from ers_mj.position_loop.runs import Run, speed_of
 from ers_mj.servo.simulation import unit_of
 
+BESIDE = (
+    "under a position command the datasheet's numbers stand beside those that were identified; none of them is fitted"
+    " from, or held"
+)
+
 
 def told(case: LoopCase) -> Diagnosis:
     """The document, the evidence, the model and the plant."""
     samples = gather(case)
     missing = [_effect(case, name) for name in case.told_effects]
-    found = _places(case, samples)
+    found, data = _places(case, samples), data_of(case.recordings, case.holdout)
+    known = case.datasheet.to_lumped() if case.datasheet is not None else {}
+    data["problems"] += [BESIDE] if case.datasheet is not None else []
     document = {
         "version": 1,
         "verdict": case.verdict,
@@ -36,11 +45,11 @@ def told(case: LoopCase) -> Diagnosis:
         "remainder": remainder(
             case.explained, case.more_is_left, case.free_held, beyond_training(case.recordings, case.holdout)
         ),
-        "record_state": [],
+        "record_state": record_state(case),
         "fit": case.fits,
-        "parameters": parameters(case.intervals, case.output_unit),
+        "parameters": parameters(case.intervals, case.output_unit, case.selector.data, known),
         "next_recording": next_recording(case),
-        "data": data_of(case.recordings, case.holdout),
+        "data": data,
         "seed": case.seed,
         "versions": versions_of(),
     }

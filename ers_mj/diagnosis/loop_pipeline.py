@@ -15,6 +15,7 @@ from ers_mj.position_loop.fit import polished
 from ers_mj.position_loop.intervals import Intervals
 from ers_mj.position_loop.runs import runs_of
 from ers_mj.position_loop.selection import Selector
+from ers_mj.servo.datasheet import Datasheet
 
 Progress = Callable[[str, float], None]
 
@@ -22,6 +23,7 @@ Progress = Callable[[str, float], None]
 def diagnose_loop(
     recordings: Sequence[Recording],
     holdout: Sequence[Recording],
+    datasheet: Datasheet | None,
     *,
     seed: int,
     jobs: int,
@@ -38,4 +40,4 @@ def diagnose_loop(
     progress("running the MuJoCo plant", 0.88)
     left_out = found.models if found.folds[0].training is not None and len(runs) > 1 else ()
     intervals = Intervals.of(selection.chosen, selector.data, left_out)
-    return told(LoopCase(recordings, holdout, selector, selection, found, intervals, seed, policy))
+    return told(LoopCase(recordings, holdout, selector, selection, found, intervals, datasheet, seed, policy))

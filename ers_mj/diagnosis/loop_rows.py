@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
 from ers_mj.effects import BY_NAME
+from ers_mj.position_loop.fit import Data
 from ers_mj.position_loop.intervals import CLOCK, COMBINED, Intervals, Told
 from ers_mj.position_loop.model import LETTERS, LoopModel
 from ers_mj.servo.datasheet import LOOP, Datasheet
@@ -17,20 +20,22 @@ UNKNOWN = {"value": None, "ci95": [None, None], "datasheet": None, "identifiable
 NOTHING = Told(0.0, (0.0, 0.0), True)
 
 
-def parameters(found: Intervals, y: str) -> dict:
+def parameters(found: Intervals, y: str, data: Data, known: Mapping[str, float] = MappingProxyType({})) -> dict:
     """Every letter of the loop and the plant, null where the recordings cannot tell it, and what combinations they
-    tell.
+    tell; beside them what is ``known`` beforehand.
     """
     rows = {}
     for letter in ROWS:
         rows[letter] = _row(_letter(found, letter), LETTERS[letter].unit.format(y=y))
     if found.model["dead_time_s"] > 0.0:  # the latency is the whole loop's, not the command's
         rows["tau_s"] = dict(rows["dead_time_s"])
-    rows |= {"b": UNKNOWN | {"unit": f"{y}/s^2/{y}"}, "c_1": UNKNOWN | {"unit": f"{y}/s^2"}}
+    signal = next((run.beside.unit for run in data.runs if run.beside is not None), y)
+    rows["b"] = _row(found.input_gain(data), f"{y}/s^2/{signal}")
+    rows["c_1"] = UNKNOWN | {"unit": f"{y}/s^2"}
     rows["theta_0"] = UNKNOWN | {"unit": y}
     for name in COMBINED:
         rows[name] = _row(found.combined(name), COMBINED_UNITS[name].format(y=y))
-    return rows
+    return {name: row | {"datasheet": known.get(name)} for name, row in rows.items()}
 
 
 def _letter(found: Intervals, letter: str) -> Told | None:

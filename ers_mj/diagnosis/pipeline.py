@@ -52,7 +52,7 @@ def diagnose(
 
     Args:
         recordings: training recordings of one rig, all of one output and input unit.
-        datasheet: what is known of the servo, or None; a position command goes without.
+        datasheet: what is known of the servo, or None; under a position command it only stands beside the numbers.
         holdout: looked at only after the selection has ended.
         seed: kept in the document; nothing here draws random numbers.
         jobs: threads; all cores by default. The result does not depend on it.
@@ -67,7 +67,7 @@ def diagnose(
     recordings, holdout = searched(recordings, holdout)
     first = recordings[0]
     if first.input_kind == "position":
-        return diagnose_loop(recordings, holdout, seed=seed, jobs=jobs, progress=progress, policy=policy)
+        return diagnose_loop(recordings, holdout, datasheet, seed=seed, jobs=jobs, progress=progress, policy=policy)
     inertia = datasheet.parameters.get("J") if datasheet is not None else None
     traces = [trace_of(r, inertia) for r in recordings]
     travel = float(np.ptp(np.concatenate([t.y[t.valid] for t in traces])))

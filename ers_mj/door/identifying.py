@@ -216,7 +216,7 @@ def refuse_beside_a_loop(settings: Settings, has_datasheet: bool) -> None:
 
 def _loop_document(found: LoopFound, recordings: Sequence[Recording], seed: int) -> dict[str, Any]:
     words = "explains the recordings" if found.explains else "leaves more than noise: ask ers diagnose what is missing"
-    rows = parameters(found.intervals, recordings[0].output_unit)
+    rows = parameters(found.intervals, recordings[0].output_unit, found.data)
     return {
         "method": "ls",
         "plant": "reduced",

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
-import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from ers_mj.errors import InputError
+from ers_mj.data.whole import final
+from ers_mj.errors import InputError, Unwritable
+from ers_mj.passing import part_name, passing, sweep
 
 OTHER_FORMATS = (".parquet", ".mat", ".h5", ".hdf5", ".npz", ".json", ".toml")
+ROOM = 2 << 20  # [bytes] that results may take up, at least
 
 
 def plain(x: object) -> Any:
@@ -36,32 +40,58 @@ def as_json(document: object) -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write text with plain line ends."""
-    path.write_text(text, encoding="utf-8", newline="\n")
+    """Write text with plain line ends; of a file name that is no text something like it."""
+    path.write_text(text, encoding="utf-8", errors="replace", newline="\n")
 
 
 def write_results(folder: Path, writers: Mapping[str, Callable[[Path], None]]) -> list[Path]:
-    """Let each writer write its file in a neighbour of `folder`, then move all of them in; the paths.
+    """Let each writer write its file within `folder`, out of sight, then put all of them in their places; the paths.
 
     Raises:
-        InputError: the folder cannot be written.
+        Unwritable: the folder cannot be written. It is left as it was, not there where it was not.
     """
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        part = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
-    try:
-        for name, write in writers.items():
-            write(part / name)
-        folder.mkdir(exist_ok=True)
-        for name in writers:
-            os.replace(part / name, folder / name)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        inside = Path(os.path.realpath(folder))  # a link is followed, so that files move within one file system
+        made = _made(inside)
+        try:
+            sweep(inside)
+            with passing(inside / part_name()) as part:
+                part.mkdir()
+                for name, write in writers.items():
+                    write(part / name)
+                for name in writers:  # a folder in a file's place is found before the first file moves
+                    final(folder / name)
+                for name in writers:
+                    os.replace(part / name, inside / name)
+        except BaseException:
+            _unmake(made)
+            raise
+    except Unwritable:
+        raise
+    except (OSError, ValueError) as error:
+        raise Unwritable.at(folder, error) from None
     return [folder / name for name in writers]
+
+
+def _made(folder: Path) -> list[Path]:
+    """Make a folder and those above it; those that were not there, from above."""
+    missing = [level for level in (folder, *folder.parents) if not level.exists()]
+    made: list[Path] = []
+    try:
+        for level in reversed(missing):
+            level.mkdir(exist_ok=True)
+            made.append(level)
+    except OSError:
+        _unmake(made)
+        raise
+    return made
+
+
+def _unmake(folders: Sequence[Path]) -> None:
+    """Remove folders that were made in vain."""
+    for level in reversed(folders):
+        with suppress(OSError):
+            level.rmdir()
 
 
 def report_writers(name: str, document: object, page: str) -> dict[str, Callable[[Path], None]]:
@@ -76,29 +106,12 @@ def make_room(path: Path) -> None:
     """Make the folder that a file is to lie in.
 
     Raises:
-        InputError: it cannot be made.
+        Unwritable: it cannot be made.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """One file, whole or not at all.
-
-    Raises:
-        InputError: it cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(part, 0o644)
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+    except (OSError, ValueError) as error:
+        raise Unwritable.at(path, error) from None
 
 
 def today() -> str:
@@ -121,8 +134,6 @@ def refuse_folder(folder: Path, force: bool) -> None:
     """Raise InputError where results cannot go to a folder: it is a file, cannot be written, or holds files and no
     ``force`` is given.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file, --out needs a folder")
     refuse_unwritable(folder)
     if not force and folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder}: holds files already, give --force to write into it or name another folder")
@@ -134,17 +145,48 @@ def refuse_table(file: Path, force: bool) -> None:
     """
     if file.suffix.lower() in OTHER_FORMATS:
         raise InputError(f"{file}: the file name ends in {file.suffix!r}, simulate writes .csv")
-    if file.exists() and not force:
-        raise InputError(f"{file}: exists already, give --force to overwrite it")
-    refuse_unwritable(file)
+    refuse_file(file, force)
 
 
-def refuse_unwritable(path: Path) -> None:
-    """Raise InputError where `path` cannot be made: its nearest existing parent is a file or is locked."""
-    parent = path.absolute()
-    while not parent.exists():
-        parent = parent.parent
-    if not parent.is_dir() and parent != path.absolute():
-        raise InputError(f"{path}: cannot be made, {parent} is a file")
-    if not os.access(parent, os.W_OK):
-        raise InputError(f"{path}: cannot be written, {parent} is read-only")
+def refuse_file(file: Path, force: bool) -> None:
+    """Raise InputError where a file cannot be written, or exists and no ``force`` is given."""
+    try:
+        if os.path.lexists(file) and not force:
+            raise InputError(f"{file}: exists already, give --force to overwrite it")
+        whole = final(file)
+    except OSError as error:
+        raise Unwritable.at(file, error) from None
+    refuse_unwritable(whole.parent, str(file))
+
+
+def refuse_unwritable(folder: Path, told: str = "") -> None:
+    """Raise InputError where files cannot be put into a folder, which is found out by doing so; ``told`` is what the
+    sentence calls it. Nothing stays.
+    """
+    told = told or str(folder)
+    try:
+        inside = Path(os.path.realpath(folder))
+        if (above := next(level for level in (inside, *inside.parents) if level.exists())) and not above.is_dir():
+            is_it = above == inside and told == str(folder)
+            raise InputError(f"{told}: {'is a file, a folder was expected' if is_it else f'{above} is a file'}")
+        made = _made(inside)
+        try:
+            with tempfile.TemporaryFile(dir=inside) as probe:
+                _fill(probe.fileno(), ROOM)
+        finally:
+            _unmake(made)
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
+        raise Unwritable.at(told, error, f", name another place, as in {tempfile.gettempdir()}") from None
+
+
+def _fill(handle: int, size: int) -> None:
+    """Take room on the disk; a file system that does not know how is taken to have it."""
+    if not hasattr(os, "posix_fallocate"):
+        return
+    try:
+        os.posix_fallocate(handle, 0, size)
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            raise

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
+LONGEST = 1e5  # [s] that an input may last: a day, which takes minutes
 Voltage = str | os.PathLike[str] | Recording | tuple[Any, Any]  # an input
 Effect = str | tuple[str, Mapping[str, float]]
 
@@ -151,6 +152,8 @@ def simulate(
     if sheet.loop:
         _refuse_beside_a_loop(input, added, options)
     name, t, u = _signal(input, rate_hz, duration, column)
+    if not t[-1] - t[0] <= LONGEST:
+        raise InputError(f"the input {name} lasts {t[-1] - t[0]:.4g} s, at most {LONGEST:g} s were expected")
     if sheet.loop:
         columns = simulate_loop(sheet, t, u, plant=options.get("plant", "reduced"), noise=noise, seed=seed)
     else:

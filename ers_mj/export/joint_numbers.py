@@ -99,9 +99,9 @@ class JointNumbers:
         return lines
 
 
-def joint_numbers(servo: Servo) -> JointNumbers:
-    """The numbers of a servo; the delay is the whole one, in seconds."""
-    made, c, n = OwnJoint(servo), servo.lowered, servo.portable.numbers
+def joint_numbers(servo: Servo, wound: bool = True) -> JointNumbers:
+    """The numbers of a servo; the delay is the whole one, in seconds, the actuator a dcmotor only where ``wound``."""
+    made, c, n = OwnJoint(servo, wound=wound), servo.lowered, servo.portable.numbers
     lines, J = made.lines, made.inertia
     joint, actuator = lines.joint, lines.actuator
 

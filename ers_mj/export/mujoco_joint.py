@@ -47,10 +47,11 @@ class OwnJoint:
     Args:
         servo: what is to be written.
         timestep: h [s] of the model.
+        wound: whether the actuator may be a dcmotor, which has the winding's time constant.
     """
 
-    def __init__(self, servo: Servo, timestep: float = TIMESTEP):
-        self.servo, self.timestep = servo, timestep
+    def __init__(self, servo: Servo, timestep: float = TIMESTEP, wound: bool = True):
+        self.servo, self.timestep, self.wound = servo, timestep, wound
         self.inertia = servo.inertia or 1.0
 
     @cached_property
@@ -64,7 +65,7 @@ class OwnJoint:
             joint="servo",
             bodies=NEGLIGIBLE * self.inertia,
             timestep=self.timestep,
-            actuator="dcmotor" if c.tau_e > 0 else "motor",
+            actuator="dcmotor" if c.tau_e > 0 and self.wound else "motor",
             is_angle=self.servo.is_angle,
             soft=soft,
         )

@@ -16,12 +16,10 @@ EXPLICIT = (
     "the drive is explicit unless you ask newton for an implicit one: keep its damping times the timestep well below J"
 )
 STOPS = "stops are newton's own springs, joint_limit_ke and joint_limit_kd, and scale with nothing"
-SOFT = "friction below breakaway creeps as newton's MuJoCo solver has it: its solreffriction is not set here"
 BRAKES = (
     "ENVELOPE alone: beyond the no-load speed ClampingDCMotor's line brakes, also when asked to drive; the limit of the"
     " servo itself is on its voltage, which add_to() has"
 )
-WOUND = "the winding's time constant: the drive's torque is there at once, the back-EMF is damping"
 
 
 class Newton(Target):
@@ -32,7 +30,7 @@ class Newton(Target):
     def write(self, servo: Servo) -> Written:
         from ers_mj import __version__
 
-        n = joint_numbers(servo)
+        n = joint_numbers(servo, wound=False)
         gain = math.copysign(n.torque, n.gear)
         limit = n.effort if n.kind == "position" else n.torque * n.limit
         clamping = f"[(ClampingMaxEffort, {{'max_effort': {limit!r}}})]" if math.isfinite(limit) else "[]"
@@ -46,8 +44,10 @@ class Newton(Target):
             "torque": "None  # it is told a position" if n.kind == "position" else f"{gain!r}  # [N m, or N]",
             "envelope": _enveloped(n),
             "armature": repr(n.armature),
-            "damping": repr(n.damping + (n.emf if n.kind == "dcmotor" else 0.0)),
+            "damping": repr(n.damping),
             "friction": repr(n.friction),
+            "solref": n.solref,
+            "solimp": n.solimp,
             "edits": "\n".join(_edits(n)),
             "drive": "DrivePD",
             "clamping": clamping,
@@ -59,9 +59,7 @@ class Newton(Target):
 
 def _losses(n: JointNumbers) -> tuple[str, ...]:
     found = {
-        WOUND: n.inductance > 0,
         SOLVERS: True,
-        SOFT: n.friction > 0,
         EXPLICIT: n.brake > 0,
         STOPS: math.isfinite(n.lower) or math.isfinite(n.upper),
         GROWS: n.delay > 0,

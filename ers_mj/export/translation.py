@@ -10,8 +10,14 @@ import math
 import textwrap
 from collections.abc import Callable, Mapping
 
-POINTERS = {"c": "const Servo *c", "x": "State *x", "p": "const double *p"}
-ARRAYS = ("at", "to", "past")  # parameters that are arrays of double
+POINTERS = {
+    "c": "const Servo *c",
+    "x": "State *x",
+    "p": "const double *p",
+    "at": "const double *at",
+    "to": "const double *to",
+    "past": "double *past",
+}
 CALLS = {"abs": "fabs", "math.fabs": "fabs", "min": "fmin", "max": "fmax"}
 OPERATORS = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
@@ -63,7 +69,7 @@ def translated(text: str) -> str:
 def _head(function: ast.FunctionDef) -> str:
     returns = any(isinstance(node, ast.Return) and node.value is not None for node in ast.walk(function))
     names = [argument.arg for argument in function.args.args]
-    given = [POINTERS.get(n) or (f"double *{n}" if n in ARRAYS else f"double {n}") for n in names]
+    given = [POINTERS.get(name, f"double {name}") for name in names]
     return f"static {'double' if returns else 'void'} {function.name}({', '.join(given)})"
 
 

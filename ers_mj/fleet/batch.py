@@ -16,8 +16,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from ers_mj.data.whole import write_whole
 from ers_mj.door.results import Progress, silent
-from ers_mj.door.saving import refuse_folder, refuse_unwritable, today, write_results, write_whole
+from ers_mj.door.saving import refuse_folder, refuse_unwritable, today, write_results
 from ers_mj.errors import ErsError
 from ers_mj.fleet.diagnosing import COLUMNS, Row, Settings, diagnosed, failed, fingerprint, read_servo
 from ers_mj.fleet.manifest import Servo

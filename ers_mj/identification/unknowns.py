@@ -14,25 +14,13 @@ from ers_mj.data.columns import per
 from ers_mj.data.prepared import Trace
 from ers_mj.errors import InputError
 from ers_mj.estimation.search import opening
-from ers_mj.servo.datasheet import LUMPED, Datasheet, refuse_impossible
+from ers_mj.servo.datasheet import LUMPED, SHEET_UNITS, Datasheet, refuse_impossible
 from ers_mj.servo.model import BASE, Model
 
 LETTERS = ("L", "R", "k_s", "T_LH", "F_c", "J", "B", "K_t", "K_e", "theta_0")  # Eq. (1), in the paper's order
 NEEDED = ("J", "B", "K_t", "K_e", "R")  # without them Eq. (1) cannot run
 FACTORS = (0.2, 3.0)  # of what is known beforehand, between which a positive one is searched
 REST = {"a_1": 0.0, "a_2": 0.0, "c_1": 0.0, "c_2": 0.0, "theta_0": 0.0, "tau_e": 0.0, "emf_share": 0.0}
-UNITS = {
-    "J": "kg m^2",
-    "B": "N m s/rad",
-    "K_t": "N m/A",
-    "K_e": "V s/rad",
-    "k_s": "N m/rad",
-    "T_LH": "N m",
-    "F_c": "N m",
-    "R": "ohm",
-    "L": "H",
-    "n": "-",
-}
 
 
 def unit_of_letter(name: str, y: str, u: str) -> str:
@@ -48,7 +36,7 @@ def unit_of_letter(name: str, y: str, u: str) -> str:
         "emf_share": "-",
         "ampere": f"{y}/s^2/A",
     }
-    return UNITS.get(name) or lumped[name]
+    return SHEET_UNITS.get(name) or lumped[name]
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,11 @@ import llvmlite.binding as llvm
 import numba
 import numpy as np
 from numba.core import cgutils, types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.extending import intrinsic
 
-from ers_mj.plants.code_folder import code_folder, one_at_a_time
+from ers_mj.passing import remove
+from ers_mj.plants.code_folder import code_folder, complaint, one_at_a_time, shelves
 from ers_mj.plants.digest import digest_of, read_by
 
 MANY = 4  # parts to compile of which it is worth saying so
@@ -259,11 +260,18 @@ def make(piece: Piece) -> None:
         with one_at_a_time():
             missing = sum(not _is_kept(each) for each in _in_order(piece))
             if missing >= MANY:
-                logging.getLogger(__name__).warning(
-                    f"ers-mj: compiling {missing} parts of the simulator ({piece.name}) for this machine, once: "
-                    f"about {math.ceil(SECONDS_EACH * missing)} s"
+                where = f" ({complaint()})" if complaint() else ""
+                _tell(
+                    f"compiling {missing} parts of the simulator ({piece.name}) for this machine, once: "
+                    f"about {math.ceil(SECONDS_EACH * missing)} s{where}"
                 )
             _make_all(piece)
+
+
+@cache
+def _tell(sentence: str) -> None:
+    """Say something once."""
+    logging.getLogger(__name__).warning(f"ers-mj: {sentence}")
 
 
 def _in_order(piece: Piece) -> list[Piece]:
@@ -281,7 +289,12 @@ def _in_order(piece: Piece) -> list[Piece]:
 
 
 def _is_kept(piece: Piece) -> bool:
-    return (code_folder() / f"{piece.stem}.nbi").exists()
+    return _shelf(piece) is not None
+
+
+def _shelf(piece: Piece) -> Path | None:
+    """The folder in which a piece is kept; None where it is in none."""
+    return next((folder for folder in shelves() if (folder / f"{piece.stem}.nbi").exists()), None)
 
 
 def _make_all(piece: Piece) -> None:
@@ -311,6 +324,22 @@ def _cache_of(piece: Piece) -> FunctionCache:
     class Kept(FunctionCache):
         _impl_class = staticmethod(lambda _: _Place(piece))
 
+        def load_overload(self, signature, context):
+            """What is kept; nothing where that is not whole."""
+            try:
+                return super().load_overload(signature, context)
+            except Exception as error:  # pickle raises whatever the bytes say
+                _tell(f"{self.cache_path} is not whole ({type(error).__name__}), what is missing is compiled again")
+                self._cache_file = _Place(piece).fresh()
+                return None
+
+        def save_overload(self, signature, data):
+            """Keep it, where there is room."""
+            try:
+                super().save_overload(signature, data)
+            except OSError as error:
+                _tell(f"{self.cache_path} takes no compiled code ({error.strerror}), the next call compiles it again")
+
     return Kept(piece.function)
 
 
@@ -318,14 +347,20 @@ class _Place(CompileResultCacheImpl):
     """Where numba keeps a piece; it is its own locator."""
 
     def __init__(self, piece: Piece):
+        self.piece = piece
         self._locator, self._filename_base, self._lineno = self, piece.stem, piece.function.__code__.co_firstlineno
         self._py_file = piece.function.__code__.co_filename
+
+    def fresh(self) -> IndexDataCacheFile:
+        """The files where code is written, with nothing in them."""
+        remove(code_folder() / f"{self._filename_base}.nbi")
+        return IndexDataCacheFile(str(code_folder()), self._filename_base, self.get_source_stamp())
 
     def ensure_cache_path(self) -> None:
         """The folder is there."""
 
     def get_cache_path(self) -> str:
-        return str(code_folder())
+        return str(_shelf(self.piece) or code_folder())
 
     def get_source_stamp(self) -> str:
         return self._filename_base

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -120,20 +121,39 @@ class ReducedModel:
     def __post_init__(self):
         object.__setattr__(self, "_lowered", lowered(self.coefficients, self.effects))
 
+    def __reduce__(self):  # what is laid out holds addresses, which no other process has
+        return ReducedModel, (self.coefficients, self.effects, self.supply, self.effort)
+
+    @cached_property
+    def _with_effects(self) -> Coefficients:
+        """The coefficients that the effects leave."""
+        return Coefficients(*self._lowered[0])
+
     @property
     def coupled(self) -> bool:
         """Whether there is a second body, be it the foot of a bristle."""
-        return Coefficients(*self._lowered[0]).two_body > 0
+        return self._with_effects.two_body > 0
 
-    @property
+    @cached_property
     def bends(self) -> bool:
         """Whether friction bends a bristle first."""
-        return Coefficients(*self._lowered[0]).has_bristle
+        return self._with_effects.has_bristle
 
-    @property
+    @cached_property
     def has_motor_side(self) -> bool:
         """Whether a play or a shaft parts motor and rudder."""
-        return Coefficients(*self._lowered[0]).has_motor_side
+        return self._with_effects.has_motor_side
+
+    @cached_property
+    def _laid_out(self) -> np.ndarray:
+        """What the kernels take of the plant, a copy each since they change it."""
+        return laid_out(*self._lowered)
+
+    @cached_property
+    def _keeps_command(self) -> bool:
+        """Whether no effect makes another input of the command."""
+        kinds = [type(BY_NAME[name]) for name, _ in self.effects]
+        return all(kind.command is Effect.command and kind.fed is Effect.fed for kind in kinds)
 
     def fed(self, u: np.ndarray) -> np.ndarray:
         """What a drive makes of the command u (N,) whose supply varies as it was measured."""
@@ -149,14 +169,13 @@ class ReducedModel:
         return np.ascontiguousarray(u, float)
 
     def _run(self, t: np.ndarray, u: np.ndarray, start, held: Held, refine: int) -> np.ndarray:
-        c, on, p = self._lowered
         out = np.empty((t.size, 4))
         enable, load, y = held.beside(t)
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
         self._count(t, self._price)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
         run = fixed_steps.simulate if self.bends and self.has_motor_side else event_integrator.simulate
-        plant = laid_out(c, on, p)
+        plant = self._laid_out.copy()
         run(t, self.terminal(u), enable, load, y, held.gain, held.every, plant, refine, x0, out)
         return out
 
@@ -197,11 +216,11 @@ class ReducedModel:
         """Whether the winding's current is the drive acceleration itself."""
         return all(type(BY_NAME[name]).winding is Effect.winding for name, _ in self.effects)
 
-    @property
+    @cached_property
     def _touches_reading(self) -> bool:
         return any(_touches_sensor(name) for name, _ in self.effects)
 
-    @property
+    @cached_property
     def _is_instant(self) -> bool:
         """Whether the reading tells the output at the same time."""
         return all(BY_NAME[name].instant for name, _ in self.effects if _touches_sensor(name))
@@ -213,7 +232,7 @@ class ReducedModel:
         """
         return (
             not self.coupled
-            and Coefficients(*self._lowered[0]).delay <= 0
+            and self._with_effects.delay <= 0
             and not any(_touches_sensor(name) or BY_NAME[name].memory for name, _ in self.effects)
         )
 
@@ -222,7 +241,7 @@ class ReducedModel:
         """Whether ``tangents`` can tell how the output changes: of one body, on a bristle or not, that meets no stop,
         creeps nowhere, read by a sensor of a smooth law.
         """
-        c = Coefficients(*self._lowered[0])
+        c = self._with_effects
         return (
             not self.has_motor_side
             and c.creep == 0.0
@@ -245,19 +264,22 @@ class ReducedModel:
         theta, arriving = path[:, 0], self._arriving(t, u)
         read, followed, instant, out = self.read(t, theta), self.behind(y), self._is_instant, []
         maps, slopes, still = np.empty((6, 5, 17)), np.zeros((t.size, 3)), np.zeros(t.size)
-        prepare(t, load, path, laid_out(c, on, p), maps, slopes)
+        nothing = acting((), False)
+        prepare(t, load, path, self._laid_out.copy(), maps, slopes)
         self._count(t, TANGENT * len(others))
         for other in others:
             c_2, on_2, p_2 = other._lowered
-            dc, differ = laid_out(_step(c, c_2) * scale, acting((), False), p[:0]), on != on_2 or bool((p != p_2).any())
+            dc, differ = laid_out(_step(c, c_2) * scale, nothing, p[:0]), on != on_2 or bool((p != p_2).any())
             change, added, dy = np.empty((t.size, 4)), still, still
             if self._touches_reading or other._touches_reading:
                 added = (other.read(t, theta) - read) * scale
                 dy = (other.behind(y) - followed) * scale if instant else -added
-            du, here = (other._arriving(t, u) - arriving) * scale, followed if instant else y
+            du, here = self._moved_input(t, u, arriving, other, scale), followed if instant else y
             motion = (t, arriving, du, enable, load, here, dy, path, maps, slopes, held.gain, held.every)
-            tangent(*motion, laid_out(c, on, p), laid_out(c_2, on_2, p_2), dc, differ, scale, change)
-            change[:, 3] = added + self._read_change(t, theta, read, change[:, 0])
+            tangent(*motion, self._laid_out.copy(), other._laid_out.copy(), dc, differ, scale, change)
+            change[:, 3] = self._read_change(t, theta, read, change[:, 0])
+            if added is not still:
+                change[:, 3] += added
             out.append(change)
         return out
 
@@ -283,11 +305,19 @@ class ReducedModel:
         if self.effort is not None:
             self.effort.add(t, per_second)
 
+    def _moved_input(
+        self, t: np.ndarray, u: np.ndarray, arriving: np.ndarray, other: ReducedModel, scale: float
+    ) -> np.ndarray:
+        """Change (N,) towards another plant, times the scale, of the input that arrives at the motor."""
+        if self._keeps_command and other._keeps_command and self._with_effects.delay == other._with_effects.delay:
+            return np.zeros(t.size)
+        return (other._arriving(t, u) - arriving) * scale
+
     def _arriving(self, t: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Mean (N,) over each uniform sample of the input that arrives at the motor: after a dead time the impulse of a
         switch within a sample is exact.
         """
-        u, delay, h = self.terminal(u), Coefficients(*self._lowered[0]).delay, t[1] - t[0]
+        u, delay, h = self.terminal(u), self._with_effects.delay, t[1] - t[0]
         if delay <= 0:
             return u
         skip = int(delay / h)
@@ -296,8 +326,8 @@ class ReducedModel:
 
     def _read_change(self, t: np.ndarray, theta: np.ndarray, read: np.ndarray, change: np.ndarray) -> np.ndarray:
         """First-order change (N,) of the reading that a change (N,) of the output makes."""
-        most = float(np.max(np.abs(change)))
-        if not self._touches_reading or not 0.0 < most < np.inf:
+        most = float(np.max(np.abs(change))) if self._touches_reading else 0.0
+        if not 0.0 < most < np.inf:
             return change
         small = NUDGE * float(np.ptp(theta)) / most
         return (self.read(t, theta + small * change) - read) / small

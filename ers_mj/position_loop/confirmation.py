@@ -1,4 +1,6 @@
-"""Does data that no fit has seen confirm what was found? Every named effect against the best refit without it."""
+"""Does data that no fit has seen confirm what was found? Every term that must be worth something against the best refit
+without it, begun from the answer's own numbers with the same budget.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +10,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, paired_p
+from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, paired_p, pays
 from ers_mj.decisions.explained import cost, score
 from ers_mj.decisions.thresholds import Policy
 from ers_mj.position_loop.fit import Data, Fit, fitted
-from ers_mj.position_loop.model import LoopModel
+from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run
-from ers_mj.position_loop.selection import Selection, Selector
-from ers_mj.position_loop.terms import without
+from ers_mj.position_loop.selection import Left, Selection, Selector
+from ers_mj.position_loop.terms import INTEGRAL, SPRING, without
 
 FIRST, LAST = 0.7, 0.3  # shares of the only recording that are fitted and held out; the last that is recalibrated on
 COARSER = 3  # blocks of a run that are judged as one
+MOST_FOLDS = 6  # of more recordings several are left out at once
+STEPS = 12  # of a refit to the rest
 
 
 @dataclass(frozen=True)
@@ -42,8 +46,8 @@ class Score:
 
 @dataclass(frozen=True)
 class Confirmed:
-    """What held-out runs say: scores before (without any named effect) and after, and without each name; the models of
-    each fold, before and after, and a sentence of where the held-out data comes from.
+    """What held-out runs say: scores before (without any named effect) and after, and without each term that is judged;
+    the models of each fold, before and after, and a sentence of where the held-out data comes from.
     """
 
     folds: tuple[Fold, ...]
@@ -58,9 +62,15 @@ class Confirmed:
 
 
 def folds_of(runs: Sequence[Run], held: Sequence[Run]) -> tuple[list[Fold], str]:
-    """Recordings of their own, else each one left out in turn, else the end of the only one."""
+    """Recordings of their own, else each one left out in turn (of many every so manieth), else the end of the only
+    one.
+    """
     if held:
         return [Fold(None, tuple(held))], "recordings that were opened after the selection had ended"
+    if len(runs) > MOST_FOLDS:
+        groups = [tuple(runs[k::MOST_FOLDS]) for k in range(MOST_FOLDS)]
+        folds = [Fold(tuple(r for r in runs if r not in out), out) for out in groups]
+        return folds, f"every {MOST_FOLDS}th recording left out in turn; the structure was chosen on all"
     if len(runs) > 1:
         folds = [Fold(tuple(r for r in runs if r is not out), (out,)) for out in runs]
         return folds, "each recording left out in turn; the structure was chosen on all"
@@ -94,8 +104,14 @@ def bare_fit(selector: Selector, selection: Selection) -> Fit:
         for other in selection.named:
             model = without(model, other.name)
         starts.append(replace(model, free=bare.free) if set(model.free) == set(bare.free) else bare)
-    tried = [fitted(model, selector.data, 12) for model in starts]
+    tried = [fitted(model, selector.data, STEPS) for model in starts]
     return fitted(min(tried, key=lambda fit: fit.cost).model, selector.data)
+
+
+def judged(selection: Selection) -> list[Left]:
+    """The terms that held-out data must confirm: the names, and those laws without one that a name could stand for."""
+    names = {x.name for x in selection.named} | {INTEGRAL, SPRING}
+    return [x for x in selection.left if x.name in names]
 
 
 def confirmed(
@@ -105,7 +121,7 @@ def confirmed(
     folds, sentence = folds_of(selector.runs, held)
     while True:
         found = _judged(selector, selection, folds, sentence, policy)
-        doubtful = [x for x in selection.named if not _holds(found, x.name, selector.runs, policy)]
+        doubtful = [x for x in judged(selection) if not _holds(found, x.name, selector.runs, policy)]
         if not doubtful:
             return selection, found
         weakest = min(doubtful, key=lambda x: x.gain)
@@ -120,13 +136,13 @@ def _judged(
     models = _refitted(selection.chosen.model, folds)
     bare = _refitted(base.model, folds) if selection.named else models
     after = scored(models, folds)
-    lesser = {x.name: scored(_refitted(x.fit.model, folds), folds) for x in selection.named}
+    lesser = {x.name: scored(_refitted(x.fit.model, folds), folds) for x in judged(selection)}
     p = {name: _p_value(after, less, policy) for name, less in lesser.items()}
     return Confirmed(tuple(folds), scored(bare, folds), after, lesser, p, tuple(bare), tuple(models), base, sentence)
 
 
 def _refitted(model: LoopModel, folds: Sequence[Fold]) -> list[LoopModel]:
-    return [model if f.training is None else fitted(model, Data.of(f.training), 12).model for f in folds]
+    return [model if f.training is None else fitted(model, Data.of(f.training), STEPS).model for f in folds]
 
 
 def _p_value(after: Score, less: Score, policy: Policy) -> float:
@@ -139,7 +155,7 @@ def _holds(found: Confirmed, name: str, runs: Sequence[Run], policy: Policy) -> 
     ratio = after.rmse / max(less.rmse, 1e-300)
     costs = cost(after.misfit, 1.0), cost(less.misfit, 1.0)
     held = HeldOut(found.p_values[name], (after.rmse, less.rmse), noise, costs, ratio, math.log(ratio))
-    return is_confirmed(held, lambda: None, policy)
+    return is_confirmed(held, lambda: None, policy) and pays(held, lambda: None, policy)
 
 
 # -- what a day changes ---------------------------------------------------------------------------------------------
@@ -154,20 +170,9 @@ def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
         for run in fold.held:
             seen = run.t[run.scored]
             share = (seen[0] + LAST * (seen[-1] - seen[0])) / run.t[-1]
-            state = replace(model.having(hold=model["hold"]), free=("K", "hold", "c_2"))
-            again = fitted(_OnlyLetters.made_of(state), Data.of([run.only(0.0, share)]), 8).model
+            state = only_letters(model.having(hold=model["hold"]), ("K", "hold", "c_2"))
+            again = fitted(state, Data.of([run.only(0.0, share)]), 8).model
             rest = run.only(share, 1.0)
             e = (rest.y - again.predicted(rest))[rest.scored]
             squares, count = squares + float(e @ e), count + e.size
     return math.sqrt(squares / max(count, 1))
-
-
-class _OnlyLetters(LoopModel):
-    """A model of which no effect's numbers are fitted."""
-
-    @staticmethod
-    def made_of(model: LoopModel) -> _OnlyLetters:
-        return _OnlyLetters(model.values, model.free, model.effects, model.side, model.scales)
-
-    def layout(self):
-        return [f for f in super().layout() if not f.owner]

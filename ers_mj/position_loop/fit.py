@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ers_mj.effects import BY_NAME
+from ers_mj.position_loop import beside
 from ers_mj.position_loop.model import Free, LoopModel
 from ers_mj.position_loop.runs import Run
 from ers_mj.solvers.levenberg_marquardt import Damping, Descent
@@ -72,29 +73,44 @@ class Data:
     @staticmethod
     def of(runs: Sequence[Run]) -> Data:
         travel = max(float(np.nanmax(run.y) - np.nanmin(run.y)) for run in runs)
-        blocks, base = [], 0
+        blocks, second, base = [], [], 0
         for run in runs:
-            block = run.block[run.scored]
-            blocks.append(block - block[0] + base)
+            block = run.block - run.block[run.scored][0] + base
+            blocks.append(block[run.scored])
+            second += [block[run.beside.scored]] if run.beside is not None else []
             base = int(blocks[-1][-1]) + 1
-        return Data(tuple(runs), SEARCH.soft * travel, np.unique(np.concatenate(blocks), return_inverse=True)[1])
+        return Data(
+            tuple(runs), SEARCH.soft * travel, np.unique(np.concatenate(blocks + second), return_inverse=True)[1]
+        )
+
+    def alone(self, run: Run) -> Data:
+        """One run, its errors counted as here."""
+        return replace(Data.of([run]), soft=self.soft)
 
     @property
     def blocks(self) -> int:
-        return int(self.block[-1]) + 1
+        return int(self.block.max()) + 1
 
     def residuals(self, model: LoopModel) -> np.ndarray:
-        """Errors (N,) of the scored samples in noise sigmas, large ones softened."""
+        """Errors (N,) of the scored samples in noise sigmas, large ones softened; those of a second signal last."""
         self.simulated[0] += 1
-        return np.concatenate([self._softened(run, model) for run in self.runs])
+        motions = [model.motion(run, self.refine) for run in self.runs]
+        errors = [
+            _softened((run.y - model.logged(m))[run.scored], self.soft, run.sigma)
+            for run, m in zip(self.runs, motions, strict=True)
+        ]
+        for signal, e in beside.errors(model, self.runs, motions):
+            errors.append(_softened(e, SEARCH.soft * float(np.ptp(signal.values[signal.scored])), signal.sigma))
+        return np.concatenate(errors)
 
-    def _softened(self, run: Run, model: LoopModel) -> np.ndarray:
-        e = (run.y - model.predicted(run, self.refine))[run.scored]
-        x = e / self.soft
-        with np.errstate(invalid="ignore", over="ignore"):
-            small = np.sqrt(2.0 * (np.sqrt(1.0 + x * x) - 1.0))
-        soft = np.where(np.abs(x) < 1e-4, np.abs(x), small)
-        return np.copysign(soft, e) * (self.soft / run.sigma)
+
+def _softened(e: np.ndarray, scale: float, sigma: float) -> np.ndarray:
+    """Errors over sigma; beyond ``scale`` their squares grow as their size does."""
+    x = e / scale
+    with np.errstate(invalid="ignore", over="ignore"):
+        small = np.sqrt(2.0 * (np.sqrt(1.0 + x * x) - 1.0))
+    soft = np.where(np.abs(x) < 1e-4, np.abs(x), small)
+    return np.copysign(soft, e) * (scale / sigma)
 
 
 class _Problem:

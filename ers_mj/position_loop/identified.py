@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.data.recording import Recording
-from ers_mj.position_loop.fit import Fit, polished
+from ers_mj.position_loop.fit import Data, Fit, polished
 from ers_mj.position_loop.intervals import Intervals
 from ers_mj.position_loop.runs import runs_of
 from ers_mj.position_loop.selection import Selection, Selector
@@ -19,9 +19,10 @@ WRONG = 1.5  # mean squared error in noise variances from which the bare loop is
 
 @dataclass(frozen=True)
 class Identified:
-    """The fit, its intervals, Eq. (13)'s fitness [output unit^2 s], simulations and time."""
+    """The fit and its data, its intervals, Eq. (13)'s fitness [output unit^2 s], simulations and time."""
 
     fit: Fit
+    data: Data
     intervals: Intervals
     fitness: float
     evaluations: int
@@ -45,4 +46,6 @@ def identify_loop(
     errors = [((run.y - fit.model.predicted(run)) ** 2)[run.scored].mean() * run.t[-1] for run in selector.runs]
     progress("telling the intervals", 0.9)
     found = Intervals.of(fit, selector.data)
-    return Identified(fit, found, float(np.sum(errors)), selector.data.simulated[0], time.perf_counter() - begun)
+    return Identified(
+        fit, selector.data, found, float(np.sum(errors)), selector.data.simulated[0], time.perf_counter() - begun
+    )

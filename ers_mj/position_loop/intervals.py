@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import stdtrit
 
+from ers_mj.position_loop import beside
 from ers_mj.position_loop.fit import Data, Fit, fitted, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
+from ers_mj.solvers.student import quantile
 
 RUN = 5  # neighbouring blocks that are taken as one
 FEWEST = 3  # left-out refits from which they count
@@ -59,7 +60,7 @@ class Intervals:
         if len(left_out) >= FEWEST and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
         spread += np.diag([_inexact(f, q) ** 2 for f, q in zip(layout, model.vector(layout), strict=True)])
-        return Intervals(model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
+        return Intervals(model, tuple(layout), spread, quantile(max(n - len(layout), 1), 0.975))
 
     def told(self, owner: str, name: str) -> Told | None:
         """A fitted number."""
@@ -81,6 +82,24 @@ class Intervals:
             "L/K": lambda m: m["L"] / m["K"],
             "I/K": lambda m: m["I"] / m["K"],
         }[name]
+        return self._of(rule)
+
+    def input_gain(self, data: Data) -> Told | None:
+        """b [output unit/s^2 of the drive per unit of the signal recorded beside]; None where there is none."""
+        runs = [run for run in data.runs if run.beside is not None and not run.beside.is_current]
+        if not runs:
+            return None
+
+        def factor(model: LoopModel) -> float:
+            return float(beside.factors(model, runs, [model.motion(run) for run in runs])[0])
+
+        found = self._of(lambda model: abs(1.0 / factor(model)))
+        if found is None or factor(self.model) > 0.0:
+            return found
+        return replace(found, value=-found.value, ci95=(-found.ci95[1], -found.ci95[0]))
+
+    def _of(self, rule: Callable[[LoopModel], float]) -> Told | None:
+        """A positive number that follows from the model."""
         value, z = rule(self.model), self.model.vector(self.layout)
         if not math.isfinite(value) or value <= 0.0:
             return None

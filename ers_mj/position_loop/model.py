@@ -52,6 +52,7 @@ LETTERS: Mapping[str, Letter] = {
     "a_2": Letter("1/s", lower=1e-4),
     "c_2": Letter("{y}/s^2", lower=1e-9),
     "hold": Letter("{y}/s^2", positive=False, lower=-math.inf, size=5.0),
+    "offset": Letter("{y}", positive=False, lower=-math.inf, size=0.01),  # of the log's sensor alone
 }
 SCALED = ("K", "I", "D", "L", "least", "most", "grease", "a_1", "a_2", "c_2", "hold")  # by one over the inertia
 WIDER = {
@@ -246,9 +247,25 @@ class LoopModel:
         """Free run (N, 4) from the first sample: load's angle and speed, motor side's angle, drive."""
         loop, plant = self.of(run)
         out = np.empty((run.t.size, 4))
-        simulate(run.t, run.r, run.enable, plant, np.array(loop, float), *run.start, run.before, refine, out)
+        theta, w = run.start
+        start = theta - self["offset"], w
+        simulate(run.t, run.r, run.enable, plant, np.array(loop, float), *start, run.before, refine, out)
         return out
 
     def predicted(self, run: Run, refine: int = 1) -> np.ndarray:
         """What the log shows (N,)."""
-        return self.motion(run, refine)[:, 2 if self.side == "motor" else 0]
+        return self.logged(self.motion(run, refine))
+
+    def logged(self, motion: np.ndarray) -> np.ndarray:
+        """The column (N,) of a motion that is logged."""
+        return motion[:, 2 if self.side == "motor" else 0] + self["offset"]
+
+
+def only_letters(model: LoopModel, letters: tuple[str, ...]) -> LoopModel:
+    """The model of which these letters alone are fitted, and no effect's numbers."""
+    return _OnlyLetters(model.values, letters, model.effects, model.side, model.scales)
+
+
+class _OnlyLetters(LoopModel):
+    def layout(self):
+        return [f for f in super().layout() if not f.owner]

@@ -10,9 +10,11 @@ import numpy as np
 
 from ers_mj.data.prepared import start_seen
 from ers_mj.data.recording import Recording
-from ers_mj.data.sensor_faults import spikes
+from ers_mj.data.sensor_faults import converter_step, spikes
 from ers_mj.effects.quantities import Scales
+from ers_mj.errors import InputError
 
+KINDS = {"u_V": "voltage", "u_duty_pct": "duty", "i_A": "current", "i_cmd_A": "current"}  # of a drive's signals
 BLOCK = 0.1  # [s] that a servo's errors hang together
 
 
@@ -28,9 +30,23 @@ class Reading:
     samples: int = 10  # or so many samples
     rest: float = 0.1  # [s] within which an output that has been commanded away leaves its place
     sure: float = 4.0  # standard deviations by which it must do so
+    unsaturated: float = 0.9  # of the largest drive signal, below which it follows the loop's error
 
 
 READING = Reading()
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """A drive signal recorded beside: values and the samples that are scored (N,), noise sigma [its own unit],
+    that unit, and whether it is a current.
+    """
+
+    values: np.ndarray
+    scored: np.ndarray
+    sigma: float
+    unit: str
+    is_current: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +55,8 @@ class Run:
     sigma [output unit] and the converter's quantum, (angle, speed) at the start, and the reference before it.
 
     ``gain`` is the firmware's gain over that of the first run, ``inertia`` and ``pull`` the load's m l^2 and m l over
-    those of the first; ``second`` (N,) a drive signal recorded beside, NaN where missing, or None.
+    those of the first; ``beside`` a drive signal to explain as well, or None; ``offset`` [output unit]
+    what was taken off its output.
     """
 
     name: str
@@ -55,7 +72,8 @@ class Run:
     gain: float = 1.0
     inertia: float = 1.0
     pull: float = 1.0
-    second: np.ndarray | None = field(default=None, repr=False)
+    beside: Beside | None = field(default=None, repr=False)
+    offset: float = 0.0
 
     @property
     def sample_time(self) -> float:
@@ -67,10 +85,17 @@ class Run:
         """Block (N,) of each sample."""
         return ((self.t - self.t[0]) / BLOCK).astype(np.int64)
 
+    def shifted(self, offset: float) -> Run:
+        """The run with the offset of its log's sensor taken off."""
+        start = self.start[0] - offset, self.start[1]
+        return replace(self, y=self.y - offset, start=start, offset=self.offset + offset)
+
     def only(self, begin: float, end: float) -> Run:
         """The run, of which only the samples between these shares of its time are scored."""
         share = (self.t - self.t[0]) / (self.t[-1] - self.t[0])
-        return replace(self, scored=self.scored & (share >= begin) & (share <= end))
+        within = (share >= begin) & (share <= end)
+        beside = replace(self.beside, scored=self.beside.scored & within) if self.beside is not None else None
+        return replace(self, scored=self.scored & within, beside=beside)
 
 
 def runs_of(recordings: Sequence[Recording], first: Recording | None = None) -> list[Run]:
@@ -89,7 +114,7 @@ def _run(recording: Recording, first: Recording) -> Run:
     start, travel = started(t, y, sigma), float(np.nanmax(y) - np.nanmin(y))
     is_settled = stood(t, recording.u, y, sigma, travel)
     inertia, pull = _load(recording, first)
-    return Run(
+    run = Run(
         recording.name,
         t,
         np.ascontiguousarray(recording.u, float),
@@ -103,8 +128,32 @@ def _run(recording: Recording, first: Recording) -> Run:
         gain=recording.kp / first.kp if recording.kp and first.kp else 1.0,
         inertia=inertia,
         pull=pull,
-        second=recording.second,
     )
+    return replace(run, beside=_beside(recording, run))
+
+
+def _beside(recording: Recording, run: Run) -> Beside | None:
+    """The second signal of a recording; its noise is at least what the output's noise becomes within the loop.
+
+    Raises:
+        InputError: what is to be explained is no signal of the drive.
+    """
+    if recording.second is None:
+        return None
+    if recording.second_name not in KINDS:
+        raise InputError(
+            f"{recording.name}: --second {recording.second_name} under a position command, a signal of its drive was"
+            f" expected ({', '.join(KINDS)})"
+        )
+    x = np.asarray(recording.second, float)
+    scored = np.isfinite(x) & run.scored
+    if not scored.any() or not float(np.ptp(x[scored])) > 0.0:
+        raise InputError(f"{recording.name}: {recording.second_name} never changes, a signal of the drive was expected")
+    e = run.r - run.y
+    small = scored & (np.abs(x) < READING.unsaturated * np.max(np.abs(x[scored])))
+    slope = float(np.dot(x[small], e[small]) / max(np.dot(e[small], e[small]), 1e-300)) if small.any() else 0.0
+    sigma = max(noise_of(x, converter_step(x[scored]) or 0.0), abs(slope) * run.sigma)
+    return Beside(x, scored, sigma, recording.second_unit, KINDS[recording.second_name] == "current")
 
 
 def _driven(enable: np.ndarray) -> np.ndarray:

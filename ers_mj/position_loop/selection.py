@@ -18,7 +18,7 @@ from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain, jacobian
-from ers_mj.position_loop.model import LoopModel
+from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run, scales_of
 from ers_mj.position_loop.terms import (
     CONSTANT,
@@ -47,6 +47,7 @@ class Effort:
     """How far a search goes."""
 
     rounds: int = 6
+    alignments: int = 3  # of logs of different offsets
     screened: float = 50.0  # [s] of recordings on which starts are compared
     several: Halving = Halving(looked=6, first=10, kept=3)  # starts of the bare loop
     parted: Halving = Halving(looked=5, first=6, kept=2)  # starts of two bodies
@@ -111,7 +112,11 @@ class Selector:
     """A selection under way on some runs."""
 
     def __init__(self, runs: Sequence[Run], is_angle: bool, jobs: int = 1, policy: Policy = POLICY):
-        self.data, self.is_angle, self.jobs, self.policy = Data.of(runs), is_angle, jobs, policy
+        self.is_angle, self.jobs, self.policy = is_angle, jobs, policy
+        self._take(runs)
+
+    def _take(self, runs: Sequence[Run]) -> None:
+        self.data = Data.of(runs)
         some = spread_out(runs, EFFORT.screened)
         self.screen = self.data if len(some) == len(runs) else Data.of(some)
 
@@ -122,7 +127,7 @@ class Selector:
     def run(self, progress: Progress = lambda text, share: None) -> Selection:
         """Base, rounds, and what can be left out again."""
         progress("fitting the loop", 0.05)
-        current = base = self.base()
+        current = base = self.aligned(self.base())
         rounds: list[tuple[Compared, ...]] = []
         for name in FIRST:  # what bends all the rest, before anything that could stand for it
             if self._may_gain(current):
@@ -164,6 +169,21 @@ class Selector:
         found = self._whole(best(starts, self.screen, EFFORT.full, EFFORT.several))
         within = self._whole(best(delayed_within(found.model), self.screen, EFFORT.full))
         return self.unburdened(within if gain(found, within) > 0.0 else found)
+
+    def aligned(self, base: Fit) -> Fit:
+        """The bare loop once the logs' offsets against the first one are taken off, where they leave half of what it
+        leaves: what differs between recordings comes before structure.
+        """
+        for _ in range(EFFORT.alignments if len(self.runs) > 1 else 0):
+            alone = only_letters(base.model, ("offset",))
+            each = [fitted(alone, self.data.alone(run), EFFORT.tried) for run in self.runs]
+            if sum(fit.cost for fit in each) > 0.5 * base.cost or not self._may_gain(base):
+                break
+            first = each[0].model["offset"]
+            runs = [run.shifted(fit.model["offset"] - first) for run, fit in zip(self.runs, each, strict=True)]
+            self._take(runs)
+            base = fitted(base.model, self.data, EFFORT.full)
+        return base
 
     def _whole(self, fit: Fit) -> Fit:
         """A fit to some of the runs refitted to all."""

@@ -5,6 +5,7 @@ nothing else.
 from __future__ import annotations
 
 import json
+import math
 import os
 import resource
 import shutil
@@ -15,10 +16,15 @@ import tempfile
 import time
 from pathlib import Path
 
+from ers_mj.passing import passing
 from ers_mj.proving.sealing import hashes
 
 LIMIT = 300.0  # [s] of one processor that a diagnosis may take
-START = """import resource, runpy, sys
+PATIENCE = 0.7  # [s] that a child has to end when it is told to
+START = """import os, resource, runpy, sys
+from ers_mj.passing import end_with_parent, pass_with_process
+pass_with_process(os.getcwd())
+end_with_parent()
 resource.setrlimit(resource.RLIMIT_CPU, ({limit}, {limit} + 5))
 runpy.run_module("ers_mj", run_name="__main__", alter_sys=True)"""
 
@@ -29,18 +35,18 @@ class Asker:
     def __init__(self, code: str, limit: float = LIMIT):
         self.code, self.limit = code, limit
         self.children: set[subprocess.Popen] = set()
-        self.stopped = False
+        self.stopped_at = math.inf
 
     def ask(self, case: Path) -> dict | None:
         """The answer with what it cost; a failure or a run out of time is an answer without a document. None once
         stopped.
         """
         bound = {"case": case.name, "files_sha256": hashes(case), "code": self.code}
-        with tempfile.TemporaryDirectory(prefix="ers-blind-") as folder:
+        with passing(Path(tempfile.mkdtemp(prefix="ers-blind-"))) as folder:
             for path in case.iterdir():
                 shutil.copy(path, folder)
-            cost, text, complaint = self.run(Path(folder))
-        if self.stopped:
+            cost, text, complaint = self.run(folder)
+        if self.stopped_at < math.inf:
             return None
         document, error = None, None
         try:
@@ -112,12 +118,13 @@ class Asker:
                 child.returncode = os.waitstatus_to_exitcode(status)
                 return child.returncode, usage
             # by the clock a busy machine takes longer than by the processor, which the child limits itself
-            if self.stopped or time.monotonic() - began > 4.0 * self.limit:
+            now = time.monotonic()
+            if now - self.stopped_at > PATIENCE or now - began > 4.0 * self.limit:
                 child.kill()
             time.sleep(0.05)
 
     def stop(self) -> None:
-        """End every child that this asker started."""
-        self.stopped = True
+        """End every child that this asker started, leaving it a moment to tidy up."""
+        self.stopped_at = time.monotonic()
         for child in list(self.children):
-            child.kill()
+            child.terminate()

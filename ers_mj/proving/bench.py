@@ -21,9 +21,20 @@ from ers_mj.proving.quick import advance, simulate
 from ers_mj.proving.sampling import Run, Setup
 from ers_mj.proving.sizing import STIFF, levenberg
 
-FINE = 2e-5  # [own s], the step of the recordings
-ROUGH = 3e-4  # the longest while sizing; two fifths of the winding's time constant where that is less
-CONTACTS = 4e-5  # while sizing what is stiff
+
+@dataclass(frozen=True)
+class Steps:
+    """Of the integration [own s]."""
+
+    finest: float = 2e-5  # of recordings with what is stiff, or a winding
+    fine: float = 4e-5  # of all others
+    stiff: float = 4e-5  # while sizing what is stiff
+    rough: float = 3e-4  # while sizing, at most
+    winding: float = 0.2  # of its time constant, while sizing
+    least: float = 5e-5  # while sizing
+
+
+STEPS = Steps()
 
 
 @njit(cache=True)
@@ -61,6 +72,18 @@ def delayed(reference: np.ndarray, samples: float) -> np.ndarray:
     return (1.0 - samples + whole) * late(whole) + (samples - whole) * late(whole + 1)
 
 
+def is_stiff(effects: Sequence[dict]) -> bool:
+    """Whether one of these needs a finer step."""
+    return any(effect["label"] in STIFF for effect in effects)
+
+
+def recorded(servo: Servo, effects: Sequence[dict], step: float | None = None) -> list[Run]:
+    """Every recording with these effects beside what the servo always has; the finest step by default."""
+    if step is None:
+        step = STEPS.finest if is_stiff(effects) or servo.params["L"] else STEPS.fine
+    return [_run(servo, record, k, effects, step) for k, record in enumerate(servo.records)]
+
+
 @dataclass
 class Bench:
     """A servo with the runs that its effect-free self makes."""
@@ -70,29 +93,21 @@ class Bench:
     def __post_init__(self) -> None:
         self.sigma = self.servo.sensor["noise_sigma_eff_rad"]
         self.ordinary_inductance = self.servo.params["L"]
-        p = self.servo.params
-        follows = p.get("torque_s") or p["L"] / p["R"]
-        self.rough = float(np.clip(0.4 * follows, 5e-5, ROUGH))
-        self.runs = self.recorded([], self.rough)
+        winding = self.servo.params["L"] / self.servo.params["R"]
+        self.rough = STEPS.rough
+        if winding:
+            self.rough = float(np.clip(STEPS.winding * winding, STEPS.least, STEPS.rough))
+        self.runs = recorded(self.servo, [], self.rough)
         self.basis = self._basis()
-
-    # -- recordings ----------------------------------------------------------------------------------------------
-
-    def recorded(self, effects: Sequence[dict], step: float, servo: Servo | None = None) -> list[Run]:
-        """Every recording with these effects beside what the servo always has."""
-        servo = servo or self.servo
-        return [_run(servo, record, k, effects, step) for k, record in enumerate(servo.records)]
 
     def step_for(self, effects: Sequence[dict]) -> float:
         """[own s] step that does for sizing these effects."""
-        return CONTACTS if any(effect["label"] in STIFF for effect in effects) else self.rough
-
-    # -- what a model without the effects leaves -----------------------------------------------------------------
+        return STEPS.stiff if is_stiff(effects) else self.rough
 
     def misses(self, servo: Servo, runs: Sequence[Run]) -> list[np.ndarray]:
         """(samples,) of each recording: the angle less what this servo's model makes of it [sigma]."""
         if servo.closed:
-            models = [run.clean for run in self.recorded([], self.rough, servo)]
+            models = [run.clean for run in recorded(servo, [], self.rough)]
         else:
             models = [self._model(servo, record, run) for record, run in zip(servo.records, runs)]
         return [
@@ -128,12 +143,12 @@ class Bench:
 
     def projected(self, effects: list[dict]) -> float:
         """[sigma] rms of what the effects move, less what small changes of the parameters can imitate."""
-        change = np.concatenate(self.misses(self.servo, self.recorded(effects, self.step_for(effects))))
+        change = np.concatenate(self.misses(self.servo, recorded(self.servo, effects, self.step_for(effects))))
         return float(np.sqrt(np.mean((change - self.basis @ (self.basis.T @ change)) ** 2)))
 
     def refitted(self, effects: list[dict]) -> float:
         """[sigma] rms that the refitted model leaves."""
-        return self.pooled(self.refit(self.recorded(effects, self.step_for(effects)), 4))
+        return self.pooled(self.refit(recorded(self.servo, effects, self.step_for(effects)), 4))
 
 
 def _run(servo: Servo, record: Record, number: int, effects: Sequence[dict], step: float) -> Run:

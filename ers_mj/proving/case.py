@@ -41,7 +41,7 @@ def plans(count: int, seed: int) -> list[Plan]:
     out = []
     for index, kind in enumerate(kinds):
         labels = (lists[kind].pop(0),) if kind in lists else several(rng, LISTED) if kind == "several" else ()
-        out.append(Plan(index, kind, labels))
+        out.append(Plan(index, kind, labels, "rudder", index))
     return out
 
 
@@ -75,8 +75,7 @@ class Made:
 
 def make(plan: Plan, seed: int) -> tuple[dict[str, str], dict]:
     """({file name: text} that is handed out, the truth) of one case; it does not depend on the others."""
-    number = plan.index if plan.number is None else plan.number
-    rng = np.random.default_rng([seed, 1, number])
+    rng = np.random.default_rng([seed, 1, plan.number])
     made = _made(plan, rng)
     sensor = made.servo["sensor"]
     files = {"datasheet.toml": _datasheet(sensor["sample_rate_hz"])}

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ers_mj.data.tables import reason, write_whole
+from ers_mj.data.tables import reason
+from ers_mj.data.whole import write_whole
 from ers_mj.errors import ErsError, InputError
 from ers_mj.proving.scoring import row_of
 from ers_mj.proving.sealing import hash_of, hashes

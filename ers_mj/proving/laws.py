@@ -50,12 +50,19 @@ def bus_target(p, v, i):
 
 
 @njit(cache=True)
-def terminal_voltage(p, y, u, gain):
-    """[V] what the drive puts on the motor when told u."""
+def driven_voltage(p, y, u, gain):
+    """[V] what the drive puts on the motor when told u, whatever the current."""
     v = saturate(p, dead_zone(p, u)) * gain
     if p.sag_R > 0.0:
         bus = y[BUS] if p.sag_tau > 0.0 else bus_target(p, v, y[CUR])
         v *= bus / p.sag_V
+    return v
+
+
+@njit(cache=True)
+def terminal_voltage(p, y, u, gain):
+    """[V] what the drive puts on the motor when told u, what it takes back beyond its current's limit included."""
+    v = driven_voltage(p, y, u, gain)
     if p.lim_A > 0.0 and p.lim_form == 1.0:
         v -= np.copysign(12.0 * p.R * max(abs(y[CUR]) - p.lim_A, 0.0), y[CUR])
     return v
@@ -89,22 +96,39 @@ def torque_constant(p, y):
 
 
 @njit(cache=True)
-def current_rate(p, y, u, gain):
-    """[A/s] L i' = v - R i - K_e n w - brush drop."""
+def opposed(p, y, v):
+    """[V] (v with what tachometer and brushes add to it, the motor's back-EMF)."""
     i = y[CUR]
-    if p.torque_s > 0.0:  # a drive that is told a torque: its current follows, whatever the speed
-        return (terminal_voltage(p, y, u, gain) - i) / p.torque_s
     has_motor = p.two > 0.0 or p.rod > 0.0
     speed = y[WM] if has_motor else y[W]
     angle = y[THM] if has_motor else y[TH]
-    warm = warmth(p, y)
-    emf = p.K_e * (1.0 - p.th_beta * warm) * p.n * ratio(p, y[TH] - p.theta_0) * speed
-    v = terminal_voltage(p, y, u, gain)
+    emf = p.K_e * (1.0 - p.th_beta * warmth(p, y)) * p.n * ratio(p, y[TH] - p.theta_0) * speed
     if p.tacho_a > 0.0:
         v += p.tacho_a * emf * np.sin(p.n * angle + p.tacho_ph)
     if p.brush_V > 0.0:
         v -= np.copysign(p.brush_V * np.log1p(abs(i) / p.brush_i), i)
-    rate = (v - p.R * (1.0 + p.th_alpha * warm) * i - emf) / (p.L * (1.0 - 0.4 * np.tanh(p.L_sat * i) ** 2))
+    return v, emf
+
+
+@njit(cache=True)
+def settled_current(p, y, u, gain):
+    """[A] where the winding has no inductance: L i' = 0; a drive that is told a torque holds its current at u."""
+    i = driven_voltage(p, y, u, gain)
+    if p.torque == 0.0:
+        v, emf = opposed(p, y, i)
+        i = (v - emf) / (p.R * (1.0 + p.th_alpha * warmth(p, y)))
+    if p.lim_A > 0.0 and abs(i) > p.lim_A:
+        i = np.copysign(p.lim_A if p.lim_form == 0.0 else (abs(i) + 12.0 * p.lim_A) / 13.0, i)
+    return i
+
+
+@njit(cache=True)
+def current_rate(p, y, u, gain):
+    """[A/s] L i' = v - R i - K_e n w - brush drop."""
+    i = y[CUR]
+    v, emf = opposed(p, y, terminal_voltage(p, y, u, gain))
+    resistance = p.R * (1.0 + p.th_alpha * warmth(p, y))
+    rate = (v - resistance * i - emf) / (p.L * (1.0 - 0.4 * np.tanh(p.L_sat * i) ** 2))
     if p.lim_A > 0.0 and p.lim_form == 0.0 and abs(i) >= p.lim_A and rate * i > 0.0:
         return 0.0
     return rate

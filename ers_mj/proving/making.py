@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.proving.bench import FINE, Bench
+from ers_mj.proving.bench import Bench, recorded
 from ers_mj.proving.concealed.loop import speed_limit
 from ers_mj.proving.families.base import RUDDER_INERTIA, RUDDER_SUPPLY, Family, Servo, lumped, top_speed
 from ers_mj.proving.faults import draw_faults, with_faults
@@ -43,8 +44,7 @@ def make(family: Family, plan: Plan, seed: list[int]) -> tuple[dict[str, str], d
     """({file name: text} that is handed out, the truth) of one case; `seed` alone draws it."""
     rng = np.random.default_rng(seed)
     made = _made(family, plan, rng)
-    files = _files(rng, made)
-    return files, _truth(plan, seed, made)
+    return files_of(rng, made.servo, made.runs, made.faults, made.sheet), _truth(plan, seed, made)
 
 
 def _made(family: Family, plan: Plan, rng: np.random.Generator) -> Made:
@@ -53,7 +53,7 @@ def _made(family: Family, plan: Plan, rng: np.random.Generator) -> Made:
     context = context_of(bench)
     concealed = [conceal(rng, bench, name, context, draw_either, VISIBILITY.wider) for name in plan.labels]
     faint = clutter(rng, bench, list(plan.labels), context, family.effects)
-    runs = bench.recorded([*concealed, *faint], FINE)
+    runs = recorded(servo, [*concealed, *faint])
     left = bench.refit(runs, 8)
     inherent = [*servo.inherent_names, *_winding(bench, plan.labels)]
     unit, shift = servo.units.angle, servo.shift
@@ -94,14 +94,16 @@ def _winding(bench: Bench, labels: tuple[str, ...]) -> tuple[str, ...]:
 # -- files -----------------------------------------------------------------------------------------------------------
 
 
-def _files(rng: np.random.Generator, made: Made) -> dict[str, str]:
-    servo = made.servo
-    refers = not servo.closed and rng.random() < REFERENCES and "wrap" not in [f["kind"] for f in made.faults]
+def files_of(
+    rng: np.random.Generator, servo: Servo, runs: Sequence[Run], faults: list[dict], sheet: str
+) -> dict[str, str]:
+    """{file name: text} of these recordings with their faults, and of the datasheet of that kind."""
+    refers = not servo.closed and rng.random() < REFERENCES and "wrap" not in [f["kind"] for f in faults]
     files = {}
-    for k, run in enumerate(made.runs):
-        table = with_faults(_table(rng, servo, k, run, refers), made.faults, k, servo.columns)
+    for k, run in enumerate(runs):
+        table = with_faults(_table(rng, servo, k, run, refers), faults, k, servo.columns)
         files[f"rec{k + 1}.csv"] = _csv(table, servo)
-    text = sheet_text(rng, made.sheet, *_known(servo), rate_hz=servo.sensor["sample_rate_hz"])
+    text = sheet_text(rng, sheet, *_known(servo), rate_hz=servo.sensor["sample_rate_hz"])
     return files if text is None else {"datasheet.toml": text, **files}
 
 

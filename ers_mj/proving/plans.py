@@ -21,8 +21,8 @@ class Plan:
     index: int
     kind: str
     labels: tuple[str, ...]
-    family: str = "rudder"
-    number: int | None = None
+    family: str
+    number: int
 
 
 def several(rng: np.random.Generator, names: tuple[str, ...]) -> tuple[str, ...]:

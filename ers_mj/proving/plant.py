@@ -33,7 +33,7 @@ FIELDS = """J B K_t K_e k_s T_LH F_c R L theta_0 n share_J share_B share_F
     dist_T dist_t0 dist_d dist_form gust_T gust_w gust_ph gust_form
     lag_s lag_form nl_a nl_P nl_ph nl_form q_step q_form adc_step
     app_J app_k app_c bw_T bw_x bw_n age_a age_t0 age_D brush_V brush_i angdamp_a angdamp_P tacho_a tacho_ph
-    kt_sat mxw_k mxw_tau run_a run_D L_sat rod torque_s grav_k""".split()
+    kt_sat mxw_k mxw_tau run_a run_D L_sat rod torque quasi grav_k""".split()
 PLANT = np.dtype([(name, "f8") for name in FIELDS])
 """Everything that the compiled code reads, one number a field; zero means absent."""
 

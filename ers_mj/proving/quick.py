@@ -21,7 +21,16 @@ import numpy as np
 from numba import njit
 
 from ers_mj.proving.catalogue import put_effects
-from ers_mj.proving.laws import bristle_rate, current_rate, dry, free_torques, friction_level, inertia, slow_rates
+from ers_mj.proving.laws import (
+    bristle_rate,
+    current_rate,
+    dry,
+    free_torques,
+    friction_level,
+    inertia,
+    settled_current,
+    slow_rates,
+)
 from ers_mj.proving.plant import APP, BRI, BUS, CUR, LAG, STATES, TH, THM, WM, W, plant_of
 from ers_mj.proving.sampling import ALONE, Run, Setup, take
 
@@ -34,6 +43,8 @@ COARSE, FINE, ROUGH = 4e-5, 1e-5, 1e-4
 @njit(cache=True)
 def rates(p, y, t, u, gain, rudder, motor, side, dy):
     """y' with friction directions `rudder`, `motor` (+-1, 0 at rest) and preload side `side` (+-1) held."""
+    if p.quasi > 0.0:
+        y[CUR] = settled_current(p, y, u, gain)
     tau, tau_m = free_torques(p, y, t)
     dy[TH] = dy[W] = 0.0
     if rudder != 0.0:
@@ -45,7 +56,7 @@ def rates(p, y, t, u, gain, rudder, motor, side, dy):
         if motor != 0.0:
             dy[THM] = y[WM]
             dy[WM] = (tau_m - motor * dry(p, y, y[WM], motor, True)) / (p.share_J * p.J)
-    dy[CUR] = current_rate(p, y, u, gain)
+    dy[CUR] = 0.0 if p.quasi > 0.0 else current_rate(p, y, u, gain)
     if p.pre_s0 > 0.0:
         level = friction_level(p, y, y[W], np.sign(y[W])) * (1.0 - p.two * p.share_F)
         dy[BRI] = bristle_rate(p, y, level) if rudder != 0.0 else 0.0
@@ -107,6 +118,8 @@ def advance(p, y, t, u, gain, h, work):
     """One step of length h, cut at every reversal and at every pass of theta_0."""
     out, left, hold, hold_m = work[3], h, False, False
     for count in range(10):
+        if p.quasi > 0.0:
+            y[CUR] = settled_current(p, y, u, gain)
         rudder, motor, side = directions(p, y, t)
         rudder = 0.0 if hold and y[W] == 0.0 else rudder
         motor = 0.0 if hold_m and y[WM] == 0.0 else motor

@@ -14,7 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
-from ers_mj.data.tables import reason, write_whole
+from ers_mj.data.tables import reason
+from ers_mj.data.whole import write_whole
 from ers_mj.errors import InputError
 
 SETTINGS, SEALED, ANSWERS = "settings.json", "sealed", "answers"
@@ -81,9 +82,21 @@ def begin(folder: Path, settings: Mapping, force: bool) -> bool:
     return False
 
 
+def refuse_foreign(folder: Path) -> None:
+    """Raise InputError where a folder holds folders of a proof's names, and no proof."""
+    held = [path for path in _kept(folder) if path.exists()]
+    if held and _read(folder / SETTINGS) is None:
+        raise InputError(f"{held[0]}: is of no proof, move it, or name another folder with --out")
+
+
+def _kept(folder: Path) -> list[Path]:
+    """The folders in which a proof keeps what it made."""
+    return [folder / SEALED, folder / ANSWERS, *folder.glob("case-[0-9][0-9][0-9]*")]
+
+
 def _clear(folder: Path) -> None:
     """Remove what an earlier proof wrote, and nothing else."""
-    for path in [folder / SEALED, folder / ANSWERS, *folder.glob("case-[0-9][0-9][0-9]*")]:
+    for path in _kept(folder):
         shutil.rmtree(path, ignore_errors=True)
     for name in (SETTINGS, *WRITTEN):
         (folder / name).unlink(missing_ok=True)

@@ -42,7 +42,7 @@ def plans(count: int, seed: int, families: Sequence[str] = NAMES) -> list[Plan]:
     turns = [(families[k % len(families)], k // len(families)) for k in range(count)]
     rudders = case.plans(sum(name == RUDDER for name, _ in turns), seed)
     return [
-        replace(rudders[number], index=k, number=number)
+        replace(rudders[number], index=k)
         if name == RUDDER
         else Plan(k, *planned(_seed(seed, name), number, FAMILIES[name].effects, FAMILIES[name].outside), name, number)
         for k, (name, number) in enumerate(turns)

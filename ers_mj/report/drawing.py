@@ -9,6 +9,7 @@ import io
 import itertools
 import re
 from collections.abc import Callable, Sequence
+from html import escape
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -44,9 +45,9 @@ def _svg(figure: Figure, described: str) -> str:
     mark = f"f{next(_serial)}-"
     text = re.sub(r'\bid="', f'id="{mark}', text)
     text = re.sub(r'href="#', f'href="#{mark}', text).replace("url(#", f"url(#{mark}")
-    text = re.sub(
-        r'<svg [^>]*?viewBox="([^"]+)"[^>]*>', rf'<svg viewBox="\1" role="img" aria-label="{described}">', text, count=1
-    )
+    told = escape(described, quote=True)  # it may hold the name of a file
+    begin = lambda found: f'<svg viewBox="{found[1]}" role="img" aria-label="{told}">'
+    text = re.sub(r'<svg [^>]*?viewBox="([^"]+)"[^>]*>', begin, text, count=1)
     return re.sub(r"\n\s*", "\n", text)
 
 

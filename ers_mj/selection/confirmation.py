@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from ers_mj.data.prepared import START, Blocks, Trace
+from ers_mj.data.prepared import START, Trace
 from ers_mj.decisions import confirmation as decisions
 from ers_mj.decisions.explained import cost, score
 from ers_mj.decisions.thresholds import POLICY, Policy
@@ -324,7 +324,7 @@ def delta_bic(name: str, model: Model, after: Score, without: Score) -> float:
 
 
 def _misfit(model: Model, trace: Trace, record: int) -> np.ndarray:
-    return Blocks.of([trace]).misfit(residuals_in(model, trace, record, OBSERVER_RATE))
+    return trace.blocks.misfit(residuals_in(model, trace, record, OBSERVER_RATE))
 
 
 def _recalibrated(

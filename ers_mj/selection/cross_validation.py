@@ -76,7 +76,7 @@ def scored(model: Model, trace: Trace, record: int = 0, begin: int = 0, measure:
     return Score(
         float(e @ e),
         int(trace.valid[begin:].sum()),
-        Blocks.of([trace]).misfit(np.nan_to_num(local, nan=1e6)),
+        trace.blocks.misfit(np.nan_to_num(local, nan=1e6)),
         sure,
         float(np.sum(np.abs(e))),
     )

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ers_mj.data.tables import write_whole
+from ers_mj.data.whole import write_whole
 from ers_mj.errors import InputError
 
 # Table 1 of the paper (Energies 2020): the values of its joint simulation model, as printed but for the units
@@ -38,6 +38,20 @@ TABLE_1: Mapping[str, float] = MappingProxyType(
         "L": 0.0016,  # H, printed 1.6 mH
         "theta_0": math.radians(15),  # rad, printed 15 deg
         "n": 22.26,  # motor turns a rudder turn
+    }
+)
+SHEET_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "J": "kg m^2",
+        "B": "N m s/rad",
+        "K_t": "N m/A",
+        "K_e": "V s/rad",
+        "k_s": "N m/rad",
+        "T_LH": "N m",
+        "F_c": "N m",
+        "R": "ohm",
+        "L": "H",
+        "n": "-",
     }
 )
 LUMPED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -15,24 +14,26 @@ from ers_mj.errors import InputError
 from ers_mj.plants.mjcf import unlogged
 from ers_mj.plants.staging import staged
 from ers_mj.view.replay import Replay
+from ers_mj.view.within import parsed, refuse_outside
+
+MOST_STEPS = 5e6  # a minute or two
+UNSTABLE = tuple(getattr(mujoco.mjtWarning, f"mjWARN_BAD{what}").value for what in ("QPOS", "QVEL", "QACC", "CTRL"))
 
 
 def read_plant(path: Path) -> mujoco.MjModel:
     """A plant.xml, or any other MJCF file, on its stage.
 
     Raises:
-        InputError: no such file, no XML, no MJCF.
+        InputError: no such file, no XML, no MJCF, or one that names files outside its folder.
     """
     if not path.is_file():
         raise InputError(
             f"{path}: there is no such file" if not path.exists() else f"{path}: is a folder, a plant.xml was expected"
         )
-    try:
-        root = ElementTree.parse(path).getroot().tag
-    except (ElementTree.ParseError, OSError, UnicodeError, LookupError, ValueError) as error:
-        raise InputError(f"{path}: is not XML ({str(error)[:120]})") from None
-    if root != "mujoco":
-        raise InputError(f"{path}: its root element is <{root[:40]}>, a MuJoCo model begins with <mujoco>")
+    root = parsed(path)
+    if root.tag != "mujoco":
+        raise InputError(f"{path}: its root element is <{root.tag[:40]}>, a MuJoCo model begins with <mujoco>")
+    refuse_outside(path, root)
     try:
         with unlogged():
             return staged(mujoco.MjSpec.from_file(str(path)))
@@ -66,6 +67,7 @@ def recorded_file(model: mujoco.MjModel, trace: Trace, moments: np.ndarray, outp
 def _stepped(model: mujoco.MjModel, data: mujoco.MjData, t: np.ndarray, u: np.ndarray, moments: np.ndarray) -> Replay:
     if u.any() and model.nu == 0:
         raise InputError("the model has no actuator that an input could drive")
+    _refuse_endless(t[moments[-1]] - t[0], model.opt.timestep)
     motor = max(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, "motor"), 0)
     shown, qpos, theta = set(moments.tolist()), [], []
     with unlogged():
@@ -77,9 +79,19 @@ def _stepped(model: mujoco.MjModel, data: mujoco.MjData, t: np.ndarray, u: np.nd
             until = t[k + 1] - t[0] if k + 1 < t.size else -math.inf
             while data.time < until - 0.5 * model.opt.timestep:
                 mujoco.mj_step(model, data)
+                if any(data.warning[kind].number for kind in UNSTABLE):  # it begins anew at time 0, for ever
+                    raise InputError(f"the simulation of the model is unstable at {t[k] - t[0]:.4g} s, check the file")
     if not np.isfinite(qpos).all():
         raise InputError("the simulation of the model leaves all bounds, check the file and the input")
     return Replay(model, t[moments] - t[0], np.array(qpos), np.array(theta))
+
+
+def _refuse_endless(lasts: float, step: float) -> None:
+    if not (step > 0.0 and lasts / step <= MOST_STEPS):
+        raise InputError(
+            f"the model's step of {step:g} s makes {lasts / step:.3g} of {lasts:.4g} s, at most {MOST_STEPS:.0e} were"
+            " expected"
+        )
 
 
 def _started(model: mujoco.MjModel, theta: float, omega: float) -> mujoco.MjData:

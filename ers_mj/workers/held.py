@@ -20,7 +20,7 @@ def held(folder: Path, who: str) -> Iterator[None]:
         InputError: it cannot be made, or another run holds it.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        Path(os.path.realpath(folder)).mkdir(parents=True, exist_ok=True)  # a link may lead to none yet
         handle = os.open(folder, os.O_RDONLY)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror})") from None

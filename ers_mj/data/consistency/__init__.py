@@ -1,8 +1,9 @@
 """One pass over all columns of a recording before anything is fitted: data before physics.
 
-    fields as checked -> clock (scale, jumps, lone rows) -> scales (another unit) -> wraps -> commands (unsigned,
-    constant, a reference of another zero or sign) -> supply (readings off, drive off) -> blackouts (several columns
-    repeat together, leaps) -> refresh (held samples) -> fields, masked or mended, and a fault for each
+    fields as checked -> clock (scale, jumps, lone rows) -> scales (another unit) -> wraps -> commands (unsigned)
+    -> references (the output itself, of another zero or sign, behind a limit) -> supply (readings off, drive off)
+    -> blackouts (several columns repeat together, leaps) -> refresh (held samples)
+    -> fields, masked or mended, and a fault for each
 
 A member takes a `Sheet` and gives it back with the faults that it found; what it cannot mend it refuses in one
 sentence. A sheet without a fault comes back as it is, to the last bit.
@@ -12,12 +13,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ers_mj.data.consistency import blackouts, clock, commands, refresh, scales, supply, wraps
+from ers_mj.data.consistency import blackouts, clock, commands, references, refresh, scales, supply, wraps
 from ers_mj.data.consistency.sheet import Fault, Sheet
 
 STEPS = (
     clock.scale,
     clock.jumps,
+    clock.pieces,
     clock.lone_rows,
     scales.whole_numbers,
     scales.duty_counts,
@@ -25,7 +27,9 @@ STEPS = (
     wraps.unwrapped,
     commands.directed,
     commands.unsigned,
-    commands.reference,
+    references.itself,
+    references.of_another_kind,
+    references.behind_a_limit,
     supply.off_median,
     supply.drive_off,
     blackouts.repeats,

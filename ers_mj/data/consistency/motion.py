@@ -32,3 +32,13 @@ def lagged(x: np.ndarray, y: np.ndarray, lags: np.ndarray) -> tuple[float, float
     """Slope and correlation of y over x (N,), of those lags of y (samples) at which they are most alike."""
     found = [likeness(x[: x.size - k], y[k:]) for k in lags]
     return max(found, key=lambda pair: abs(pair[1]))
+
+
+LATEST, TRIED = 0.5, 12  # [s] by which a servo may follow late, and how many lags are tried
+
+
+def lags_of(sheet: Sheet) -> np.ndarray:
+    """Samples by which an output may follow late."""
+    step = float(np.median(np.diff(sheet.t)))
+    most = min(round(LATEST / step), sheet.t.size // 4)
+    return np.unique(np.linspace(0, most, TRIED).astype(int))

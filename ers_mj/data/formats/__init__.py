@@ -7,16 +7,20 @@ extra names it where it is missing.
 from __future__ import annotations
 
 import contextlib
+import gc
 import gzip
 import hashlib
 import importlib
 import io
 import os
+import re
+import sys
+import traceback
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ers_mj.data.formats.base import File, Loaded
+from ers_mj.data.formats.base import MOST, File, Loaded, refuse_large
 from ers_mj.data.tables import listed, read_content, reason
 from ers_mj.errors import ErsError, InputError
 
@@ -35,6 +39,9 @@ READERS = {
     ".bin": "ardupilot",
 }
 
+CUT_OFF = re.compile(
+    "truncated|could not read bytes|unpack requires|not a zip file|Unterminated|end magic|reach(ed)? EOF"
+)
 ON_DISK = ("ros", "can_log", "ardupilot")  # formats whose libraries take paths
 
 
@@ -61,21 +68,39 @@ def load(
 
 
 def _read(module: str, file: File) -> Loaded:
-    """The file by this reader; what its library prints is not for our output, and what it raises, it raises at
-    whatever its parser met.
-    """
+    """The file by this reader; what its library raises, it raises at whatever its parser met."""
     reader = importlib.import_module(f"ers_mj.data.formats.{module}")
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
+    with _quiet():
+        try:
             return reader.load(file)
-    except ErsError:
-        raise
-    except Exception as error:
-        raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({reason(error)})") from None
+        except ErsError:
+            raise
+        except MemoryError:
+            raise InputError(f"{file.name}: takes more memory than there is, cut it") from None
+        except Exception as error:
+            traceback.clear_frames(error.__traceback__)  # and with them what the library has left half read
+            told = re.sub(r"'?<_io\.\w+ object at 0x[0-9a-f]+>'?", "it", reason(error))
+        gc.collect(1)  # it may hold itself
+    hint = ": it seems cut off, copy it again" if CUT_OFF.search(told) else ""
+    raise InputError(f"{file.name}: is not a readable {reader.FORMAT} ({told}){hint}")
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """What a library prints, and what its destructors raise over a damaged file, is not for our output."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            yield
+    finally:
+        sys.unraisablehook = hook
 
 
 def _unpacked(content: bytes, name: str) -> bytes:
     try:
-        return gzip.decompress(content)
+        with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
+            found = file.read(MOST.size + 1)
+        refuse_large(name, size=len(found))
+        return found
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{name}: is no whole gzip file ({error})") from None

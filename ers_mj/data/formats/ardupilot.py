@@ -4,6 +4,8 @@ the log itself declares.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
 from typing import Any
 
@@ -25,14 +27,16 @@ def load(file: File) -> Loaded:
     reading = library("pymavlink.DFReader", "pymavlink", "ardupilot", file.name)
     if file.content[:2] != b"\xa3\x95":
         raise InputError(f"{file.name}: is no log of ArduPilot (it does not begin as one)")
-    log = reading.DFReader_binary(str(file.path), zero_time_base=True)
-    try:
-        rows, units = _rows(log)
-    finally:
-        log.data_map.close()
-        log.filehandle.close()
+    with contextlib.redirect_stderr(io.StringIO()) as complaints:
+        log = reading.DFReader_binary(str(file.path), zero_time_base=True)
+        try:
+            rows, units = _rows(log)
+        finally:
+            log.data_map.close()
+            log.filehandle.close()
     signals = [Signal(name, np.array(t), np.array(x), units.get(name, "")) for name, (t, x) in rows.items()]
-    return on_one_clock(signals, file.wanted, file.name)
+    notes = ["the log is damaged, what could be read of it is taken"] if complaints.getvalue() else []
+    return on_one_clock(signals, file.wanted, file.name, notes)
 
 
 def _rows(log: Any) -> tuple[dict[str, tuple[list[float], list[float]]], dict[str, str]]:

@@ -43,8 +43,11 @@ def loaded(
     upright = {k: _upright(x, count) for k, x in long.items()}
     columns = {k: x for k, x in upright.items() if len(x) == count}
     constants = {k: np.full(count, float(x)) for k, x in numeric.items() if x.ndim == 0}
-    told = [*notes, *_left_out(arrays, numeric, [k for k in long if k not in columns], count)]
-    return Loaded(table_of(columns | constants, name), tuple(told), units or {})
+    other = [k for k in long if k not in columns]
+    left_out = {k: f"has {len(numeric[k])} values and others {count}" for k in other}
+    left_out |= {k: "holds no numbers" for k in arrays if k not in numeric}
+    told = [*notes, *_left_out(arrays, numeric, other, count)]
+    return Loaded(table_of(columns | constants, name), tuple(told), units or {}, left_out)
 
 
 def _numeric(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

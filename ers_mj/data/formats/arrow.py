@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-from ers_mj.data.formats.base import File, Loaded, refuse_twice
+from ers_mj.data.formats.base import File, Loaded, refuse_large, refuse_twice
 from ers_mj.data.tables import reason
 from ers_mj.errors import InputError
 
@@ -31,12 +31,24 @@ def _table(file: File) -> pa.Table:
     if file.path.suffix.lower() == ".parquet":
         from pyarrow import parquet  # here alone: it takes long to import
 
-        return parquet.read_table(buffer)
-    try:
-        return pa.ipc.open_file(buffer).read_all()
-    except pa.ArrowInvalid:
+        _refuse_part(file, b"PAR1", b"PAR1")
+        told = parquet.ParquetFile(buffer).metadata
+        groups = (told.row_group(k).total_byte_size for k in range(told.num_row_groups))
+        refuse_large(file.name, told.num_columns, told.num_rows, sum(groups))
         buffer.seek(0)
+        return parquet.read_table(buffer)
+    if file.content.startswith(b"\xff\xff\xff\xff"):
         return pa.ipc.open_stream(buffer).read_all()
+    _refuse_part(file, b"ARROW1", b"ARROW1")
+    return pa.ipc.open_file(buffer).read_all()
+
+
+def _refuse_part(file: File, begin: bytes, end: bytes) -> None:
+    """Raise InputError where a file lacks what every whole one begins or ends with."""
+    if not file.content.startswith(begin):
+        raise InputError(f"{file.name}: is no {_kind(file)} file (it does not begin as one)")
+    if not file.content.endswith(end):
+        raise InputError(f"{file.name}: is cut off, a whole {_kind(file)} file ends in {end.decode()}: copy it again")
 
 
 def _kind(file: File) -> str:

@@ -43,11 +43,40 @@ class Loaded:
         table: its columns.
         notes: what was skipped or assumed, a sentence each.
         units: column -> unit, where the file says one.
+        left_out: what of the file is no column -> why not.
     """
 
     table: pa.Table
     notes: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Most:
+    """What a file may hold, unpacked: a few bytes may say that they stand for more than there is memory."""
+
+    columns: int = 10_000
+    cells: int = 500_000_000
+    size: int = 4 << 30  # [bytes]
+    text: int = 1 << 30  # [bytes], which take several times their size to read
+
+
+MOST = Most()
+
+
+def refuse_large(name: str, columns: int = 0, rows: int = 0, size: int = 0, text: int = 0) -> None:
+    """Raise InputError where a file holds more than can be read into memory."""
+    for what, count, most in (
+        ("columns", columns, MOST.columns),
+        ("cells", columns * rows, MOST.cells),
+        ("bytes unpacked", size, MOST.size),
+        ("bytes of text", text, MOST.text),
+    ):
+        if count > most:
+            raise InputError(
+                f"{name}: holds {count} {what}, at most {most} were expected, cut it or leave out what is not needed"
+            )
 
 
 def library(module: str, package: str, extra: str, name: str) -> ModuleType:

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv
 
-from ers_mj.data.formats.base import File, Loaded, refuse_twice
+from ers_mj.data.formats.base import File, Loaded, refuse_large, refuse_twice
 from ers_mj.data.tables import reason
 from ers_mj.data.units import is_unit
 from ers_mj.errors import InputError
@@ -34,12 +34,15 @@ class Text:
 
 def load(file: File) -> Loaded:
     """The cells as text, under the names of the header."""
+    refuse_large(file.name, text=len(file.content))
     text = _spaces_as_tabs(_uncommented(_below_titles(_decoded(file))))
     delimiter = max(DELIMITERS, key=text.header.count)
     text = _without_ends(text, delimiter)
     columns = [column.strip(' \t"') for column in text.header.split(delimiter)]
+    refuse_large(file.name, len(columns))
     refuse_twice(columns, file.name)
     text, units = _without_units(text, columns, delimiter)
+    text = _without_part(text, delimiter)
     table = _cells(text.body, columns, delimiter, file.name)
     if delimiter in ";\t|":
         table = pa.table([pc.replace_substring(cells, ",", ".") for cells in table.columns], names=columns)
@@ -142,6 +145,14 @@ def _without_units(text: Text, columns: list[str], delimiter: str) -> tuple[Text
     units = {column: cell for column, cell in zip(columns, cells) if cell}
     told = f"its second line gives units: {first.strip()}"
     return replace(text, body="".join(rest), notes=(*text.notes, told)), units
+
+
+def _without_part(text: Text, delimiter: str) -> Text:
+    """Without a last row that was cut off, as a logger that was stopped leaves it."""
+    rows, end, last = text.body.rpartition("\n")
+    if not end or not last.strip() or last.count(delimiter) >= text.header.count(delimiter):
+        return text
+    return replace(text, body=rows + end, notes=(*text.notes, "the last row is cut off and left out"))
 
 
 def _cells(body: str, columns: list[str], delimiter: str, name: str) -> pa.Table:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from typing import Any
 
 import numpy as np
 
 from ers_mj.data.formats import arrays
-from ers_mj.data.formats.base import File, Loaded
-from ers_mj.data.tables import reason
+from ers_mj.data.formats.base import File, Loaded, refuse_large
 from ers_mj.errors import InputError
 
 FORMAT = "JSON file"
@@ -17,6 +17,7 @@ FORMAT = "JSON file"
 
 def load(file: File) -> Loaded:
     """The records as columns; what a record lacks is missing there."""
+    refuse_large(file.name, text=len(file.content))
     tree = _parsed(file)
     while isinstance(tree, dict) and len(tree) == 1 and isinstance(next(iter(tree.values())), (list, dict)):
         tree = next(iter(tree.values()))
@@ -28,14 +29,23 @@ def load(file: File) -> Loaded:
 
 
 def _parsed(file: File) -> Any:
+    text = file.content.decode("utf-8-sig")
     try:
-        text = file.content.decode("utf-8-sig")
-        try:
-            return json.loads(text)
-        except json.JSONDecodeError:
-            return [json.loads(line) for line in text.splitlines() if line.strip()]
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise InputError(f"{file.name}: is not readable JSON ({reason(error)})") from None
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return _lines(text)
+
+
+def _lines(text: str) -> list[Any]:
+    """The records of lines; the last one may be cut off, as a logger that was stopped leaves it."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    if len(lines) < 2:
+        return json.loads(text)
+    *whole, last = lines
+    rows = [json.loads(line) for line in whole]
+    with contextlib.suppress(json.JSONDecodeError):
+        rows.append(json.loads(last))
+    return rows
 
 
 def _flat(tree: dict, path: str = "") -> list[tuple[str, Any]]:

@@ -50,5 +50,5 @@ def _variables(group: Any, path: str, h5py: Any, name: str) -> Iterator[tuple[st
             raise InputError(f"{name}: {path}{key} is an object of MATLAB (a timeseries?), {HOW}")
         if isinstance(item, h5py.Group):
             yield from _variables(item, f"{path}{key}.", h5py, name)
-        elif not item.attrs.get("MATLAB_empty", 0) and kind not in ("char", "cell"):
-            yield f"{path}{key}", np.asarray(item).T
+        elif not item.attrs.get("MATLAB_empty", 0):
+            yield f"{path}{key}", np.array(kind) if kind in ("char", "cell") else np.asarray(item).T

@@ -31,7 +31,7 @@ def _signals(mdf) -> list[Signal]:
                 continue
             signal = mdf.get(group=number, index=index, raw=True)  # a table of texts would come as texts
             signal = signal.physical(copy=False, ignore_value2text_conversions=True)
-            if signal.samples.ndim == 1 and signal.samples.dtype.kind in "biuf":
+            if signal.samples.ndim == 1:
                 times, values = np.asarray(signal.timestamps, float), np.asarray(signal.samples)
                 found.append(Signal(channel.name, times, values, signal.unit or ""))
     return found

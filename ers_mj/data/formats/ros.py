@@ -6,8 +6,10 @@ a message's header where it has one that agrees with the log's, else the log's.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
+import struct
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,12 +17,14 @@ import numpy as np
 
 from ers_mj.data.formats.base import File, Loaded, library
 from ers_mj.data.formats.clocks import Signal, on_one_clock
+from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
 
 FORMAT = "log of messages"
 NANO = 1e-9
 APART = 5.0  # [s] between a header's stamp and the log's, from which they are of different clocks
 LONGEST = 64  # elements of an array that become signals: an image has more
+MAGIC = b"\x89MCAP0\r\n"  # with which an MCAP begins and ends
 JOINT = ("position", "velocity", "effort")
 
 
@@ -31,6 +35,7 @@ class Topics:
         self.rows: dict[str, list[tuple[int, int | None, float]]] = {}  # stamps [ns]: floats since 1970 are coarse
         self.first: int | None = None
         self.short: set[str] = set()
+        self.texts: set[str] = set()
 
     def take(self, topic: str, log_ns: int, message: Any) -> None:
         """One message: an object with fields, or a dictionary."""
@@ -50,6 +55,8 @@ class Topics:
                 yield from () if key in ("header", "__msgtype__") else self._numbers(f"{path}.{key}", value)
         elif isinstance(x, (bool, int, float, np.number)):
             yield path, float(x)
+        elif isinstance(x, str):
+            self.texts.add(path)
         elif isinstance(x, (list, tuple, np.ndarray)) and len(x) <= LONGEST:
             for k, value in enumerate(x):
                 yield from self._numbers(f"{path}[{k}]", value)
@@ -75,6 +82,7 @@ class Topics:
             found.append(Signal(name, stamps if own else log, np.array([row[2] for row in rows])))
             if stamped and not own:
                 notes.append(f"the stamps of {name.split('.')[0]} are of another clock than the log's, which is taken")
+        found += [Signal(name, np.zeros(0), np.zeros(0, str)) for name in sorted(self.texts - set(self.rows))]
         notes = list(dict.fromkeys(notes))
         if self.short:
             notes.append(f"{', '.join(sorted(self.short))} differ in length from the joints' names and are left out")
@@ -115,14 +123,14 @@ def _bag(file: File, topics: Topics) -> list[str]:
                 topics.take(connection.topic, stamp, reader.deserialize(raw, connection.msgtype))
             except KeyError:
                 unknown.add(connection.topic)
-    return [f"topics of unknown types are left out: {', '.join(sorted(unknown))}"] if unknown else []
+    return [f"topics of unknown types are left out: {listed(sorted(unknown))}"] if unknown else []
 
 
 def _mcap(file: File, topics: Topics) -> list[str]:
     reading = library("mcap.reader", "mcap", "mcap", file.name)
     cdr = None
     strange: set[str] = set()
-    for schema, channel, message in reading.make_reader(io.BytesIO(file.content)).iter_messages():
+    for schema, channel, message in _messages(file, reading):
         if channel.message_encoding == "json":
             topics.take(channel.topic, message.log_time, json.loads(message.data))
         elif channel.message_encoding == "cdr" and schema is not None:
@@ -130,9 +138,27 @@ def _mcap(file: File, topics: Topics) -> list[str]:
             topics.take(channel.topic, message.log_time, cdr.read(schema, message.data))
         else:
             strange.add(f"{channel.topic} ({channel.message_encoding or 'no encoding'})")
+    whole = file.content.endswith(MAGIC)
     if strange and not topics.rows:
-        raise InputError(f"{file.name}: holds messages that are neither JSON nor ROS 2: {', '.join(sorted(strange))}")
-    return [f"topics that are neither JSON nor ROS 2 are left out: {', '.join(sorted(strange))}"] if strange else []
+        raise InputError(f"{file.name}: holds messages that are neither JSON nor ROS 2: {listed(sorted(strange))}")
+    if not whole and not topics.rows:
+        raise InputError(f"{file.name}: is cut off, and holds no whole message")
+    notes = [] if whole else ["the file is cut off, what could be read of it is taken"]
+    notes += [f"topics that are neither JSON nor ROS 2 are left out: {listed(sorted(strange))}"] if strange else []
+    return notes
+
+
+def _messages(file: File, reading: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """Schema, channel and message of each; of a file that is cut off, up to there."""
+    stream = io.BytesIO(file.content)
+    if file.content.endswith(MAGIC):
+        yield from reading.make_reader(stream).iter_messages()
+        return
+    if not file.content.startswith(MAGIC):
+        raise InputError(f"{file.name}: is no MCAP file (it does not begin as one)")
+    ends = library("mcap.exceptions", "mcap", "mcap", file.name)
+    with contextlib.suppress(ends.EndOfFile, struct.error):
+        yield from reading.NonSeekingReader(stream).iter_messages(log_time_order=False)
 
 
 class _Cdr:

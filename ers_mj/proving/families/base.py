@@ -61,7 +61,8 @@ class Motor:
         settling: time constant of the speed [s].
         friction: dry friction over stall torque.
         viscous: share of the damping that is not back-EMF.
-        resistance, electrical: of the winding [ohm], its L/R [s].
+        resistance, electrical: of the winding [ohm], its L/R [s]; None: too short to show, its current is where it
+            settles.
         gear: n, motor angle over output.
         travel: half of it.
     """
@@ -75,7 +76,7 @@ class Motor:
     gear: tuple[float, float]
     travel: tuple[float, float]
     resistance: tuple[float, float] = (0.8, 4.0)
-    electrical: tuple[float, float] = (2e-4, 5e-4)
+    electrical: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class Record:
     controller: dict
     inherent: list[dict]
     constants: dict[str, float] = field(default_factory=dict)  # columns kp, load_kg, arm_m
-    told: np.ndarray | None = None  # of a position loop: the reference that is logged
+    told: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of a position loop: the reference that is logged
     lead: int = 0  # samples of the loop before the log begins
 
 
@@ -175,7 +176,7 @@ def draw_motor(rng: np.random.Generator, m: Motor) -> tuple[dict, float, float]:
         "T_LH": 0.0,
         "F_c": between(rng, *m.friction) * stall,
         "R": resistance,
-        "L": resistance * between(rng, *m.electrical),
+        "L": resistance * between(rng, *m.electrical) if m.electrical else 0.0,
         "theta_0": 0.0,
         "n": n,
     }
@@ -189,8 +190,11 @@ def units_of(real: Mapping[str, float], supply: float, half: float, time: float 
 
 
 def shared(rng: np.random.Generator, own: dict) -> dict:
-    """Own parameters with the motor's shares of inertia and damping, for what splits the plant in two."""
+    """Own parameters as the laws read them: the motor's shares of inertia and damping, for what splits the plant in
+    two, and whether the current is where it settles.
+    """
     return own | {
+        "quasi": float(own["L"] == 0.0),
         "motor_inertia_share": float(rng.uniform(0.45, 0.75)),
         "motor_damping_share": float(rng.uniform(0.3, 0.7)),
     }

@@ -53,10 +53,9 @@ def draw(rng: np.random.Generator, labels: tuple[str, ...]) -> Servo:
         window_s=0.5,
         turns=True,
     )
-    follows = float(rng.uniform(2e-4, 5e-4))  # [s] time constant of the torque's loop
     for record in servo.records:
-        record.params = record.params | {"torque_s": follows}
-    servo.params = servo.params | {"torque_s": follows}
+        record.params = record.params | {"torque": 1.0}
+    servo.params = servo.params | {"torque": 1.0}
     return servo
 
 

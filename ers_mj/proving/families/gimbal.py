@@ -29,7 +29,6 @@ MOTOR = Motor(
     viscous=(0.08, 0.3),
     gear=(400.0, 1200.0),
     travel=(0.5, 1.0),
-    electrical=(2e-3, 5e-3),
 )
 SENSOR = Sensor(rates=(50,), noise=(0.003 * DEG, 0.01 * DEG), count=2.0 * np.pi / 2**18)
 

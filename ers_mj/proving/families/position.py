@@ -4,6 +4,8 @@ logged. Latency and limit are always there, a limit of the reference's speed and
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ers_mj.proving.concealed.base import between
@@ -37,12 +39,24 @@ MOTOR = Motor(
     travel=(0.7, 0.9),
 )
 SENSOR = Sensor(rates=(100, 100, 200), noise=(2e-4, 4e-4), count=COUNT)
-FIRMWARE = (500, 1000, 1000)  # [Hz]
-LEAD = 1.0  # [s] in which the loop comes to rest before the log begins
-INTEGRAL = 0.2  # PI's share of the loops
-LIMITED = 0.3  # share of the references with a limit of their speed
-LOADED = 0.3  # share of the servos with two loads
-TWO_GAINS = 0.4  # share of the servos recorded at two gains
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """What is drawn of the loop."""
+
+    rates: tuple[int, ...] = (500, 1000, 1000)  # [Hz]
+    lead: float = 1.0  # [s] in which the loop comes to rest before the log begins
+    rest: float = 0.2  # [s] in which the reference stands still at first
+    latency: tuple[float, float] = (3e-3, 30e-3)  # [s]
+    integral: float = 0.2  # share of the loops that are PI
+    limited: float = 0.3  # share of the references with a limit of their speed
+    gravity: float = 0.5  # share of the servos that lift an arm
+    loaded: float = 0.3  # share of the servos with two loads
+    two_gains: float = 0.4  # share of the servos recorded at two gains
+
+
+FIRMWARE = Firmware()
 
 
 def draw(rng: np.random.Generator, labels: tuple[str, ...]) -> Servo:
@@ -50,11 +64,11 @@ def draw(rng: np.random.Generator, labels: tuple[str, ...]) -> Servo:
     real, supply, half = draw_motor(rng, MOTOR)
     units = units_of(real, supply, half)
     own, sensor = shared(rng, units.own(real)), draw_sensor(rng, SENSOR, units)
-    firmware = int(rng.choice(FIRMWARE))
+    firmware = int(rng.choice(FIRMWARE.rates))
     gains = _gains(rng, own, 1.0 / firmware)
     inherent = _inherent(rng, own, units, labels)
-    registers = [1.0, between(rng, 2.0, 4.0)] if rng.random() < TWO_GAINS else [1.0]
-    loads = [1.0, between(rng, 1.5, 2.5)] if rng.random() < LOADED else [1.0]
+    registers = [1.0, between(rng, 2.0, 4.0)] if rng.random() < FIRMWARE.two_gains else [1.0]
+    loads = [1.0, between(rng, 1.5, 2.5)] if rng.random() < FIRMWARE.loaded else [1.0]
     carried, mass, arm = float(rng.uniform(0.3, 0.7)), between(rng, 0.1, 0.5), between(rng, 0.05, 0.2)
     records = []
     for k, (kind, t, told) in enumerate(draw_references(rng, sensor, SENSOR.seconds)):
@@ -78,7 +92,7 @@ def draw(rng: np.random.Generator, labels: tuple[str, ...]) -> Servo:
         columns={"input": "theta_ref_rad", "output": "theta_rad"},
         closed=True,
         stride=firmware // sensor["sample_rate_hz"],
-        latency=max(round(between(rng, 3e-3, 30e-3) * firmware), 1) / firmware,
+        latency=max(round(between(rng, *FIRMWARE.latency) * firmware), 1) / firmware,
         decimals=None,
     )
 
@@ -86,7 +100,7 @@ def draw(rng: np.random.Generator, labels: tuple[str, ...]) -> Servo:
 def _gains(rng: np.random.Generator, own: dict, period: float) -> dict:
     """P, PD with the derivative of the angle, or PI."""
     gains = controller_of(rng, own, period, damped=bool(rng.random() < 0.5)) | {"D_ON_Y": 1.0}
-    if rng.random() < INTEGRAL:
+    if rng.random() < FIRMWARE.integral:
         gains |= {"KI": between(rng, 0.5, 3.0) * gains["KP"], "KD": 0.0}
     return gains
 
@@ -96,10 +110,10 @@ def _inherent(rng: np.random.Generator, own: dict, units: Units, labels: tuple[s
     out = []
     stall = own["n"] * own["K_t"] * RUDDER_SUPPLY / own["R"]
     pull, tilt = between(rng, 0.05, 0.25) * stall, float(rng.uniform(-0.5, 0.5))
-    if rng.random() < 0.5:
+    if rng.random() < FIRMWARE.gravity:
         shape = {"phase": tilt, "wave": units.angle}
         out.append({"label": "gravity_imbalance", "strength": pull, "shape": shape})
-    cut, limited = float(rng.uniform(0.3, 0.65)), rng.random() < LIMITED
+    cut, limited = float(rng.uniform(0.3, 0.65)), rng.random() < FIRMWARE.limited
     if limited and "rate_limit" not in labels:
         out.append({"label": "rate_limit", "strength": cut, "shape": {"top_rad_s": top_speed(own)}})
     return out
@@ -117,9 +131,9 @@ def _under(inherent: list[dict], load: float) -> list[dict]:
 
 def _in_firmware(rng: np.random.Generator, record: Record, firmware: int, sensor: dict) -> Record:
     """The record on the firmware's clock, a while at rest before its log begins."""
-    lead, stride = round(LEAD * firmware), firmware // sensor["sample_rate_hz"]
+    lead, stride = round(FIRMWARE.lead * firmware), firmware // sensor["sample_rate_hz"]
     rest = record.ref.copy()
-    rest[: round(0.2 * sensor["sample_rate_hz"])] = 0.0
+    rest[: round(FIRMWARE.rest * sensor["sample_rate_hz"])] = 0.0
     told = np.round(rest, 5)
     t = np.arange(lead + told.size * stride) / firmware
     record.t, record.told, record.lead = t, told, lead
@@ -138,7 +152,6 @@ POSITION = Family(
         "backlash",
         "shaft_compliance",
         "drive_dead_zone",
-        "cogging",
         "end_stop",
     ),
     outside=("second_resonance", "hysteretic_spring", "friction_ageing", "intermittent_gain"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ers_mj.proving.families.base import (
@@ -27,14 +29,14 @@ MOTOR = Motor(
     gear=(300.0, 1300.0),  # [rad/m]: leads of 5 to 20 mm
     travel=(0.1, 0.2),  # [m]
     resistance=(0.8, 2.0),
-    electrical=(3e-4, 8e-4),
 )
+WOUND = replace(MOTOR, electrical=(3e-4, 8e-4))  # half of them: its time constant shows
 SENSOR = Sensor(rates=(500, 1000, 1000), noise=(2e-6, 6e-6), count=1e-6)
 
 
 def draw(rng: np.random.Generator, labels: tuple[str, ...]) -> Servo:
     """A horizontal axis; it reads metres from an end of its scale."""
-    real, supply, half = draw_motor(rng, MOTOR)
+    real, supply, half = draw_motor(rng, WOUND if rng.random() < 0.5 else MOTOR)
     return driven(
         rng,
         "screw",

@@ -29,7 +29,6 @@ MOTOR = Motor(
     gear=(15.0, 25.0),
     travel=(0.64, 0.68),
     resistance=(1.0, 2.5),
-    electrical=(3e-4, 8e-4),
 )
 SENSOR = Sensor(rates=(100, 100, 200), noise=(0.03 * DEG, 0.08 * DEG))
 

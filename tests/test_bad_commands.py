@@ -1,0 +1,42 @@
+"""The command line, given anything: an answer or one sentence, no traceback, and no file that was not asked for."""
+
+import os
+
+import bad_commands
+import pytest
+from hypothesis import given, settings
+from test_bad_inputs import MILD
+
+from ers_mj import cli
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    bad_commands.lay_out(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.filterwarnings("default")
+def test_an_odd_command_line_ends_in_an_answer_or_a_sentence(here, capsys):
+    @settings(MILD, max_examples=40)
+    @given(bad_commands.lines(bad_commands.UNUSABLE))
+    def ends(argv):
+        before = {str(path) for path in here.rglob("*")}
+        try:
+            code = cli.main(argv)
+        except SystemExit as left:  # --help, --version
+            code = left.code or 0
+        told = capsys.readouterr()
+        assert code in (0, 1, 2)
+        if code == 2:
+            assert told.err.startswith("ers: ") and told.err.count("\n") == 1
+            assert told.err[:-1].isprintable()
+        left = {str(path) for path in here.rglob("*")} - before
+        assert not [name for name in left if code or name.endswith(".part")]
+        for name in left:
+            os.system(f"rm -rf '{name}'")
+
+    ends()
