@@ -16,6 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from ers_mj import __version__, stopping
 from ers_mj.commands import COMMANDS
+from ers_mj.commands.output import quietly
 from ers_mj.errors import ErsError, InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # of a place that takes no more
@@ -49,6 +50,8 @@ def build_parser() -> Parser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
     for command in COMMANDS:
         command.add_parser(commands)
+    for each in commands.choices.values():
+        each.add_argument("--quiet", action="store_true", help="say nothing but errors, and JSON where it is asked for")
     return parser
 
 
@@ -80,9 +83,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         given = list(sys.argv[1:] if argv is None else argv)
         arguments = parse(given)
         arguments.told = shlex.join(["ers", *given])  # on the page that this call makes
-        code = arguments.run(arguments)
-        sys.stdout.flush()  # here, where a full disk still gets its sentence
-        return code
+        with quietly(arguments.quiet, getattr(arguments, "json", False)):
+            code = arguments.run(arguments)
+            sys.stdout.flush()  # here, where a full disk still gets its sentence
+            return code
     except ErsError as error:
         print(f"ers: {error}", file=sys.stderr)
         return 2

@@ -278,6 +278,7 @@ def stub(monkeypatch, **changes) -> list:
             "sentence": "Only the parameters were off.",
             "missing": [],
             "where": [],
+            "parameters": {"b": {"value": 91.0, "unit": "rad/s^2/V", "ci95": [90.0, 92.0], "datasheet": 81.0}},
             "fit": {"heldout_rmse_before_rad": np.float64(0.1), "heldout_rmse_after_rad": float("nan")},
             "seed": seed,
             "left_out": [{"part": part, "sentence": sentence} for part, sentence in search.left_out()],
@@ -367,6 +368,7 @@ def test_diagnose_writes_its_files_and_tells(place, monkeypatch, capsys):
     assert all(f'href="{name}"' in page for name in ("diagnosis.json", "model.toml", "plant.xml"))
     assert read_datasheet(place / "res/model.toml").lumped["b"] == 1.0
     assert "PARAMETERS_ONLY" in out and "parameters_only" in out and "report.html" in out and err == ""
+    assert "91.0 rad/s²/V   (95 %: 90.0 … 92.0)   datasheet 81.0" in out
     (call,) = calls
     assert (
         [r.name for r in call.holdout] == ["second.csv"] and call.jobs == 2 and call.datasheet.parameters["J"] == 0.0031

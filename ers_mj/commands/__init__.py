@@ -8,6 +8,7 @@ from ers_mj.commands import (
     batch,
     cache,
     compare,
+    completion,
     demo,
     diagnose,
     excite,
@@ -42,4 +43,5 @@ COMMANDS = (
     excite,
     export,
     cache,
+    completion,
 )

@@ -50,6 +50,7 @@ def wanted(arguments: argparse.Namespace) -> bool:
 def exported(arguments: argparse.Namespace, tasks_of: Made) -> int:
     """Write the cases and the truth, tell; 0. Without --seed nobody can draw the same cases again."""
     from ers_mj.proving.contest import export, refuse_places
+    from ers_mj.workers.held import held
 
     if not arguments.export:
         raise InputError("--export is empty, a folder was expected")
@@ -59,7 +60,7 @@ def exported(arguments: argparse.Namespace, tasks_of: Made) -> int:
     if arguments.seed is None:
         arguments.seed = secrets.randbits(48)
     tasks, settings = tasks_of(arguments)
-    with closing(crew_of(arguments)) as hired, Progress() as progress:
+    with held(folder, "ers prove --export"), closing(crew_of(arguments)) as hired, Progress() as progress:
         digest = export(folder, sealed, tasks, settings, hired, progress)
     found = {"cases": len(tasks), "folder": str(folder), "truth": str(sealed), "truth_sha256": digest}
     lines = ["", bold(f"{len(tasks)} cases, their truth sealed with sha256 {digest}"), *written(Kept((folder, sealed)))]

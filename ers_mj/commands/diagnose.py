@@ -32,7 +32,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     add_recordings(parser)
     parser.add_argument(
-        "--datasheet", metavar="TOML", help="what is known of the servo; table1 is the paper's (default: nothing)"
+        "--datasheet",
+        "--model",
+        metavar="TOML",
+        help="what is known of the servo; table1 is the paper's (default: nothing)",
     )
     parser.add_argument(
         "--holdout", nargs="+", action="extend", default=[], metavar="REC", help="recordings to judge on; repeatable"
@@ -99,6 +102,7 @@ def _told(document: dict, kept: Kept) -> list[str]:
     lines = ["", f"{bold(verdict.upper())} ({verdict})", str(document.get("sentence") or ""), ""]
     lines += _told_fit(document)
     lines += _told_effects(document)
+    lines += _told_parameters(document) if verdict == "parameters_only" else []
     where = [entry.get("sentence") for entry in document.get("where") or [] if entry.get("sentence")]
     lines += _section("where", where[:3])
     state = [entry.get("sentence") for entry in document.get("record_state") or [] if entry.get("sentence")]
@@ -145,6 +149,22 @@ def _told_effects(document: dict) -> list[str]:
         if others := [str(other.get("effect")) for other in effect.get("alternatives") or []]:
             lines.append(f"    not excluded: {', '.join(others)}")
     return [bold("missing physics"), *lines, ""] if lines else []
+
+
+def _told_parameters(document: dict) -> list[str]:
+    """The servo's own parameters that can be told, where they are the answer."""
+    from ers_mj.report.display import shown
+
+    lines, seen = [], set()
+    for name, entry in (document.get("parameters") or {}).items():
+        value = entry.get("value")
+        if value is None or value in seen:
+            continue
+        seen.add(value)
+        unit = shown(entry.get("unit"), value)
+        sheet = "" if entry.get("datasheet") is None else f"   datasheet {unit.bare(entry['datasheet'])}"
+        lines.append(f"  {name:12}{unit(value):>16}{_told_interval(entry, unit)}{sheet}")
+    return [bold("parameters"), *lines, ""] if lines else []
 
 
 def _told_interval(entry: dict, unit: Unit) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.keeping import keep_file, table_file
-from ers_mj.commands.options import number, one_of, several
+from ers_mj.commands.options import add_model, number, one_of, several
 from ers_mj.commands.output import Progress, bold
 from ers_mj.door.saving import as_json, make_room
 from ers_mj.errors import InputError
@@ -45,9 +45,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def _add_rig(parser: argparse.ArgumentParser) -> None:
     """The servo, what may be done to it, and how it is measured."""
-    parser.add_argument(
-        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
-    )
+    add_model(parser, "datasheet or model.toml (default table1)")
     parser.add_argument(
         "--umax-V",
         dest="umax",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.keeping import folder_for, keep
-from ers_mj.commands.options import add_out, one_of, several
+from ers_mj.commands.options import add_model, add_out, one_of, several
 from ers_mj.commands.output import bold, written
 from ers_mj.door.saving import as_json
 
@@ -34,9 +34,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ),
         epilog="example: ers export ers-out/model.toml --to mujoco,fmu --out exported",
     )
-    parser.add_argument(
-        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
-    )
+    add_model(parser, "datasheet or model.toml (default table1)")
     parser.add_argument(
         "--to",
         type=several(one_of(TARGETS), "target"),

@@ -72,6 +72,7 @@ def _add_what(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--datasheet",
+        "--model",
         default="table1",
         metavar="TOML",
         help="the plant: datasheet or model.toml with its effects (default table1)",

@@ -6,7 +6,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING, cast
 
-from ers_mj.commands.options import angle_deg, number, swing_deg, whole
+from ers_mj.commands.options import add_model, angle_deg, number, swing_deg, whole
 from ers_mj.commands.output import Progress, bold
 from ers_mj.door.saving import as_json
 
@@ -29,9 +29,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             " gains model.toml --settling-ms 60"
         ),
     )
-    parser.add_argument(
-        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
-    )
+    add_model(parser, "datasheet or model.toml (default table1)")
     parser.add_argument(
         "--gains",
         default="",

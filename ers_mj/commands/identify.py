@@ -64,6 +64,7 @@ def _add_way(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--datasheet",
+        "--model",
         metavar="TOML",
         help=(
             "what is known of the servo: where the search begins; table1 is the paper's (default: nothing, Eq. 6 from"

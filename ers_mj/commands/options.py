@@ -87,6 +87,12 @@ def pair(text: str) -> tuple[str, str]:
     return name, column
 
 
+def add_model(parser: argparse.ArgumentParser, told: str) -> None:
+    """MODEL, or --model as every command has it."""
+    parser.add_argument("model", nargs="?", default=argparse.SUPPRESS, metavar="MODEL", help=told)
+    parser.add_argument("--model", dest="model", default="table1", metavar="MODEL", help="the same, by name")
+
+
 def add_recordings(parser: argparse.ArgumentParser) -> None:
     """REC, at least one."""
     parser.add_argument(

@@ -6,7 +6,7 @@ import argparse
 import math
 
 from ers_mj.commands.keeping import keep_file, table_file
-from ers_mj.commands.options import number, whole
+from ers_mj.commands.options import add_model, number, whole
 from ers_mj.door.saving import as_json
 
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
@@ -24,9 +24,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             " --out rec.csv\n  ers simulate model.toml --plant reduced --input volts.csv --out rec.csv"
         ),
     )
-    parser.add_argument(
-        "model", nargs="?", default="table1", metavar="MODEL", help="datasheet or model.toml (default table1)"
-    )
+    add_model(parser, "datasheet or model.toml (default table1)")
     parser.add_argument("--plant", choices=PLANTS, default="reduced", help="what to simulate (default reduced)")
     parser.add_argument(
         "--input", required=True, metavar="CSV|NAME", help="columns t_s,u_V, or multisine, chirp, ramp, steps, square"

@@ -13,6 +13,7 @@ from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, condit
 from ers_mj.commands.options import (
     add_cluster,
     add_common,
+    add_model,
     add_out,
     angle_deg,
     crew_of,
@@ -75,13 +76,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def _add_what(parser: argparse.ArgumentParser) -> None:
     """Which laws, on which plants, over which references."""
-    parser.add_argument(
-        "model",
-        nargs="?",
-        default="table1",
-        metavar="MODEL",
-        help="the plant: datasheet or model.toml with its effects (default table1)",
-    )
+    add_model(parser, "the plant: datasheet or model.toml with its effects (default table1)")
     parser.add_argument(
         "--design", metavar="MODEL", help="what the controllers know of the plant (default the MODEL itself)"
     )

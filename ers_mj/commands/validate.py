@@ -35,7 +35,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ),
     )
     parser.add_argument(
-        "--datasheet", default="table1", metavar="TOML", help="datasheet or model.toml (default table1, the paper's)"
+        "--datasheet",
+        "--model",
+        default="table1",
+        metavar="TOML",
+        help="datasheet or model.toml (default table1, the paper's)",
     )
     parser.add_argument(
         "--gap", type=several(number(least=0), "gap"), metavar="DEG,...", help="play of +-DEG (default 0)"

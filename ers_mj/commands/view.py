@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.keeping import Kept, keep_file
-from ers_mj.commands.options import mapping, number, pair, whole
+from ers_mj.commands.options import add_model, mapping, number, pair, whole
 from ers_mj.commands.output import Progress
 from ers_mj.door.saving import as_json, refuse_file, write_file
 from ers_mj.errors import InputError
@@ -53,13 +53,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "  ers view plant.xml --input steps --render steps.gif"
         ),
     )
-    parser.add_argument(
-        "model",
-        nargs="?",
-        default="table1",
-        metavar="MODEL",
-        help="datasheet, model.toml or plant.xml (default table1)",
-    )
+    add_model(parser, "datasheet, model.toml or plant.xml (default table1)")
     parser.add_argument("--linkage", choices=LINKAGES, help="of the rudder (default constant)")
     parser.add_argument("--gap", type=number(least=0), metavar="DEG", help="play of +-DEG (default 0)")
     shown = parser.add_mutually_exclusive_group()

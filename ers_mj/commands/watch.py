@@ -42,6 +42,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("stream", metavar="FILE|-", help="a CSV file that may grow, or - for standard input")
     parser.add_argument(
         "--datasheet",
+        "--model",
         metavar="TOML",
         help=(
             "what is known of the servo, or a model.toml; table1 for the paper's (default: learn it from the first 5 s)"

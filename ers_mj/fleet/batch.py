@@ -113,6 +113,7 @@ def _tasks(batch: Batch) -> Iterator[Task]:
         if servo.name in batch.rows:
             continue
         try:
+            batch.asked[servo.name] = fingerprint(servo, batch.settings, sources())  # files may have changed meanwhile
             read = read_servo(servo)
         except ErsError as error:
             _keep(batch, failed(servo.name, str(error).replace(f"{servo.folder}/", "")), {})
