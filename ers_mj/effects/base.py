@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy.linalg.blas import dtbsv
 
 from ers_mj.decisions.thresholds import Policy
 from ers_mj.effects.quantities import Coefficients, Parameter, Scales, Symptoms, Twin
 
-NOTHING = 1e-18  # share of an impulse below which it is no more in a sum of numbers
 LEAST_IRON = 0.25  # share of an inductance that no current saturates
 RETURNS = (
     2.0  # periods of a torque that returns with the angle which the travel must hold: less is a spring or a weight
@@ -267,15 +267,9 @@ class Sensor(Effect):
 
 
 def recursive(decay: np.ndarray, driven: np.ndarray) -> np.ndarray:
-    """z (N,) of z[k] = decay[k] z[k - 1] + driven[k], from z[0] = driven[0], by doubling: what is
-    left of an impulse after 1, 2, 4, ... samples is added up.
-    """
-    z, left, step = np.array(driven, float), np.array(decay, float), 1
-    while step < z.size and np.max(np.abs(left[step:])) > NOTHING:
-        z[step:] += left[step:] * z[:-step]
-        left[step:] *= left[:-step]
-        step *= 2
-    return z
+    """z (N,) of z[k] = decay[k] z[k - 1] + driven[k], from z[0] = driven[0]: a triangular system of two diagonals."""
+    band = np.vstack([np.ones(driven.size), np.append(-decay[1:], 0.0)])
+    return dtbsv(1, band, driven, lower=1)
 
 
 def law(function: Callable) -> staticmethod:

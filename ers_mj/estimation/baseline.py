@@ -15,7 +15,6 @@ from ers_mj.decisions import explained
 from ers_mj.decisions.thresholds import POLICY
 from ers_mj.errors import InputError
 from ers_mj.estimation.fit import Along, fit, hopped
-from ers_mj.estimation.initial_guess import guesses
 from ers_mj.estimation.initial_state import with_starts, without_spikes
 from ers_mj.estimation.objective import Fit, run_of, tau_of
 from ers_mj.estimation.scales import ampere_in, free_in, scales_of
@@ -175,6 +174,8 @@ def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angl
 
 def _acts_the_other_way(traces: Sequence[Trace], b: float) -> bool:
     """Whether a regression says that the input acts the other way than a datasheet says."""
+    from ers_mj.estimation.initial_guess import guesses  # brings scipy.signal, as in search
+
     best = next(iter(guesses(traces)), None)
     return best is not None and best.values["b"] * b < 0
 

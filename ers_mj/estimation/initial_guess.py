@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import nnls
+from scipy.signal import savgol_filter
 
 from ers_mj.data.prepared import Trace
-from ers_mj.data.smoothing import parabolic
 from ers_mj.effects.base import Effect
-from ers_mj.solvers.nonnegative import nonnegative
 
 WINDOWS = (0.1, 0.3, 1.0)  # [s], never shorter than SHORTEST samples
 SHORTEST = 16
@@ -65,7 +65,7 @@ def _rows(trace: Trace, window: float, still: float) -> Rows | None:
     slope = np.gradient(bump, n * h / n)
     bend = np.gradient(slope, h)
     y = np.interp(trace.t, trace.t[trace.valid], trace.y[trace.valid])
-    w = parabolic(y, max(5, min(n // 2 * 2 + 1, 2 * int(0.02 / h) + 5)), h)
+    w = savgol_filter(y, max(5, min(n // 2 * 2 + 1, 2 * int(0.02 / h) + 5)), 2, deriv=1, delta=h)
     sign = np.clip(w / still, -1.0, 1.0)
     starts = np.arange(0, y.size - n - 1, max(n // 4, 1))
     index = starts[:, None] + np.arange(n + 1)
@@ -86,7 +86,7 @@ def guesses(traces: Sequence[Trace], holding: Sequence[Effect] = ()) -> list[Gue
     the effects ``holding`` the output in their place; none of an absurd gain.
     """
     y = np.concatenate([t.y[t.valid] for t in traces])
-    speed = np.concatenate([np.abs(np.diff(parabolic(t.y[t.valid], 9))) / t.sample_time for t in traces])
+    speed = np.concatenate([np.abs(np.diff(savgol_filter(t.y[t.valid], 9, 2))) / t.sample_time for t in traces])
     still = max(0.02 * float(np.quantile(speed, 0.98)), 1e-12)
     found = [one for window in WINDOWS for one in _by_window(traces, window, still, y, holding)]
     found.sort(key=lambda guess: guess.misfit)
@@ -151,7 +151,7 @@ class Joint(NamedTuple):
         both = np.column_stack([design / size, -design[:, signed] / size[signed]])
         weight = np.ones(right.size)
         for _ in range(4):
-            x = nonnegative(both * weight[:, None], right * weight)
+            x = nnls(both * weight[:, None], right * weight)[0]
             x[signed] -= x[design.shape[1] :]
             x = x[: design.shape[1]] / size
             e = right - design @ x

@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.special import stdtrit
 
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.jacobian import central_jacobian
 from ers_mj.estimation.objective import residuals
 from ers_mj.servo.model import OBSERVER_RATE, STATES, Model
-from ers_mj.solvers.student import quantile
 
 UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (decisions.policy.least_gain is what it must)
 UNSEEN = 1.0  # effects of that size that act, on average
@@ -49,7 +49,7 @@ def half_widths(
         z = np.array([m.vector(layout) for m in left_out])
         n = len(left_out)
         widths = np.hypot(
-            widths, quantile(n - 1, 0.975) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0))
+            widths, stdtrit(n - 1, 0.975) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0))
         )
     return widths
 
@@ -65,7 +65,7 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.nd
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
     n = slopes.shape[0]
     covariance = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
-    return quantile(max(n - len(layout), 1), 0.975) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return stdtrit(max(n - len(layout), 1), 0.975) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
 def _left(model: Model, traces: Sequence[Trace]) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from ers_mj.data.prepared import Trace
 from ers_mj.decisions.thresholds import POLICY
@@ -11,10 +12,12 @@ from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.quantities import Scales
 from ers_mj.errors import InputError
 from ers_mj.estimation.fit import descend, fit
-from ers_mj.estimation.initial_guess import Guess, guesses
 from ers_mj.estimation.objective import Fit, cost_of
 from ers_mj.estimation.scales import ampere_in, free_in, scales_of
 from ers_mj.servo.model import Model
+
+if TYPE_CHECKING:
+    from ers_mj.estimation.initial_guess import Guess
 
 OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
 OPENING_TAU = 1e3  # and the misfit at which its cost turns to logarithms
@@ -79,6 +82,10 @@ class Kinds:
         Raises:
             InputError: an input of zeros, or too little motion.
         """
+        from ers_mj.estimation.initial_guess import (
+            guesses,  # brings scipy.signal, which takes a second to import and is needed here alone
+        )
+
         if not any(t.u.any() for t in traces):
             raise InputError("the input is zero throughout: without a datasheet nothing tells what an input does")
         opened = any(t.enable is not None and not t.enable.all() for t in traces)

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import stdtrit
 
 from ers_mj.position_loop import beside
 from ers_mj.position_loop.fit import Data, Fit, fitted, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
-from ers_mj.solvers.student import quantile
 
 RUN = 5  # neighbouring blocks that are taken as one
 FEWEST = 3  # left-out refits from which they count
@@ -61,7 +61,7 @@ class Intervals:
         if len(left_out) >= FEWEST and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
         spread += np.diag([_inexact(f, q, rate) ** 2 for f, q in zip(layout, model.vector(layout), strict=True)])
-        return Intervals(model, tuple(layout), spread, quantile(max(n - len(layout), 1), 0.975))
+        return Intervals(model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
 
     def told(self, owner: str, name: str) -> Told | None:
         """A fitted number."""

@@ -9,13 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize
 
 from ers_mj.data.prepared import BLOCK, Trace
 from ers_mj.decisions.explained import cost
 from ers_mj.effects import Effect
 from ers_mj.estimation.objective import Run, residuals_in
 from ers_mj.servo.model import OBSERVER_RATE, Model
-from ers_mj.solvers.simplex import lowest
 
 
 @dataclass(frozen=True)
@@ -186,5 +186,11 @@ def brought_nearer(gain: Gain, effect: Effect, start: np.ndarray) -> np.ndarray:
     step = [0.03 if effect.parameters[k].name == "t_0" else 0.3 * start[k] for k in free]
     bounds = [(effect.parameters[k].lower, effect.parameters[k].upper) for k in free]
     first = np.clip(start[free] + np.vstack([np.zeros(len(free)), np.diag(step)]), *np.transpose(bounds))
-    found = lowest(lambda p: -gain(whole(p)), first, bounds, most=NEARING.simulations, within=NEARING.within)
-    return whole(found)
+    found = minimize(
+        lambda p: -gain(whole(p)),
+        first[0],
+        method="Nelder-Mead",
+        bounds=bounds,
+        options={"initial_simplex": first, "maxfev": NEARING.simulations, "xatol": np.inf, "fatol": NEARING.within},
+    )
+    return whole(found.x)

@@ -11,7 +11,6 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 from ers_mj.estimation.objective import Run
-from ers_mj.selection.recursion import two_poles
 from ers_mj.servo.model import OBSERVER_RATE
 
 
@@ -75,24 +74,24 @@ def _compared(left: np.ndarray, trace: Trace, rates: np.ndarray, a_2: float) -> 
     """(products with what is left, squared sizes) (orders,) of waves of each kind and each of these ``rates`` [1/output
     unit], in one recording.
     """
+    from scipy.signal import lfilter  # takes a second to import
+
     h = trace.sample_time
     y = np.interp(trace.t, trace.t[trace.valid], trace.y[trace.valid])
     way = np.sign(np.convolve(np.gradient(y, h), np.ones(5) / 5, "same"))
     slow, fast = np.exp(-OBSERVER_RATE * h), np.exp(-a_2 * h)
 
     def through(wave: np.ndarray) -> np.ndarray:
-        out = np.empty(wave.size, complex)
-        two_poles(h * h * wave, slow, fast, out)
-        return out
+        return lfilter([h * h], [1.0, -slow - fast, slow * fast], wave)
 
     white = _whitening(left)
-    left = np.convolve(left, white)[: left.size]
+    left = lfilter(white, 1.0, left)
     left = left / max(float(np.std(left)), 1e-300)
     out = [(np.empty(rates.size, complex), np.empty(rates.size)) for _ in KINDS]
     for k, rate in enumerate(rates):
         wave = np.exp(1j * rate * y)
         for (hit, power), moved in zip(out, (through(wave), through(wave * way), wave), strict=True):
-            seen = np.convolve(moved, white)[: left.size]
+            seen = lfilter(white, 1.0, moved)
             hit[k], power[k] = left @ seen.conj(), float(np.vdot(seen, seen).real)
     return out
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+from scipy.linalg.blas import dger
 
 
 class Point(Protocol):
@@ -109,9 +110,8 @@ class Descent(Generic[P]):
         promised = float(-(slope @ moved + 0.5 * moved @ self.curvature @ moved))
         step = Step(before.cost - there.cost, promised, self.fresh)
         if step.gain > self.rule.keeps * promised and moved @ moved > 0:
-            missed = (there.e - before.e - slopes @ moved) / float(moved @ moved)
-            for column, share in zip(slopes.T, moved):  # in place: slopes lie by columns
-                column += share * missed
+            missed = there.e - before.e - slopes @ moved
+            dger(1.0 / float(moved @ moved), missed, moved, a=slopes, overwrite_a=1)  # in place: slopes lie by columns
             self.fresh = False
         else:
             self.slopes = None
