@@ -44,10 +44,17 @@ def loaded(
     columns = {k: x for k, x in upright.items() if len(x) == count}
     constants = {k: np.full(count, float(x)) for k, x in numeric.items() if x.ndim == 0}
     other = [k for k in long if k not in columns]
-    left_out = {k: f"has {len(numeric[k])} values and others {count}" for k in other}
-    left_out |= {k: "holds no numbers" for k in arrays if k not in numeric}
     told = [*notes, *_left_out(arrays, numeric, other, count)]
-    return Loaded(table_of(columns | constants, name), tuple(told), units or {}, left_out)
+    why = _why_left_out(arrays, numeric, other, count)
+    return Loaded(table_of(columns | constants, name), tuple(told), units or {}, why)
+
+
+def _why_left_out(
+    arrays: Mapping[str, np.ndarray], numeric: Mapping[str, np.ndarray], other: Sequence[str], count: int
+) -> dict[str, str]:
+    """What is no column, and why."""
+    lengths = {k: f"has {len(numeric[k])} values and others {count}" for k in other}
+    return lengths | {k: "holds no numbers" for k in arrays if k not in numeric}
 
 
 def _numeric(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -54,8 +54,12 @@ def on_one_clock(signals: Sequence[Signal], wanted: Mapping[str, str], name: str
         values = s.values[rows].astype(float) if s is base else _held(s, times)
         columns["t_s of the file" if s.name == "t_s" else s.name] = values
     told = [*notes, *_told(base, others, base.t.size - first.size)]
-    left_out = {s.name: "holds no numbers" for s in signals if not s.is_numeric}
-    return Loaded(pa.table(columns), tuple(told), {s.name: s.unit for s in known if s.unit}, left_out)
+    return Loaded(pa.table(columns), tuple(told), {s.name: s.unit for s in known if s.unit}, _no_numbers(signals))
+
+
+def _no_numbers(signals: Sequence[Signal]) -> dict[str, str]:
+    """Signals that are no columns, and why."""
+    return {s.name: "holds no numbers" for s in signals if not s.is_numeric}
 
 
 def _told(base: Signal, others: Sequence[Signal], doubled: int) -> list[str]:

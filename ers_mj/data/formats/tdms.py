@@ -28,15 +28,9 @@ def load(file: File) -> Loaded:
     """The channels of a file."""
     nptdms = library("nptdms", "npTDMS", "tdms", file.name)
     found = nptdms.TdmsFile.read(io.BytesIO(file.content))
-    cut = found.file_status.incomplete_final_segment
-    notes = ["the file is cut off, what could be read of it is taken"] * cut
     channels = [channel for group in found.groups() for channel in group.channels()]
-    common = min(map(len, channels), default=0) if cut else None  # the last ones lack most
-    if cut and not common:
-        raise InputError(f"{file.name}: is cut off, and holds no whole channels")
-    values = {f"{c.group_name}/{c.name}": np.asarray(c[:common]) for c in channels}
-    one_group = len({c.group_name for c in channels}) == 1
-    named = [(c.name if one_group else key, c, x) for c, (key, x) in zip(channels, values.items())]
+    notes, common = _whole(found, channels, file)
+    named = [(name, c, np.asarray(c[:common])) for name, c in _named(channels)]
     units = {name: str(c.properties[UNIT]) for name, c, _ in named if c.properties.get(UNIT)}
     if not channels or not all(STEP in c.properties for c in channels):
         return arrays.loaded({name: x for name, _, x in named}, file.name, notes, units)
@@ -45,6 +39,22 @@ def load(file: File) -> Loaded:
     first = min(_stamp(properties) for run in runs for _, properties in run.values())
     signals = [Signal(name, _times(c.path, runs, first)[:common], x, units.get(name, "")) for name, c, x in named]
     return on_one_clock(signals, file.wanted, file.name, notes)
+
+
+def _whole(found: Any, channels: Sequence[Any], file: File) -> tuple[list[str], int | None]:
+    """What is to be told of a file that is cut off, and how many values all its channels have."""
+    if not found.file_status.incomplete_final_segment:
+        return [], None
+    common = min(map(len, channels), default=0)
+    if not common:
+        raise InputError(f"{file.name}: is cut off, and holds no whole channels")
+    return ["the file is cut off, what could be read of it is taken"], common
+
+
+def _named(channels: Sequence[Any]) -> list[tuple[str, Any]]:
+    """Channels by name, with their group's where there are several groups."""
+    one_group = len({c.group_name for c in channels}) == 1
+    return [(c.name if one_group else f"{c.group_name}/{c.name}", c) for c in channels]
 
 
 Run = Mapping[str, tuple[int, Mapping[str, Any]]]  # path of a channel -> how many values it has by then, properties
