@@ -41,7 +41,8 @@ def blocks(page: Path, language: str) -> list[tuple[bool, str]]:
 
 def lines(text: str) -> list[list[str]]:
     """The calls of `ers` in a block of shell, without the name and comments."""
-    return [shlex.split(line, comments=True)[1:] for line in text.splitlines() if line.startswith("ers ")]
+    whole = text.replace("\\\n", " ").splitlines()
+    return [shlex.split(line, comments=True)[1:] for line in whole if line.startswith("ers ")]
 
 
 def calls(exempt: bool) -> list[list[str]]:
