@@ -30,7 +30,8 @@ PENDULUM = """## The STS3215's weight, withheld
 
 Told as volts, without its position loop, gravity was named as a spring that softens as the weight's sine does.
 `python analysis/pendulum_ratio.py ../shared/data/sts3215 --runs 3` fits gravity to each of its eight loads alone:
-linear in m l (r² 0.991), heaviest to lightest 3.63 where m l has 3.28 ([each load](../analysis/results/pendulum_ratio.txt)).
+linear in m l (r² 0.991), heaviest to lightest 3.63 where m l has 3.28
+([each load](../analysis/results/pendulum_ratio.txt)).
 """
 
 
