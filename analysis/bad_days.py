@@ -53,6 +53,8 @@ class Table:
 
 def drawn(strategy, count: int, number: int, use) -> None:
     """Use so many examples, of which none ends the others."""
+    if not count:
+        return
     mild = settings(
         max_examples=count,
         deadline=None,
@@ -95,7 +97,7 @@ def try_readers(table: Table, count: int, number: int, folder: Path) -> None:
         read(table, "odd columns as arrays", folder, lambda: bad_inputs.survived_columns(columns), columns)
 
     drawn(bad_inputs.damaged_files(), 2 * count // 3, number, damaged)
-    drawn(bad_inputs.tables(), max(count // 9, 1), number, odd)
+    drawn(bad_inputs.tables(), count // 9, number, odd)
 
 
 # -- commands, each in a child of this process ------------------------------------------------------------------------
@@ -193,13 +195,25 @@ def try_lines(table: Table, count: int, number: int) -> None:
 # -- interruptions, each of a process of its own ----------------------------------------------------------------------
 
 
+def heeding() -> None:
+    """In a child: Ctrl-C is heeded, also where this script runs behind a shell that has it ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def try_stops(table: Table, count: int) -> None:
     """A diagnosis that is stopped ever later."""
     for k in range(count):
         with tempfile.TemporaryDirectory(prefix="bad-days-") as outer:
             (Path(outer) / "rec.csv").write_bytes(bad_inputs.files()[".csv"][0])
             command = [sys.executable, "-m", "ers_mj", "diagnose", "rec.csv", "--out", "res"]
-            child = subprocess.Popen(command, cwd=outer, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            child = subprocess.Popen(
+                command,
+                cwd=outer,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                preexec_fn=heeding,
+            )
             time.sleep(0.4 + 0.25 * k)  # by then Python itself has started
             began = time.monotonic()
             child.send_signal((signal.SIGINT, signal.SIGTERM)[k % 2])

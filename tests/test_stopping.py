@@ -43,6 +43,7 @@ def stopped(program: list[str], number: int = signal.SIGINT) -> tuple[int, str]:
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": paths},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background has it ignored
     ) as process:
         try:
             assert process.stdout.readline().strip() == "ready"
