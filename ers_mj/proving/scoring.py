@@ -55,11 +55,10 @@ def subsystem_of(name: str) -> str:
 def row_of(truth: Mapping, answer: Mapping) -> dict:
     """What counts of one case: truth and answer side by side."""
     document = answer.get("document") or {}
-    fit, remainder = document.get("fit") or {}, document.get("remainder") or {}
-    inherent = truth.get("inherent") or []
-    every = document.get("missing") or []
-    missing = [m for m in every if m["effect"] not in inherent]
-    where = [entry.get("label") for entry in document.get("where") or [] if entry.get("axis") == "subsystem"]
+    return {**_concealed(truth), **_answered(truth, document), **_cost(answer), "parameters": covered(truth, document)}
+
+
+def _concealed(truth: Mapping) -> dict:
     return {
         "case": truth["case"],
         "family": truth.get("family"),
@@ -74,22 +73,31 @@ def row_of(truth: Mapping, answer: Mapping) -> dict:
         "strength": truth["effects"][0]["strength"] if truth.get("effects") else None,
         "visibility": _or_nan(truth["visibility_after_refit_sigma"]),
         "each": {e["label"]: e.get("quick_visibility_sigma") for e in truth.get("effects", [])},
+        "inherent": truth.get("inherent") or [],
+    }
+
+
+def _answered(truth: Mapping, document: Mapping) -> dict:
+    """What was named and how it fits; the names that the family always has stand apart."""
+    fit, remainder = document.get("fit") or {}, document.get("remainder") or {}
+    inherent, every = truth.get("inherent") or [], document.get("missing") or []
+    missing = [m for m in every if m["effect"] not in inherent]
+    where = [entry.get("label") for entry in document.get("where") or [] if entry.get("axis") == "subsystem"]
+    return {
         "named": [m["effect"] for m in missing],
-        "inherent": inherent,
         "inherent_named": [m["effect"] for m in every if m["effect"] in inherent],
         "verdict": document.get("verdict") or NO_ANSWER,
-        "error": answer.get("error"),
         "significant": bool(remainder.get("significant")),
         "where": where[:1],
         "beliefs": beliefs(missing),
         "before": fit.get("heldout_rmse_before_rad"),
         "after": fit.get("heldout_rmse_after_rad"),
         "floor": fit.get("noise_floor_rad"),
-        "cpu_s": answer.get("cpu_s"),
-        "wall_s": answer.get("wall_s"),
-        "peak_MiB": answer.get("peak_MiB"),
-        "parameters": covered(truth, document),
     }
+
+
+def _cost(answer: Mapping) -> dict:
+    return {name: answer.get(name) for name in ("error", "cpu_s", "wall_s", "peak_MiB")}
 
 
 def _or_nan(x: float | None) -> float:
