@@ -80,7 +80,7 @@ def test_other_files_are_refused_by_what_they_are(tmp_path, name, content, words
 
 @pytest.mark.parametrize("spec", ["nothing.csv", ".", "nothing.parquet#run=3", "a\0b.csv", "x" * 5000 + ".csv"])
 def test_paths_that_lead_nowhere(tmp_path, spec):
-    with pytest.raises(InputError, match=r"no such file|cannot be read|is a folder"):
+    with pytest.raises(InputError, match=r"no such file|cannot be read|is a folder| \.\.\. "):
         read_recording(f"{tmp_path}/{spec}")
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 from scipy.stats import binomtest
@@ -54,50 +54,48 @@ def subsystem_of(name: str) -> str:
 
 def row_of(truth: Mapping, answer: Mapping) -> dict:
     """What counts of one case: truth and answer side by side."""
-    document = answer.get("document") or {}
-    return {**_concealed(truth), **_answered(truth, document), **_cost(answer), "parameters": covered(truth, document)}
+    return (
+        _concealed(truth)
+        | _answered(answer, truth.get("inherent") or [])
+        | {"parameters": covered(truth, answer.get("document") or {})}
+    )
 
 
 def _concealed(truth: Mapping) -> dict:
+    """What counts of a truth."""
+    effects = truth.get("effects") or []
     return {
         "case": truth["case"],
-        "family": truth.get("family"),
-        "sheet": truth.get("sheet"),
-        "faults": [fault["kind"] for fault in truth.get("faults", [])],
         "kind": truth["kind"],
         "labels": truth["labels"],
-        "linkage": truth.get("linkage"),
+        **{key: truth.get(key) for key in ("family", "sheet", "linkage", "rig", "size")},
+        "faults": [fault["kind"] for fault in truth.get("faults", [])],
         "clutter": [e["label"] for e in truth.get("clutter", [])],
-        "rig": truth.get("rig"),
-        "size": truth.get("size"),
-        "strength": truth["effects"][0]["strength"] if truth.get("effects") else None,
+        "strength": effects[0]["strength"] if effects else None,
         "visibility": _or_nan(truth["visibility_after_refit_sigma"]),
-        "each": {e["label"]: e.get("quick_visibility_sigma") for e in truth.get("effects", [])},
+        "each": {e["label"]: e.get("quick_visibility_sigma") for e in effects},
         "inherent": truth.get("inherent") or [],
     }
 
 
-def _answered(truth: Mapping, document: Mapping) -> dict:
-    """What was named and how it fits; the names that the family always has stand apart."""
-    fit, remainder = document.get("fit") or {}, document.get("remainder") or {}
-    inherent, every = truth.get("inherent") or [], document.get("missing") or []
+def _answered(answer: Mapping, inherent: Collection[str]) -> dict:
+    """What counts of an answer; what the family always has is set aside."""
+    document = answer.get("document") or {}
+    fit, every = document.get("fit") or {}, document.get("missing") or []
     missing = [m for m in every if m["effect"] not in inherent]
     where = [entry.get("label") for entry in document.get("where") or [] if entry.get("axis") == "subsystem"]
     return {
         "named": [m["effect"] for m in missing],
         "inherent_named": [m["effect"] for m in every if m["effect"] in inherent],
         "verdict": document.get("verdict") or NO_ANSWER,
-        "significant": bool(remainder.get("significant")),
+        "significant": bool((document.get("remainder") or {}).get("significant")),
         "where": where[:1],
         "beliefs": beliefs(missing),
         "before": fit.get("heldout_rmse_before_rad"),
         "after": fit.get("heldout_rmse_after_rad"),
         "floor": fit.get("noise_floor_rad"),
+        **{key: answer.get(key) for key in ("error", "cpu_s", "wall_s", "peak_MiB")},
     }
-
-
-def _cost(answer: Mapping) -> dict:
-    return {name: answer.get(name) for name in ("error", "cpu_s", "wall_s", "peak_MiB")}
 
 
 def _or_nan(x: float | None) -> float:
