@@ -108,6 +108,13 @@ def test_a_servo_without_an_effect_leaves_less_than_the_noise(bare):
         assert bench.pooled([np.sqrt(np.mean(miss**2)) for miss in bench.misses(servo, runs)]) < 0.7, name
 
 
+def test_bristles_too_stiff_for_the_step_are_stepped_finer(bare):
+    servo, _ = bare["direct"]
+    shape = {"form": "Dahl", "bristle_damping_ratio": 0.0, "v_d_rad_s": 0.0, "delta": 1.5}
+    runs = recorded(servo, [{"label": "presliding", "strength": 0.002, "shape": shape}], 1e-4)
+    assert all(np.isfinite(run.true).all() for run in runs)
+
+
 def test_what_is_concealed_leaves_what_was_drawn_and_the_seed_alone_draws_it():
     files, truth = world.make(Plan(0, "single", ("stribeck",), "direct", 0), 5)
     (effect,) = truth["effects"]

@@ -78,10 +78,18 @@ def is_stiff(effects: Sequence[dict]) -> bool:
 
 
 def recorded(servo: Servo, effects: Sequence[dict], step: float | None = None) -> list[Run]:
-    """Every recording with these effects beside what the servo always has; the finest step by default."""
+    """Every recording with these effects beside what the servo always has; the finest step by default.
+
+    Raises:
+        ArithmeticError: the motion is not finite even at a sixteenth of the step.
+    """
     if step is None:
         step = STEPS.finest if is_stiff(effects) or servo.params["L"] else STEPS.fine
-    return [_run(servo, record, k, effects, step) for k, record in enumerate(servo.records)]
+    for finer in (1.0, 0.25, 0.0625):
+        runs = [_run(servo, record, k, effects, finer * step) for k, record in enumerate(servo.records)]
+        if all(np.isfinite(run.true).all() for run in runs):
+            return runs
+    raise ArithmeticError(f"{servo.family}: no finite motion at steps of {finer * step:g} s")
 
 
 @dataclass

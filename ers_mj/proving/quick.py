@@ -41,10 +41,16 @@ COARSE, FINE, ROUGH = 4e-5, 1e-5, 1e-4
 
 
 @njit(cache=True)
-def rates(p, y, t, u, gain, rudder, motor, side, dy):
-    """y' with friction directions `rudder`, `motor` (+-1, 0 at rest) and preload side `side` (+-1) held."""
+def hold_current(p, y, u, gain):
+    """Put the current where it settles, of a winding without inductance."""
     if p.quasi > 0.0:
         y[CUR] = settled_current(p, y, u, gain)
+
+
+@njit(cache=True)
+def rates(p, y, t, u, gain, rudder, motor, side, dy):
+    """y' with friction directions `rudder`, `motor` (+-1, 0 at rest) and preload side `side` (+-1) held."""
+    hold_current(p, y, u, gain)
     tau, tau_m = free_torques(p, y, t)
     dy[TH] = dy[W] = 0.0
     if rudder != 0.0:
@@ -118,8 +124,7 @@ def advance(p, y, t, u, gain, h, work):
     """One step of length h, cut at every reversal and at every pass of theta_0."""
     out, left, hold, hold_m = work[3], h, False, False
     for count in range(10):
-        if p.quasi > 0.0:
-            y[CUR] = settled_current(p, y, u, gain)
+        hold_current(p, y, u, gain)
         rudder, motor, side = directions(p, y, t)
         rudder = 0.0 if hold and y[W] == 0.0 else rudder
         motor = 0.0 if hold_m and y[WM] == 0.0 else motor

@@ -77,8 +77,10 @@ def conceal(
 
 
 def _lowest(effect: Effect, ruler: Ruler, wider: float) -> float:
-    """The least strength that counts; an inductance must stand out from the ordinary one."""
-    low = effect.low * wider
+    """The least strength that counts; an inductance must stand out from the ordinary one, and bristles must not be too
+    stiff for the step.
+    """
+    low = effect.low * (1.0 if effect.name == "presliding" else wider)
     return max(low, 2.5 * ruler.ordinary_inductance) if effect.name == "inductance" else low
 
 
