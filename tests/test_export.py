@@ -20,6 +20,7 @@ from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.export.mujoco_joint import OwnJoint
 from ers_mj.export.servo import servo_of
 from ers_mj.export.targets import TARGETS
+from ers_mj.export.translation import translated
 from ers_mj.export.trying import apart, excitation, response
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
 
@@ -132,6 +133,12 @@ def test_the_fmu_is_source_that_compiles_without_a_word(limited, tmp_path):
     flags = ["-std=c99", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror", "-fsyntax-only"]
     done = subprocess.run([COMPILER, *flags, "model.c"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_law_that_is_not_put_into_c_is_refused_in_a_sentence():
+    assert "a - b * floor(a / b)" in translated("def f(a, b):\n    return a % b\n")  # Python's sign, not fmod's
+    with pytest.raises(ers.InputError, match=r"for k in at.*--to control"):
+        translated("def f(at):\n    for k in at:\n        g(k)\n")
 
 
 def test_an_fmus_numbers_may_be_changed_and_its_state_kept(limited):

@@ -31,6 +31,7 @@ def copy(tmp_path_factory):
     (folder / "ers_mj" / "effects" / "eddy_brake.py").write_text(code)
     return folder, {
         **os.environ,
+        "PYTEST_ADDOPTS": "-n 0 --no-cov",  # one process, whatever runs this one
         "PYTHONPATH": os.pathsep.join([str(folder), str(ROOT / "tests")]),
         "OPENBLAS_NUM_THREADS": "1",
     }

@@ -10,6 +10,8 @@ import math
 import textwrap
 from collections.abc import Callable, Mapping
 
+from ers_mj.errors import InputError
+
 POINTERS = {
     "c": "const Servo *c",
     "x": "State *x",
@@ -60,7 +62,11 @@ class _Written(ast.NodeTransformer):
 
 
 def translated(text: str) -> str:
-    """C of a text of functions: their prototypes, then their bodies."""
+    """C of a text of functions: their prototypes, then their bodies.
+
+    Raises:
+        InputError: a law says what C has no words for here.
+    """
     functions = functions_of(text)
     heads = [_head(function) for function in functions]
     return "\n".join([*(f"{head};" for head in heads), "", *map(_function, functions)])
@@ -116,7 +122,12 @@ def _statement(node: ast.stmt, depth: int) -> list[str]:
         word = "if" if isinstance(node, ast.If) else "while"
         lines = [f"{pad}{word} ({_bare(node.test)}) {{", *_block(node.body, depth + 1), f"{pad}}}"]
         return lines + ([f"{pad}else {{", *_block(node.orelse, depth + 1), f"{pad}}}"] if node.orelse else [])
-    raise NotImplementedError(f"no C for {ast.unparse(node)!r}")
+    raise _untold(node)
+
+
+def _untold(node: ast.AST) -> InputError:
+    told = ast.unparse(node).splitlines()[0][:80]
+    return InputError(f"fmu: a law says {told!r}, which is not put into C: --to control takes it as it is")
 
 
 def _bare(node: ast.expr) -> str:
@@ -130,7 +141,7 @@ def _c(node: ast.expr) -> str:
     for kind, write in _WRITERS.items():
         if isinstance(node, kind):
             return write(node)
-    raise NotImplementedError(f"no C for {ast.unparse(node)!r}")
+    raise _untold(node)
 
 
 def _attribute(node: ast.Attribute) -> str:
@@ -155,7 +166,9 @@ def _binary(node: ast.BinOp) -> str:
     left, right = _c(node.left), _c(node.right)
     if isinstance(node.op, ast.Pow):
         return f"({left} * {left})" if right == "2.0" and left.isidentifier() else f"pow({left}, {right})"
-    return f"fmod({left}, {right})" if isinstance(node.op, ast.Mod) else f"({left} {OPERATORS[type(node.op)]} {right})"
+    if isinstance(node.op, ast.Mod):  # Python's has the divisor's sign, C's fmod the dividend's
+        return f"({left} - {right} * floor({left} / {right}))"
+    return f"({left} {OPERATORS[type(node.op)]} {right})"
 
 
 def _compare(node: ast.Compare) -> str:
