@@ -1,6 +1,6 @@
 """``python -m ers_mj`` is ``ers``: signals are heeded from here on, before anything else is loaded."""
 
-from ers_mj.stopping import guarded
+from ers_mj.processes.stopping import guarded
 
 
 def main() -> int:

@@ -14,10 +14,11 @@ from typing import NoReturn
 # before numpy comes: threads are for recordings and effects, not for small matrices
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from ers_mj import __version__, stopping
+from ers_mj import __version__
 from ers_mj.commands import COMMANDS
 from ers_mj.commands.output import quietly
 from ers_mj.errors import ErsError, InputError
+from ers_mj.processes import stopping
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # of a place that takes no more
 

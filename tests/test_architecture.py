@@ -11,15 +11,14 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ers_mj"
 MAY_READ = {
     "errors": (),
-    "passing": (),
-    "stopping": ("passing",),
+    "processes": (),
     "comparing": ("errors",),
     "workers": ("errors",),
     "decisions": (),
     "solvers": (),
-    "data": ("decisions", "errors", "passing"),
+    "data": ("decisions", "errors", "processes"),
     "effects": ("decisions", "errors"),
-    "plants": ("effects", "errors", "passing"),
+    "plants": ("effects", "errors", "processes"),
     "servo": ("data", "effects", "errors", "plants"),
     "estimation": ("data", "decisions", "effects", "errors", "servo", "solvers"),
     "identification": ("data", "errors", "estimation", "plants", "servo", "solvers"),
@@ -34,19 +33,19 @@ MAY_READ = {
     "control": ("data", "effects", "errors", "plants", "servo", "workers"),
     "validation": ("plants", "servo"),
     "view": ("data", "diagnosis", "errors", "plants", "servo"),
-    "proving": ("data", "errors", "passing", "plants", "workers"),
+    "proving": ("data", "errors", "plants", "processes", "workers"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "export": ("control", "effects", "errors", "plants", "position_loop", "servo"),
     "door": (
-        "control", "data", "diagnosis", "effects", "errors", "estimation", "export", "identification", "passing",
+        "control", "data", "diagnosis", "effects", "errors", "estimation", "export", "identification", "processes",
         "plants", "position_loop", "report", "selection", "servo", "validation", "view",
     ),
     "fleet": ("data", "door", "errors", "servo", "workers"),
     "commands": (
-        "comparing", "control", "data", "door", "errors", "experiment_design", "fleet", "online", "passing", "plants",
-        "proving", "report", "servo", "stopping", "validation", "view", "workers",
+        "comparing", "control", "data", "door", "errors", "experiment_design", "fleet", "online", "plants", "processes",
+        "proving", "report", "servo", "validation", "view", "workers",
     ),
-    "cli": ("commands", "errors", "stopping"),
+    "cli": ("commands", "errors", "processes"),
 }  # fmt: skip
 WRITERS = {
     "commands",
@@ -55,7 +54,7 @@ WRITERS = {
     "report",
     "view",
     "proving",
-    "stopping",
+    "processes",
     "cli",
 }  # beside these only the tables of data/ open a file to write
 FAMILIES = {

@@ -12,7 +12,7 @@ import pytest
 
 from ers_mj import cli
 from ers_mj.door.results import Result
-from ers_mj.passing import part_name
+from ers_mj.processes.passing import part_name
 from ers_mj.report import inspect_report
 
 T = np.arange(300) * 0.01

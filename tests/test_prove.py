@@ -79,7 +79,7 @@ def test_the_generator_knows_nothing_of_the_effects_folder():
         seen.add(path)
         todo |= imported(path) - seen
     rooms = {p.relative_to(PACKAGE).parts[0].removesuffix(".py") for p in seen}
-    assert rooms <= {"proving", "passing", "plants", "errors", "data", "workers", "__init__"}
+    assert rooms <= {"proving", "processes", "plants", "errors", "data", "workers", "__init__"}
     assert {p.name for p in seen if p.parent.name == "data"} <= {"__init__.py", "tables.py", "whole.py"}
     assert {p.name for p in seen if p.parent.name == "plants"} == {"__init__.py", "mjcf.py"}
 

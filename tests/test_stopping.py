@@ -23,8 +23,8 @@ IN_PROCESSES = "with ProcessPoolExecutor(2) as pool:\n        list(pool.map(time
 PROGRAM = """import hashlib, os, sys, time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
-from ers_mj import passing
-from ers_mj.stopping import guarded
+from ers_mj.processes import passing
+from ers_mj.processes.stopping import guarded
 def work():
     passing.pass_with_process(Path({part!r}))
     print("ready", flush=True)
@@ -79,7 +79,8 @@ def test_what_is_ignored_from_outside_stays_ignored(tmp_path):
 def test_a_child_ends_with_its_parent(tmp_path):
     if sys.platform != "linux":
         pytest.skip("on Linux alone")
-    child = "from ers_mj.passing import end_with_parent; import time; end_with_parent(); print('up', flush=True); "
+    child = "from ers_mj.processes.passing import end_with_parent; import time; end_with_parent(); "
+    child += "print('up', flush=True); "
     parent = (
         "import os, signal, subprocess, sys\n"
         f"child = subprocess.Popen([sys.executable, '-c', {child + 'time.sleep(100)'!r}], stdout=subprocess.PIPE)\n"

@@ -7,14 +7,14 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj import stopping
 from ers_mj.commands.diagnose import add_quick
 from ers_mj.commands.keeping import DEFAULT_OUT, Kept, Place, keep, refuse_foreign
 from ers_mj.commands.options import add_cluster, add_common, add_out, crew_of
 from ers_mj.commands.output import Progress, bold, tell, written
 from ers_mj.door.saving import as_json, report_writers, write_results, write_text
 from ers_mj.errors import InputError
-from ers_mj.passing import passing
+from ers_mj.processes import stopping
+from ers_mj.processes.passing import passing
 
 if TYPE_CHECKING:
     from ers_mj.fleet.batch import Batch

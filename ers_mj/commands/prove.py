@@ -10,13 +10,13 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj import stopping
 from ers_mj.commands.contest import add_contest, exported, scored, wanted
 from ers_mj.commands.keeping import Kept, Place, folder_for, keep
 from ers_mj.commands.options import add_cluster, add_common, add_out, crew_of, number, whole
 from ers_mj.commands.output import Progress, bold, tell, written
 from ers_mj.door.saving import as_json, plain, report_writers, write_results, write_text
-from ers_mj.passing import passing
+from ers_mj.processes import stopping
+from ers_mj.processes.passing import passing
 
 if TYPE_CHECKING:
     from ers_mj.proving.conduct import Proof

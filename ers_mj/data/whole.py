@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 
 from ers_mj.errors import Unwritable
-from ers_mj.passing import part_name, passing
+from ers_mj.processes.passing import part_name, passing
 
 
 def write_whole(path: Path, content: str | bytes) -> None:

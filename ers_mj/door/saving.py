@@ -15,7 +15,7 @@ from typing import Any
 
 from ers_mj.data.whole import final, write_whole
 from ers_mj.errors import InputError, Unwritable
-from ers_mj.passing import part_name, passing, sweep
+from ers_mj.processes.passing import part_name, passing, sweep
 
 OTHER_FORMATS = (".parquet", ".mat", ".h5", ".hdf5", ".npz", ".json", ".toml")
 ROOM = 2 << 20  # [bytes] that results may take up, at least

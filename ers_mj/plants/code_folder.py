@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ers_mj.errors import InputError
-from ers_mj.passing import pass_with_process, remove
+from ers_mj.processes.passing import pass_with_process, remove
 
 try:
     import fcntl

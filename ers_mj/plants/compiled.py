@@ -31,9 +31,9 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
-from ers_mj.passing import remove
 from ers_mj.plants.code_folder import code_folder, complaint, one_at_a_time, shelves
 from ers_mj.plants.digest import digest_of, read_by
+from ers_mj.processes.passing import remove
 
 MANY = 4  # parts to compile of which it is worth saying so
 SECONDS_EACH = 0.6

@@ -16,13 +16,13 @@ import tempfile
 import time
 from pathlib import Path
 
-from ers_mj.passing import passing
+from ers_mj.processes.passing import passing
 from ers_mj.proving.sealing import hashes
 
 LIMIT = 300.0  # [s] of one processor that a diagnosis may take
 PATIENCE = 0.7  # [s] that a child has to end when it is told to
 START = """import os, resource, runpy, sys
-from ers_mj.passing import end_with_parent, pass_with_process
+from ers_mj.processes.passing import end_with_parent, pass_with_process
 pass_with_process(os.getcwd())
 end_with_parent()
 resource.setrlimit(resource.RLIMIT_CPU, ({limit}, {limit} + 5))

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NoReturn
 
-from ers_mj import passing
+from ers_mj.processes import passing
 
 GRACE = 1.2  # [s] that a command has to end by itself
 STOPPED = 130  # exit code
