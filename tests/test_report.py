@@ -272,3 +272,12 @@ def test_an_error_beyond_the_noise_is_drawn_over_frequency():
     assert "spectrum" in drawn and "spectrum" not in silent
     assert "spectrum" not in data_of(report_page(document(where=[]), told[0]))["charts"]
     read(report_page(document(), told[0]))
+
+
+def test_the_page_says_how_its_errors_are_measured():
+    doc = document("missing_physics")
+    free = report_page(doc, evidence())
+    doc["fit"] = {**doc["fit"], "measure": "windows", "window_s": 2.0}
+    windows = report_page(doc, evidence())
+    assert "Each model runs free" in free and "free-run rms error" in free and "in windows" not in free
+    assert "in windows of 2 s" in windows and "windowed rms error" in windows and "runs free" not in windows

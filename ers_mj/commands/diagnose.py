@@ -126,11 +126,11 @@ def _section(title: str, sentences: list[str]) -> list[str]:
 
 def _told_fit(document: dict) -> list[str]:
     """The three fit numbers, before and after, as a table."""
-    from ers_mj.report.display import shown
+    from ers_mj.report.display import measured, shown
 
     fit, unit = document.get("fit") or {}, (document.get("data") or {}).get("output_unit")
     unit = shown(unit, fit.get("heldout_rmse_before_rad"))
-    lines = [bold(f"{'free-run error [' + unit.label + ']':24}{'before':>12}{'after':>12}")]
+    lines = [bold(f"{measured(fit)[0] + ' error [' + unit.label + ']':24}{'before':>12}{'after':>12}")]
     for title, key in FITS:
         before, after = (unit.bare(fit.get(f"{key}_rmse_{when}_rad")) for when in ("before", "after"))
         lines.append(f"  {title:22}{before:>12}{after:>12}")

@@ -108,8 +108,8 @@ def compare(a: Told, b: Told) -> dict[str, Any]:
             "method": "Holm",
             "level": LEVEL,
             "tests": tests,
-            "sentence": f"of {tests} tests together, the chance that even one is wrongly called a difference is"
-            f" {LEVEL:.0%} (Holm); each interval by itself is a 95 % one",
+            "sentence": f"Of {tests} tests together, the chance that even one is wrongly called a difference is"
+            f" {LEVEL:.0%} (Holm); each interval by itself is a 95 % one.",
         },
         "notes": notes,
     }

@@ -14,7 +14,7 @@ from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.report import charts, diagnosis_charts, page
 from ers_mj.report.diagnosis_effects import missing_physics
 from ers_mj.report.diagnosis_tables import candidates, fit_table, parameters, record_state, trail
-from ers_mj.report.display import NONE, Unit, figure, missing, noun, pretty, shown
+from ers_mj.report.display import NONE, Unit, figure, measured, missing, noun, pretty, shown
 from ers_mj.view.frames import Frame, Frames
 
 NEXT_INPUT = "next_recording.csv"  # the file that holds the input to record next
@@ -42,7 +42,7 @@ def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = N
     """The page as HTML, which draws its charts itself: no font, no address outside it."""
     verdict, unit = str(document.get("verdict") or ""), _error_unit(document, evidence)
     sections = (
-        _curves(evidence),
+        _curves(document, evidence),
         _frames(frames),
         _where(document, evidence),
         missing_physics(document, unit),
@@ -160,7 +160,7 @@ def _tiles(document: Mapping, unit: Unit) -> list[tuple[str, str]]:
     return tiles
 
 
-def _curves(evidence: Evidence) -> str:
+def _curves(document: Mapping, evidence: Evidence) -> str:
     """The first recording open, the others to unfold, and the switches of the effects."""
     records = evidence.told[:MOST_DRAWN]
     if not records:
@@ -173,7 +173,7 @@ def _curves(evidence: Evidence) -> str:
     if len(evidence.records) > len(records):
         content.append(f'<p class="note">{len(evidence.records) - len(records)} more recordings are not drawn.</p>')
     lead = (
-        "Each model runs free: it gets the input and the initial state, never the measurement. "
+        f"{page.text(measured(document.get('fit') or {})[1])} "
         '<span class="b">Before</span> is the paper’s model refitted to the training recordings, '
         '<span class="a">after</span> has the named physics in it. The grey band is ±2 standard deviations of noise.'
     )
@@ -255,7 +255,7 @@ def _residuals(evidence: Evidence) -> str:
         return ""
     output = noun(evidence.output_unit)
     lead = (
-        f"Rms residual of the free runs in each bin of {output} and speed, one scale for both; bins without colour hold"
+        f"Rms residual of the runs in each bin of {output} and speed, one scale for both; bins without colour hold"
         " no data."
     )
     drawn = charts.place("map", f"rms residual over {output} and speed, before and after")

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from ers_mj.diagnosis.evidence import Evidence, Rung
 from ers_mj.report import charts, page
 from ers_mj.report.diagnosis_charts import MOST_RUNGS, rung_name
-from ers_mj.report.display import NONE, Unit, figure, interval, missing, shown
+from ers_mj.report.display import NONE, Unit, figure, interval, measured, missing, shown
 
 FITS = (
     ("train", "Training", "the recordings that the model was fitted to", "nothing was scored on them"),
@@ -76,14 +76,14 @@ def fit_table(document: Mapping, unit: Unit) -> str:
     """The section of errors before and after, in this unit."""
     fit = document.get("fit") or {}
     label = page.text(unit.label)
-    told = "".join(f'<p class="note">{page.text(x)}</p>' for x in fit.values() if isinstance(x, str))
+    told = "".join(f'<p class="note">{page.text(x)}</p>' for key, x in fit.items() if key.endswith("_from"))
+    kind, how = measured(fit)
     table = page.table(
-        ["free-run rms error", f">before [{label}]", f">after [{label}]", ">after/noise", ""],
+        [f"{kind} rms error", f">before [{label}]", f">after [{label}]", ">after/noise", ""],
         [(cells, "") for cells in (*_known_fits(fit, unit), *_other_fits(fit, unit))],
     )
-    return page.section(
-        "How well it fits", "Root-mean-square error of free runs from the first sample on.", table + told
-    )
+    lead = f"Root-mean-square error from the first sample on. {page.text(how)}"
+    return page.section("How well it fits", lead, table + told)
 
 
 def _known_fits(fit: Mapping, unit: Unit) -> Iterator[tuple[str, ...]]:

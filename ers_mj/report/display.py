@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 NONE = "—"
@@ -78,3 +79,13 @@ def interval(ci: object, unit: Unit, digits: int = 3) -> str:
         return NONE
     low, high = ("" if missing(x) else unit.bare(x, digits) for x in ci)
     return f"{low or '…'} … {high}".strip()
+
+
+def measured(fit: Mapping) -> tuple[str, str]:
+    """How errors are measured, as a heading and as a sentence: in one free run, or in windows (`fit.measure`)."""
+    if fit.get("measure") != "windows":
+        return "free-run", "Each model runs free: it gets the input and the initial state, never the measurement."
+    return "windowed", (
+        f"Each model runs in windows of {fit.get('window_s') or 0:.3g} s, each from a state fitted to it: nothing holds"
+        " this servo at its place, so that in one long run any error would add up."
+    )
