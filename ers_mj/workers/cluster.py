@@ -50,7 +50,10 @@ class Cluster:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of versions, which are checked below
             try:
-                self._client: Client = Client(address, timeout=ANSWERS_WITHIN)
+                try:
+                    self._client: Client = Client(address, timeout=ANSWERS_WITHIN)
+                except AssertionError:  # a busy machine did not start its thread in the ten seconds that it is given
+                    self._client = Client(address, timeout=ANSWERS_WITHIN)
             except (OSError, TimeoutError, ValueError, RuntimeError, ImportError):
                 raise InputError(
                     f"--cluster {address}: no Dask scheduler answers there within {ANSWERS_WITHIN:g} s; its address"
