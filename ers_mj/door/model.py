@@ -41,7 +41,8 @@ class Model:
 
     Args:
         datasheet: a path (a datasheet or model.toml), "table1", a mapping laid out as the TOML, a datasheet, a model.
-        output_unit, input_unit: rad, m or V, which Eq. (6)'s letters are in; V, % of duty, N m or A.
+        output_unit: rad, m or V, which Eq. (6)'s letters are in.
+        input_unit: V, % of duty, N m or A.
         inductance: whether the winding's time constant acts; by default where a diagnosis has found one, and not that
             of a bare datasheet.
 
@@ -139,7 +140,8 @@ class Model:
 
         Args:
             rate_hz: of its samples [Hz].
-            theta, omega: where the servo starts [output unit], theta_0 by default, and its speed there [output unit/s].
+            theta: where the servo starts [output unit], theta_0 by default.
+            omega: its speed there [output unit/s].
 
         Returns:
             The first reading [output unit].
@@ -188,7 +190,8 @@ class Model:
         with their slopes (`losses("control")` says what does not).
 
         Args:
-            theta, omega: the point [output unit] and its speed [output unit/s]; theta_0 by default.
+            theta: the point [output unit], theta_0 by default.
+            omega: its speed there [output unit/s].
             rate_hz: of a loop: the plant from sample to sample, dead times exact. None: continuous.
             pade: order of the approximations that stand for dead times in continuous time.
 
