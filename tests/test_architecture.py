@@ -13,7 +13,7 @@ MAY_READ = {
     "errors": (),
     "processes": (),
     "comparing": ("errors",),
-    "workers": ("errors",),
+    "workers": ("data", "errors"),
     "decisions": (),
     "solvers": (),
     "data": ("decisions", "errors", "processes"),
