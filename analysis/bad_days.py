@@ -168,6 +168,10 @@ def try_line(table: Table, kind: str, argv: list[str], sheet: str | None = None)
 def try_lines(table: Table, count: int, number: int) -> None:
     """Odd command lines, absurd datasheets, and places that results cannot go to."""
     short = ["simulate", "sheet.toml", "--input", "steps", "--duration", "0.1", "--out", "new.csv"]
+    with tempfile.TemporaryDirectory(prefix="bad-days-") as folder:  # compile, however long that takes a busy machine
+        for plant in ("reduced", "mujoco"):
+            command = [sys.executable, "-m", "ers_mj", "simulate", *short[2:], "--plant", plant, "--force"]
+            subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, check=True)
     drawn(bad_commands.lines(), count // 2, number, lambda argv: try_line(table, "command lines", argv))
     for kind, argv in (("datasheets", short), ("datasheets in MuJoCo", [*short, "--plant", "mujoco"])):
         drawn(
