@@ -262,7 +262,7 @@ def _tells(record: Recorded, v: np.ndarray, spectrum: tuple[np.ndarray, np.ndarr
         Tells(
             "breaking loose and creep before it",
             m.stops >= SEEING.settled and m.rests > SEEING.share,
-            f"it comes to rest {m.stops} times",
+            f"it comes to rest {m.stops} times and rests for {m.rests:.0%} of the time",
         ),
         Tells(
             "a spring, gravity or another force by place",
