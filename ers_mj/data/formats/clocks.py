@@ -19,7 +19,6 @@ from ers_mj.data.formats.base import Loaded
 from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
 
-
 COMMANDS = ("u", "reference", "direction", "enable")  # fields
 MOST = 0.49  # of a step: whether a command that comes at its middle is the step's or the next one's is left to rounding
 
