@@ -28,7 +28,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 exported = pytest.importorskip("exported", reason="analysis/ is not beside the tests")
 MOST = 0.01  # of the response's RMS
 COMPILER = shutil.which("cc")
-RUN = ("stribeck", "limit and delay", "stops, dead zone", "loop, gravity")  # all of them: analysis/exported.py
+RUN = (
+    "stribeck",
+    "limit and delay",
+    "stops, dead zone",
+    "loop, gravity",
+    "loop, stops",
+    "loop, slide",
+)  # all of them: analysis/exported.py
 
 
 def module(path):

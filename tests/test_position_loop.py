@@ -18,6 +18,7 @@ from ers_mj.position_loop.runs import Run, runs_of
 from ers_mj.position_loop.saved import model_of, simulate_loop
 from ers_mj.position_loop.weak_form import rough_starts
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.servo.simulation import kernel_effects
 
 LIMITED = {"K": 900.0, "L": 150.0, "a_2": 20.0, "c_2": 8.0, "tau_s": 0.012}
 
@@ -163,6 +164,14 @@ def test_a_model_is_written_and_read_again(tmp_path):
     model = model_of(sheet)
     assert model["K"] == 900.0
     assert model.names == (GravityImbalance.name,)
+
+
+def test_a_light_motor_that_bears_all_friction_is_read_again():
+    play = {"gap": 0.01, "rho": 0.06, "phi": 1.0}
+    sheet = Datasheet(lumped={"a_2": 20.0}, effects=((Backlash.name, play),), loop={"K": 400.0}, loop_sensor="link")
+    assert model_of(sheet).effects[0][1][1:3] == pytest.approx([0.06, 1.0])
+    with pytest.raises(InputError, match=r"phi = 1 lies outside 0 \.\. 0\.9"):
+        kernel_effects([(Backlash.name, {"gap": 0.01, "phi": 1.0})])
 
 
 @pytest.mark.parametrize(
