@@ -105,7 +105,8 @@ def test_a_bare_loop_is_identified():
 
 def test_a_limit_and_gravity_are_named_and_nothing_else():
     effects = ((GravityImbalance.name, np.array([12.0, 0.0])),)
-    document = diagnose(recorded(LIMITED, effects=effects), None, jobs=1).document
+    found = diagnose(recorded(LIMITED, effects=effects), None, jobs=1)
+    document, told = found.document, found.evidence.told[0]
     named = [m["effect"] for m in document["missing"]]
     assert set(named) == {VoltageSaturation.name, GravityImbalance.name, InputDelay.name}
     row = document["parameters"]["L"]
@@ -114,6 +115,8 @@ def test_a_limit_and_gravity_are_named_and_nothing_else():
     assert document["data"]["input_kind"] == "position"
     assert not document["remainder"]["significant"]
     assert document["fit"]["measure"] == "free_run"
+    assert list(told.without) == named
+    assert all(np.std(told.measured - alone) > np.std(told.measured - told.after) for alone in told.without.values())
 
 
 def test_a_recorded_duty_tells_the_input_gain_and_gains_differ_between_recordings():
