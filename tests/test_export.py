@@ -30,6 +30,14 @@ MOST = 0.01  # of the response's RMS
 COMPILER = shutil.which("cc")
 # all of them: analysis/exported.py
 RUN = ("stribeck", "limit and delay", "stops, dead zone", "loop, gravity", "loop, late damping")
+RUN = (
+    "stribeck",
+    "limit and delay",
+    "stops, dead zone",
+    "loop, gravity",
+    "loop, stops",
+    "loop, slide",
+)  # all of them: analysis/exported.py
 
 
 def module(path):

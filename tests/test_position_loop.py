@@ -18,6 +18,7 @@ from ers_mj.position_loop.runs import Run, runs_of
 from ers_mj.position_loop.saved import looped_plant, model_of, simulate_loop
 from ers_mj.position_loop.weak_form import rough_starts
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.servo.simulation import kernel_effects
 
 LIMITED = {"K": 900.0, "L": 150.0, "a_2": 20.0, "c_2": 8.0, "tau_s": 0.012}
 
@@ -141,7 +142,8 @@ def test_a_bare_loop_is_identified():
 
 def test_a_limit_and_gravity_are_named_and_nothing_else():
     effects = ((GravityImbalance.name, np.array([12.0, 0.0])),)
-    document = diagnose(recorded(LIMITED, effects=effects), None, jobs=1).document
+    found = diagnose(recorded(LIMITED, effects=effects), None, jobs=1)
+    document, told = found.document, found.evidence.told[0]
     named = [m["effect"] for m in document["missing"]]
     assert set(named) == {VoltageSaturation.name, GravityImbalance.name, InputDelay.name}
     row = document["parameters"]["L"]
@@ -150,6 +152,8 @@ def test_a_limit_and_gravity_are_named_and_nothing_else():
     assert document["data"]["input_kind"] == "position"
     assert not document["remainder"]["significant"]
     assert document["fit"]["measure"] == "free_run"
+    assert list(told.without) == named
+    assert all(np.std(told.measured - alone) > np.std(told.measured - told.after) for alone in told.without.values())
 
 
 def test_a_recorded_duty_tells_the_input_gain_and_gains_differ_between_recordings():
@@ -200,6 +204,14 @@ def test_a_model_is_written_and_read_again(tmp_path):
     model = model_of(sheet)
     assert model["K"] == 900.0
     assert model.names == (GravityImbalance.name,)
+
+
+def test_a_light_motor_that_bears_all_friction_is_read_again():
+    play = {"gap": 0.01, "rho": 0.06, "phi": 1.0}
+    sheet = Datasheet(lumped={"a_2": 20.0}, effects=((Backlash.name, play),), loop={"K": 400.0}, loop_sensor="link")
+    assert model_of(sheet).effects[0][1][1:3] == pytest.approx([0.06, 1.0])
+    with pytest.raises(InputError, match=r"phi = 1 lies outside 0 \.\. 0\.9"):
+        kernel_effects([(Backlash.name, {"gap": 0.01, "phi": 1.0})])
 
 
 @pytest.mark.parametrize(

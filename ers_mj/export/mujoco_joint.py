@@ -26,6 +26,10 @@ INVERSE = (
     "stops, and friction below breakaway, are as stiff as written against J alone: in a robot they scale with its"
     " inertia at the joint (dof_invweight0)"
 )
+PLAIN = (
+    "a slide along an axis of a body whose centre of mass is its origin: MuJoCo then takes dof_invweight0 from the mass"
+    " without the armature, and friction and stops give way; the file moves the centre by a millimetre"
+)
 WEIGHTS = "the bodies of your robot bring their own weight: give them the masses and centres that they have"
 LATE = "the delay is written half a timestep less than a whole number of steps: MuJoCo's clock would add one at times"
 RESET = "a controller that resets by writing qpos and qvel leaves old commands in the delay: use mj_resetData"
@@ -110,6 +114,7 @@ class OwnJoint:
         lines, hinge = self.lines.xml, ' axis="0 1 0"'
         joint = next(line for line in lines.splitlines() if line.startswith("<joint")).replace("/>", f"{hinge}/>")
         actuator = next(line for line in lines.splitlines() if line.startswith("<actuator"))
+        centre = "0 0 0" if self.servo.is_angle else "0.001 0 0"  # see PLAIN
         size, name = repr(NEGLIGIBLE * self.inertia), self.servo.name.replace("--", "- -")
         told = [sentence.replace("--", "- -") for sentence in self.lines.left_out] or ["nothing"]
         lost = "\n".join(f"     {sentence}" for sentence in told)
@@ -121,7 +126,7 @@ class OwnJoint:
   <option timestep="{self.timestep!r}" integrator="implicitfast" gravity="0 0 0"/>
   <worldbody>
     <body name="output">
-      <inertial pos="0 0 0" mass="{size}" diaginertia="{size} {size} {size}"/>
+      <inertial pos="{centre}" mass="{size}" diaginertia="{size} {size} {size}"/>
       <!-- the joint -->
       {joint}
     </body>
@@ -151,6 +156,7 @@ class OwnJoint:
         unit = "kg m^2" if self.servo.is_angle else "kg"
         found = {
             PER_INERTIA.format(unit=unit): self.servo.inertia is None,
+            PLAIN: not self.servo.is_angle,
             WEIGHTS: math.hypot(c.g_s, c.g_c) > 0,
             LATE: "delay" in lines.actuator,
             RESET: "delay" in lines.actuator,
