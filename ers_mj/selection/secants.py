@@ -19,7 +19,7 @@ from ers_mj.estimation.objective import Run, residuals
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
-SPARSE = 2e-3  # [s] between the samples that tell a wave's share to first order
+SPARSE = 4e-3  # [s] between the samples that tell a share to first order
 # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
 RUNAWAY = 1e12
 
