@@ -28,8 +28,8 @@ class Nearing:
     """
 
     lead: float = 0.1
-    tail: float = 2.0
-    simulations: int = 60
+    tail: float = 1.25
+    simulations: int = 40
     within: float = 0.05
     outweighing: float = 5.0
     idle: float = 0.1

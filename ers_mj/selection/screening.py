@@ -99,6 +99,7 @@ class _Screening:
         self.most = search.later if first.names else search.most_bent if bent else search.most_sent
         self.promises: dict[str, float] = {}
         self.begins: dict[str, list[list[Begin]]] = {}
+        self.foremost: dict[str, list[np.ndarray]] = {}  # of an effect's starts, asked from further places
 
     @property
     def screened(self) -> Screened:
@@ -118,7 +119,9 @@ class _Screening:
         is_first, sparse, scales = view.place is self.first, view.sparse(), view.place.scales
         if is_first and self.bent:
             scales = replace(scales, waves=waves_of(view.run, self.bench.traces))
-        starts = {name: BY_NAME[name].starts(scales) for name in names if not BY_NAME[name].once}
+        starts = {
+            name: self.foremost.get(name) or BY_NAME[name].starts(scales) for name in names if not BY_NAME[name].once
+        }
         told = {
             name: first_order(view if BY_NAME[name].follows_current else sparse, BY_NAME[name], some)
             for name, some in starts.items()
@@ -154,8 +157,14 @@ class _Screening:
     ) -> list[tuple[float, Model]]:
         """What the starts promise, with the models as large as they ask for, the best first."""
         some = hopeful(effect, starts, told, max(effect.tries, self.tries))
-        found = [p for start, size in some if (p := promise(view, effect, start, size)) is not None]
-        return sorted(found, key=lambda p: -p[0])
+        found = [
+            (p, k) for k, (start, size) in enumerate(some) if (p := promise(view, effect, start, size)) is not None
+        ]
+        found.sort(key=lambda item: -item[0][0])
+        likely = [starts[k] for k in sorted(range(len(told)), key=lambda k: -told[k][0])]
+        likely = likely or [some[k][0] for _, k in found]
+        self.foremost.setdefault(effect.name, likely[: self.bench.search.asked_again])
+        return [p for p, _ in found]
 
     def _keep(self, effect: Effect, found: list[tuple[float, Model]], known: Columns, is_first: bool) -> None:
         if not found:
