@@ -15,7 +15,7 @@ from ers_mj.estimation.objective import Run, run_of
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.impulse_search import NEARING, impulses
-from ers_mj.selection.secants import View, first_order, hopeful, of_each_form, promise, view_of
+from ers_mj.selection.secants import View, by_recordings, first_order, hopeful, of_each_form, promise, view_of
 from ers_mj.selection.spectrum import waves_of
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
@@ -116,19 +116,20 @@ class _Screening:
         """Ask the effects what they promise from one place, the likeliest to first order first, and of what happens
         once last.
         """
-        is_first, sparse, scales = view.place is self.first, view.sparse(), view.place.scales
+        is_first, scales, some = view.place is self.first, view.place.scales, view.foremost()
+        sparse = some.sparse()
         if is_first and self.bent:
             scales = replace(scales, waves=waves_of(view.run, self.bench.traces))
         starts = {
             name: self.foremost.get(name) or BY_NAME[name].starts(scales) for name in names if not BY_NAME[name].once
         }
         told = {
-            name: first_order(view if BY_NAME[name].follows_current else sparse, BY_NAME[name], some)
-            for name, some in starts.items()
+            name: first_order(some if BY_NAME[name].follows_current else sparse, BY_NAME[name], begun)
+            for name, begun in starts.items()
         }
-        shares = {name: max((share for share, _ in some), default=math.inf) for name, some in told.items()}
+        shares = {name: max((share for share, _ in each), default=math.inf) for name, each in told.items()}
         for name in sorted(starts, key=lambda name: -shares[name]):
-            if shares[name] < self._likely() and not view.place.plant().bends:
+            if shares[name] < self._likely(is_first) and not view.place.plant().bends:
                 self.promises.setdefault(name, shares[name])
                 continue
             self._keep(BY_NAME[name], self._found(view, BY_NAME[name], starts[name], told[name]), known, is_first)
@@ -141,9 +142,11 @@ class _Screening:
         lasting = (promise for other, promise in self.promises.items() if not BY_NAME[other].once)
         return sorted((0.0, 0.0, *lasting))[-2]
 
-    def _likely(self) -> float:
+    def _likely(self, is_first: bool) -> float:
         """What an effect must promise to first order to be simulated."""
-        return self.bench.search.unlikely * max(self.floor, self.bench.search.promising * self._second())
+        search = self.bench.search
+        share = search.unlikely if is_first else search.less
+        return share * max(self.floor, search.promising * self._second())
 
     def _struck(self, view: View, effect: Effect) -> list[tuple[float, Model]]:
         """What impulses gain, where all that is left around a place is enough for one to be refitted."""
@@ -156,7 +159,10 @@ class _Screening:
         self, view: View, effect: Effect, starts: Sequence[np.ndarray], told: Sequence[tuple[float, float]]
     ) -> list[tuple[float, Model]]:
         """What the starts promise, with the models as large as they ask for, the best first."""
-        some = hopeful(effect, starts, told, max(effect.tries, self.tries))
+        tries = max(effect.tries, self.tries)
+        if not told:
+            starts = by_recordings(view, effect, starts, tries + self.bench.search.beside_tries)
+        some = hopeful(effect, starts, told, tries)
         found = [
             (p, k) for k, (start, size) in enumerate(some) if (p := promise(view, effect, start, size)) is not None
         ]

@@ -20,6 +20,7 @@ from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 SPARSE = 4e-3  # [s] between the samples that tell a share to first order
+MOST = 0.5  # of what is left, in the recordings by which starts are chosen
 # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
 RUNAWAY = 1e12
 
@@ -73,6 +74,22 @@ class View:
     def is_another(self, factor: float) -> bool:
         """Whether what a secant asks for is another size than that at which it was taken."""
         return not 1.0 / self.search.another < factor < self.search.another
+
+    def foremost(self) -> View:
+        """The view of the recordings that leave most, as few as hold MOST of it together: enough to choose by. All of
+        them where the model tells them apart.
+        """
+        target, ends = self.targets[0], np.cumsum([0, *(trace.rows for trace in self.traces)])
+        powers = np.add.reduceat(target.residual**2, ends[:-1])
+        order = np.argsort(-powers, kind="stable")
+        enough = int(np.searchsorted(np.cumsum(powers[order]), MOST * target.power)) + 1
+        if self.place.states or self.place.local or enough >= len(self.traces):
+            return self
+        records = sorted(order[:enough].tolist())
+        rows = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in records])
+        fewer = [Target(t.root[rows], np.linalg.qr(t.basis[rows])[0], t.residual[rows]) for t in self.targets]
+        place, motions = self.place.of_records(records), tuple(self.run.motions[k] for k in records)
+        return View(Run(place, self.run.left[rows], motions), fewer, [self.traces[k] for k in records], self.search)
 
     def sparse(self) -> View:
         """The view with samples SPARSE apart, where they are uniform: enough to choose by among many waves. (Of a
@@ -154,6 +171,17 @@ def _tangents(view: View, effect: Effect, starts: Sequence[np.ndarray]) -> np.nd
 def is_chosen(effect: Effect, starts: Sequence[np.ndarray], tries: int | None = None) -> bool:
     """Whether an effect has more starts than are tried, of which the first order tells the best: those of a law."""
     return len(starts) > (effect.tries if tries is None else tries) + 1 and bool(effect.torque or effect.friction)
+
+
+def by_recordings(view: View, effect: Effect, starts: Sequence[np.ndarray], most: int) -> Sequence[np.ndarray]:
+    """The starts of an effect that no first order tells, of many as many as promise ``most`` in the recordings that
+    leave most.
+    """
+    fewer = view.foremost()
+    if fewer is view or len(starts) <= most:
+        return starts
+    shares = {k: found[0] for k, start in enumerate(starts) if (found := promise(fewer, effect, start, 1.0))}
+    return [starts[k] for k in sorted(sorted(shares, key=lambda k: -shares[k])[:most])]
 
 
 def hopeful(
