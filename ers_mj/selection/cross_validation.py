@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.data.prepared import Blocks, Trace
+from ers_mj.data.prepared import Blocks, Trace, start_samples
 from ers_mj.decisions.explained import cost
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import Along, fit
@@ -232,7 +232,8 @@ def recalibrated(model: Model, trace: Trace, measure: Measure = FREE_RUN) -> Rec
     )
     if model.values["a_1"] > 0 or model.values["c_1"] > 0:
         pair = pair.with_state("offset", 2)
-    blank = replace(head, valid=np.zeros(head.t.size, bool), counts=np.zeros_like(head.counts), channels=())
+    brief = head.part(0, start_samples(head.t))
+    blank = replace(brief, valid=np.zeros(brief.t.size, bool), counts=np.zeros_like(brief.counts), channels=())
     misfit = Blocks.of([blank, head]).misfit(residuals(pair, [blank, head], OBSERVER_RATE))
     tau = tau_of(misfit[blank.counts.size :])
     found = fit(pair, [blank, head], tau=tau, steps=10)

@@ -144,7 +144,8 @@ def first_order(view: View, effect: Effect, starts: Sequence[np.ndarray]) -> lis
     with many starts are asked, and no size told.
     """
     bends = view.place.plant().bends
-    if not starts or effect.once or not effect.tangible or bends and not is_chosen(effect, starts):
+    is_law = bool(effect.torque or effect.friction)
+    if not starts or effect.once or not effect.tangible or bends and not (is_law and is_chosen(effect, starts)):
         return []
     waves, ends, changes = 2 if effect.wave else 1, view.ends(effect), _tangents(view, effect, starts)
     told = [_shares(changes, waves, ends, target, effect.signed) for target in view.targets]
@@ -169,8 +170,8 @@ def _tangents(view: View, effect: Effect, starts: Sequence[np.ndarray]) -> np.nd
 
 
 def is_chosen(effect: Effect, starts: Sequence[np.ndarray], tries: int | None = None) -> bool:
-    """Whether an effect has more starts than are tried, of which the first order tells the best: those of a law."""
-    return len(starts) > (effect.tries if tries is None else tries) + 1 and bool(effect.torque or effect.friction)
+    """Whether an effect has more starts than are tried, of which the first order tells the best."""
+    return len(starts) > (effect.tries if tries is None else tries) + 1
 
 
 def by_recordings(view: View, effect: Effect, starts: Sequence[np.ndarray], most: int) -> Sequence[np.ndarray]:
