@@ -91,6 +91,19 @@ def test_what_the_gain_register_multiplies_is_found(whole):
     assert found.told("", "D").value == pytest.approx(20.0, rel=0.1)
 
 
+def test_an_idle_bridge_takes_its_share_of_the_drive():
+    t = np.arange(0.0, 1.0, 0.005)
+    r = np.where(t < 0.1, 0.0, 0.4)
+    idle = {"K": 400.0, "D": 12.0, "a_2": 8.0, "idle": 10.0}
+    drive = LoopModel(idle, ()).motion(run_of(t, r))[:, 3]
+    rests = LoopModel(idle, ()).motion(run_of(t, 0.05 * r))
+    assert np.ptp(rests[:, 0]) == 0.0 and np.ptp(rests[:, 3]) == 0.0
+    assert np.max(drive) == pytest.approx(400.0 * 0.4 - 10.0, rel=0.1)
+    twin = looped_plant(Datasheet(lumped={"a_2": 8.0}, loop={k: idle[k] for k in ("K", "D", "idle")}))
+    there = twin.simulate(t, r, (0.0, 0.0), 0.0)
+    assert np.max(np.abs(there - LoopModel(idle, ()).predicted(run_of(t, r)))) < 5e-3
+
+
 def test_friction_holds_within_its_width():
     t = np.arange(0.0, 1.0, 0.01)
     model = LoopModel({"K": 400.0, "a_2": 8.0, "c_2": 10.0}, ())

@@ -2,7 +2,7 @@
 
     r_R   the reference tau late, its speed within +-R
     v     = K e + xi - D s,  e = r_R - theta (of the body that the loop's sensor sees),  xi' = I e,  lag s' = w - s
-    drive = v within +-L, ``dead_time`` late, its current within +-most
+    drive = v less what of it lies within +-idle, within +-L, ``dead_time`` late, its current within +-most
     theta'' = drive - a_emf w + Eq. (6)'s forces and the laws of effects, friction set-valued
 
 Fixed steps of second order (leapfrog, dampers by the trapezium), friction and limits solved for with the speed at the
@@ -33,7 +33,8 @@ class LoopNumbers(NamedTuple):
     K [1/s^2], D [1/s] and I [1/s^3] of the loop, ``lag`` [s] of the speed that D multiplies, the loop's limit L
     [output unit/s^2], latency tau [s] of the reference, dead time [s] of the drive, R the limit of the reference's
     speed; ``band`` the error [output unit] within which the drive sleeps and ``lost`` what is still missing outside
-    it; ``least`` the smallest drive outside the band; ``most`` the largest motor torque; ``creep`` [1/s] the speed's
+    it; ``idle`` [output unit/s^2] the drive that the bridge ignores, and loses of more; ``least`` the smallest drive
+    outside the band; ``most`` the largest motor torque; ``creep`` [1/s] the speed's
     factor below breakaway (infinite: friction holds) and ``heavy`` how much slower the body answers there (MuJoCo's
     constraint: 10), as ``buried`` within a stop (20); ``share`` the motor's of the inertia, behind which a gear rubs;
     ``grease`` [1/s] what drags the load along within a play; ``at_motor`` 1 where the loop's sensor sits on the
@@ -50,6 +51,7 @@ class LoopNumbers(NamedTuple):
     R: float = np.inf
     band: float = 0.0
     lost: float = 0.0
+    idle: float = 0.0
     least: float = 0.0
     most: float = np.inf
     creep: float = np.inf
@@ -173,6 +175,12 @@ def _damped(q, slow, w, h):
     return q.D, w
 
 
+@inline
+def _ignored(q, v):
+    """What the bridge loses of a drive v."""
+    return min(max(v, -q.idle), q.idle)
+
+
 @unit(M9(C, Q, F, M9, F, F, F, F))
 def _one_body(c, q, t, x, r, fresh, late, h):
     """The state h later under the mean reference r, where of the drive the share ``fresh`` is the present one and the
@@ -187,9 +195,13 @@ def _one_body(c, q, t, x, r, fresh, late, h):
     a = (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     level = _level(c, theta, x.w, x.carried)
     D, slow = _damped(q, x.slow, x.w, h)
-    push, ahead = hold + wall, q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
+    push, asked = hold + wall, q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
+    ahead = asked - _ignored(q, asked - D * x.w)
     mass = q.buried if wall != 0.0 else 1.0
     w = _slipped(mass, push + fresh * ahead + late, a + fresh * D + c.a_emf, level, q.creep, q.heavy, x.w, h)
+    if q.idle > 0.0:
+        ahead = asked - _ignored(q, asked - 0.5 * D * (x.w + w))
+        w = _slipped(mass, push + fresh * ahead + late, a + fresh * D + c.a_emf, level, q.creep, q.heavy, x.w, h)
     v = ahead - 0.5 * D * (x.w + w)
     if abs(v) > q.L:
         drive = fresh * math.copysign(q.L, v) + late
@@ -230,9 +242,10 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
     a_m = c.beta * (c.a_mech_plus if x.w_m > 0.0 else c.a_mech_minus) + c.a_emf
     level, level_m = _level(c, theta, x.w, x.drive), _level(c, theta, x.w_m, x.drive)
     D, slow = _damped(q, x.slow, seen, h)
-    ahead = q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
+    asked = q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
     w, w_m = x.w, x.w_m
-    v = ahead - D * seen
+    v = asked - D * seen
+    ahead = asked - _ignored(q, v)
     for _ in range(3):
         w = _slipped(
             1.0 - c.rho,
@@ -256,9 +269,11 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
                 x.w_m,
                 h,
             )
-            v = ahead - 0.5 * D * (x.w_m + w_m)
+            v = asked - 0.5 * D * (x.w_m + w_m)
         else:
-            v = ahead - 0.5 * D * (x.w + w)
+            v = asked - 0.5 * D * (x.w + w)
+        lost = _ignored(q, v)
+        ahead, v = asked - lost, v - lost
         if q.at_motor == 0.0 or abs(v) > q.L:
             w_m = _slipped(
                 c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, q.heavy, x.w_m, h

@@ -6,7 +6,7 @@ A limit or an effect is begun from a start of its own; where one changes what th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.input_delay import InputDelay
 from ers_mj.effects.load_dependent_friction import LoadDependentFriction
+from ers_mj.effects.position_dependent_friction import PositionDependentFriction
 from ers_mj.effects.presliding import Presliding
 from ers_mj.effects.quadratic_drag import QuadraticDrag
 from ers_mj.effects.rate_limit import RateLimit
@@ -33,7 +34,10 @@ from ers_mj.position_loop.runs import Run, speed_of
 INTEGRAL, DERIVATIVE, WITHIN = "integral action", "derivative action", "dead time within the loop"
 STARTING = "starting force"  # of the firmware: the least that its motor is driven with
 SPRING, CONSTANT = "spring", "constant load"  # the second may as well be an offset of the sensor: it has no name
-LAWS = (GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, EndStop, Cogging)
+LAWS = (
+    GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, PositionDependentFriction,
+    EndStop, Cogging,
+)  # fmt: skip
 
 
 OWN = {
@@ -71,7 +75,7 @@ class Sizes:
         (150.0, 1.0),
     )  # [1/s], and how heavy
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
-    bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K
+    bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K, or of c_2
     lags: tuple[float, ...] = (0.003, 0.008)  # [s] of the speed that the firmware damps
     pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
@@ -156,13 +160,20 @@ def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
         Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds)),
         Term(InputDelay.name, (model.having(tau_s=0.01),)),
         Term(WITHIN, delayed_within(model)),
-        Term(DriveDeadZone.name, tuple(model.having(band=x * model["c_2"] / model["K"]) for x in SIZES.bands)),
+        Term(DriveDeadZone.name, tuple(_asleep(model))),
         Term(STARTING, tuple(model.having(least=x * model["c_2"]) for x in SIZES.pushes if model["c_2"] > 0.0)),
         Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
     ]
     if "L" in model.free:
         found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
     return found
+
+
+def _asleep(model: LoopModel) -> Iterator[LoopModel]:
+    """The firmware that ignores small errors, and the bridge that ignores small drives."""
+    for size in SIZES.bands:
+        yield model.having(band=size * model["c_2"] / model["K"])
+        yield model.having(idle=size * model["c_2"])
 
 
 def lagging(model: LoopModel) -> tuple[LoopModel, ...]:
