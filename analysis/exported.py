@@ -1,3 +1,4 @@
+"""Whether exports do what the model does: fifteen models, run in MuJoCo, python-control, an FMU and from tables.
 """Whether exports do what the model does: run in MuJoCo, python-control, an FMU and from tables.
 
     python analysis/exported.py [--only NAME]               sixteen models written by hand
@@ -71,6 +72,7 @@ MODELS = {
         asymmetric_friction={"dF": 3.0},
     ),
     "loop": hobby({}),
+    "loop, late damping": hobby({"kind": "PD", "D": 25.0, "lag_s": 0.006}),
     "loop, play": hobby({"R": 2.0}, backlash={"gap": 0.01}),
     "loop, gravity": hobby(
         {"kind": "PID", "I": 2000.0, "band": 0.005, "creep": 200.0, "heavy": 10.0}, gravity_imbalance={"g_s": 30.0}

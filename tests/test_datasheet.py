@@ -94,6 +94,11 @@ def test_a_model_that_cannot_be_written(tmp_path):
 # -- what is refused ------------------------------------------------------------------------------------
 
 MALFORMED = {
+    "a product beyond all numbers": (
+        "[parameters]\nJ = 1e299\nB = 1\nK_t = 1\nK_e = 1\nR = 1\nn = 1e300\n",
+        "no finite a_2",
+    ),
+    "a product below all numbers": ("[parameters]\nJ = 1e-300\nK_t = 1\nR = 1e-300\n", "no finite b"),
     "empty": ("", "[parameters] or [lumped] was expected"),
     "empty sections": ("[parameters]\n[lumped]\n", "gives nothing of the servo"),
     "baseline alone": ("[baseline]\na_1 = 2\n", "gives nothing of the servo"),

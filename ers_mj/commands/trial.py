@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 import re
 from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.keeping import Kept, keep, results_folder
+from ers_mj.commands.keeping import DEFAULT_OUT, Kept, Place, keep, results_folder
 from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
 from ers_mj.commands.options import (
     add_cluster,
@@ -26,9 +28,13 @@ from ers_mj.commands.options import (
     swing_deg,
     whole,
 )
-from ers_mj.commands.output import Progress, bold, written
+from ers_mj.commands.output import Progress, bold, tell, written
 from ers_mj.door.saving import as_json, plain, report_writers, versions, write_results
 from ers_mj.errors import InputError
+from ers_mj.processes import stopping
+from ers_mj.processes.passing import remove
+from ers_mj.workers.finished import Finished
+from ers_mj.workers.held import held
 
 if TYPE_CHECKING:
     from ers_mj.control.monte_carlo import Spread
@@ -48,6 +54,7 @@ COLUMNS = (
 )
 
 RESULTS = ("trials.json", "report.html")
+KEPT = ".trial"  # in the folder of the results: the scattered servos that are finished
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -55,7 +62,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "trial",
         help="controllers in a closed loop, on either plant",
-        description="Run controllers in a closed loop and measure them. Lists with commas run every combination.",
+        description=(
+            "Run controllers in a closed loop and measure them. Lists with commas run every combination. Stopped, the"
+            " same command goes on\nwith the servos of --plants where it was."
+        ),
         epilog=(
             "examples:\n  ers trial\n  ers trial --controller ftrc,pid-ff,time-optimal --plant reduced,mujoco --case"
             " square,ramp,chirp --rate-hz 1000 --noise-deg 0.01\n  ers trial model.toml --design datasheet.toml --case"
@@ -164,6 +174,48 @@ def _add_scatter(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Run every combination, write, tell; 0, or 130 where it was stopped."""
+    place = _place(arguments)
+    try:
+        with _carried_on(arguments, place) as finished:
+            return _run(arguments, place, finished)
+    except KeyboardInterrupt:
+        kept = place is not None and (place.folder / KEPT).is_dir() and place.folder
+        stopping.tell(f"; {kept} keeps what was done, the same command goes on from there" if kept else "")
+        return stopping.STOPPED
+
+
+def _place(arguments: argparse.Namespace) -> Place | None:
+    """Where the results go; a folder that a trial of many servos was begun in may hold files."""
+    begun = arguments.plants > 0 and (Path(arguments.out or DEFAULT_OUT) / KEPT).is_dir()
+    return results_folder(arguments.out, arguments.force or begun, arguments.json, RESULTS)
+
+
+@contextmanager
+def _carried_on(arguments: argparse.Namespace, place: Place | None) -> Iterator[Finished | None]:
+    """The scattered servos that are finished, kept in the folder of the results until these are written; None where
+    there are no such servos, or no folder.
+    """
+    if place is None or not arguments.plants:
+        yield None
+        return
+    new = not place.folder.exists()
+    finished = Finished(place.folder / KEPT)
+    try:
+        with held(place.folder, "ers trial"):
+            if finished.folder.is_dir():
+                tell(f"{place.folder}: goes on where it was left")
+            yield finished
+    finally:
+        with suppress(OSError):
+            if new:
+                place.folder.rmdir()  # which it is not where anything is in it
+
+
+def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished | None) -> int:
+    from ers_mj.control.controllers import CONTROLLERS
+    from ers_mj.control.paper_claims import headline
+    from ers_mj.control.trial import try_out
     """Run every combination, write, tell; 0."""
     place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     from ers_mj.control.controllers import Servo
@@ -179,7 +231,7 @@ def run(arguments: argparse.Namespace) -> int:
         trials = try_out(
             datasheet, controllers, arguments.plant, arguments.case, conditions, design=design, progress=progress
         )
-        spreads = _spreads(arguments, datasheet, controllers, conditions, design, hired, progress)
+        spreads = _spreads(arguments, datasheet, controllers, conditions, design, hired, finished, progress)
         document = plain(
             {
                 "trials": [t.as_document() for t in trials],
@@ -196,6 +248,9 @@ def run(arguments: argparse.Namespace) -> int:
                 "versions": versions(),
             }
         )
+        kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress))
+    if finished is not None and not kept.code:
+        remove(finished.folder)
         traces = trials if arguments.save_traces else []
         kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress, traces))
     print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
@@ -225,6 +280,7 @@ def _spreads(
     conditions: Conditions,
     design: Datasheet,
     hired: Crew,
+    finished: Finished | None,
     progress: Progress,
 ) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
@@ -234,7 +290,7 @@ def _spreads(
         return []
     fleet = Fleet(datasheet, arguments.plants, arguments.scatter, design)
     asked = controllers, arguments.plant, arguments.case
-    return scatter(fleet, *asked, conditions, crew=hired, progress=progress)
+    return scatter(fleet, *asked, conditions, crew=hired, finished=finished, progress=progress)
 
 
 def _refuse_cases(arguments: argparse.Namespace) -> None:

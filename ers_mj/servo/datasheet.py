@@ -12,7 +12,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -62,8 +62,8 @@ SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect", "
 VERDICTS = ("consistent", "parameters_only", "missing_physics", "unexplained")
 KINDS, SENSORS = ("P", "PD", "PI", "PID"), ("load", "link", "motor")  # of a firmware's loop, and where its sensor sits
 LOOP = (
-    "K", "D", "I", "L", "tau_s", "dead_time_s", "R", "band", "least", "most", "creep", "heavy", "buried", "share",
-    "grease", "rotor", "hold",
+    "K", "D", "lag_s", "I", "L", "tau_s", "dead_time_s", "R", "band", "least", "most", "creep", "heavy", "buried",
+    "share", "grease", "rotor", "hold",
 )  # fmt: skip
 
 
@@ -122,15 +122,14 @@ class Datasheet:
 
         n is 1 where it is not given; what is given lumped stands as it is.
         """
-        known = {"n": 1.0, **self.parameters}
-        lumped = {name: rule(known) for name, (needs, rule) in FOLLOWS.items() if known.keys() >= set(needs.split())}
-        return {name: x for name, x in lumped.items() if math.isfinite(x)} | dict(self.lumped)
+        return {name: x for name, x in _following(self.parameters).items() if math.isfinite(x)} | dict(self.lumped)
 
     @property
     def emf_damping(self) -> float | None:
         """What the back-EMF damps [1/s], where the letters are given from which it follows."""
         known = {"n": 1.0, **self.parameters}
-        return _emf_damping(known) if known.keys() >= {"K_t", "K_e", "J", "R"} else None
+        damping = _finite(_emf_damping, known) if known.keys() >= {"K_t", "K_e", "J", "R"} else math.nan
+        return None if math.isnan(damping) else damping
 
 
 def _emf_damping(p: Mapping[str, float]) -> float:
@@ -153,6 +152,20 @@ FOLLOWS = {
     "ampere": ("K_t J", lambda p: p["n"] * p["K_t"] / p["J"]),
     "emf_share": ("B J K_t K_e R", lambda p: _emf_damping(p) / _damping(p) if _damping(p) else math.nan),
 }
+
+
+def _following(parameters: Mapping[str, float]) -> dict[str, float]:
+    """What FOLLOWS from these letters, NaN where that is no finite number."""
+    known = {"n": 1.0, **parameters}
+    return {name: _finite(rule, known) for name, (needs, rule) in FOLLOWS.items() if known.keys() >= set(needs.split())}
+
+
+def _finite(rule: Callable[[Mapping[str, float]], float], known: Mapping[str, float]) -> float:
+    try:
+        x = rule(known)
+    except ArithmeticError:  # beyond the numbers that there are, or by what is zero to all of them
+        return math.nan
+    return x if math.isfinite(x) else math.nan
 
 
 # -- reading -----------------------------------------------------------------------------------------------
@@ -189,6 +202,10 @@ def datasheet_of(document: Mapping[str, Any], path: str | os.PathLike[str] = "da
         name=path.name,
     )
     _refuse_none_or_both(sheet, "baseline" in document, path)
+    for name, x in _following(sheet.parameters).items():
+        if math.isnan(x) and name != "emf_share":  # which there is none of without damping
+            letters = ", ".join(FOLLOWS[name][0].split())
+            raise InputError(f"{path}: [parameters] {letters} come to no finite {name}, sizes of a servo were expected")
     return sheet
 
 
