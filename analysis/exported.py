@@ -1,7 +1,6 @@
-"""Whether exports do what the model does: fifteen models, run in MuJoCo, python-control, an FMU and from tables.
 """Whether exports do what the model does: run in MuJoCo, python-control, an FMU and from tables.
 
-    python analysis/exported.py [--only NAME]               sixteen models written by hand
+    python analysis/exported.py [--only NAME]               seventeen models written by hand
     python analysis/exported.py --diagnosed [FOLDER]        twelve, diagnosed from ../shared, kept in FOLDER
     python analysis/exported.py --answers FOLDER...         what `ers diagnose` has written already
 

@@ -29,15 +29,10 @@ exported = pytest.importorskip("exported", reason="analysis/ is not beside the t
 MOST = 0.01  # of the response's RMS
 COMPILER = shutil.which("cc")
 # all of them: analysis/exported.py
-RUN = ("stribeck", "limit and delay", "stops, dead zone", "loop, gravity", "loop, late damping")
 RUN = (
-    "stribeck",
-    "limit and delay",
-    "stops, dead zone",
-    "loop, gravity",
-    "loop, stops",
+    "stribeck", "limit and delay", "stops, dead zone", "loop, gravity", "loop, late damping", "loop, stops",
     "loop, slide",
-)  # all of them: analysis/exported.py
+)  # fmt: skip
 
 
 def module(path):

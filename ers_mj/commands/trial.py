@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
-import re
-from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -213,11 +212,6 @@ def _carried_on(arguments: argparse.Namespace, place: Place | None) -> Iterator[
 
 
 def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished | None) -> int:
-    from ers_mj.control.controllers import CONTROLLERS
-    from ers_mj.control.paper_claims import headline
-    from ers_mj.control.trial import try_out
-    """Run every combination, write, tell; 0."""
-    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
     from ers_mj.control.controllers import Servo
     from ers_mj.control.own_law import law_of
     from ers_mj.control.paper_claims import headline, is_papers
@@ -248,11 +242,10 @@ def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished 
                 "versions": versions(),
             }
         )
-        kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress))
-    if finished is not None and not kept.code:
-        remove(finished.folder)
         traces = trials if arguments.save_traces else []
         kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress, traces))
+    if finished is not None and not kept.code:
+        remove(finished.folder)
     print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
     return kept.code
 
