@@ -24,6 +24,7 @@ from ers_mj.processes import stopping
 # objects made before garbage is looked for: imports make a million that stay, and arrays go without
 SELDOM = (50_000, 20, 20)
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # of a place that takes no more
+LONGEST = 300  # of a sentence that refuses, in characters
 
 
 class Parser(argparse.ArgumentParser):
@@ -80,6 +81,13 @@ def _recordings_first(argv: list[str]) -> list[str]:
     return [argv[0], *argv[begin:end], *argv[1:begin], *argv[end:]]
 
 
+def shortened(text: str) -> str:
+    """A sentence without its middle where it is long: what is at fault stands at its beginning, what is expected at its
+    end.
+    """
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 + 5 :]}"
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 a check failed, 2 bad input, 130 interrupted."""
     _ready_streams()
@@ -93,7 +101,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()  # here, where a full disk still gets its sentence
             return code
     except ErsError as error:
-        print(f"ers: {error}", file=sys.stderr)
+        print(f"ers: {shortened(str(error))}", file=sys.stderr)
         return 2
     except MemoryError:
         print("ers: this takes more memory than there is, shorter recordings would do", file=sys.stderr)
@@ -105,7 +113,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        if error.filename is not None or error.errno not in FULL:
+        if error.filename is not None:  # a name too long, a loop of links, a folder that is closed: none that we made
+            print(f"ers: {shortened(f'{error.filename}: {error.strerror}')}", file=sys.stderr)
+            return 2
+        if error.errno not in FULL:
             raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         print(f"ers: standard output cannot be written ({error.strerror})", file=sys.stderr)

@@ -40,3 +40,33 @@ def test_an_odd_command_line_ends_in_an_answer_or_a_sentence(here, capsys):
             os.system(f"rm -rf '{name}'")
 
     ends()
+
+
+LONG = "x" * 400
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["inspect", f"{LONG}.csv#run=1", "--json"],
+        ["simulate", LONG, "--input", "steps", "--out", "s.csv"],
+        ["simulate", "--input", LONG, "--out", "s.csv"],
+        ["trial", "--case", f"{LONG}.csv", "--json"],
+        ["compare", LONG, LONG],
+        ["watch", LONG],
+        ["batch", LONG],
+        ["batch", "servos.csv"],
+        ["prove", "--real", LONG, "--cases", "1", "--json"],
+        ["inspect", "rec.csv", "--map-file", LONG, "--json"],
+        ["inspect", "/dev/zero", "--json"],
+    ],
+    ids=lambda argv: " ".join(argv)[:20],
+)
+def test_a_place_that_cannot_be_is_a_short_sentence(argv, tmp_path, monkeypatch, capsys):
+    """Names that no file system takes, and what never ends."""
+    monkeypatch.chdir(tmp_path)
+    bad_commands.lay_out(tmp_path)
+    (tmp_path / "servos.csv").write_text(f'name,recordings\na,"{"[a-z]" * 2000}"\n')
+    assert cli.main(argv) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("ers: ") and told.count("\n") == 1 and len(told) <= 300 + len("ers: \n")

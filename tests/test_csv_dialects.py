@@ -56,6 +56,16 @@ def test_a_dialect_is_read_and_what_was_skipped_is_said(tmp_path, content, told)
     assert told is None or any(told in problem for problem in record.problems)
 
 
+@pytest.mark.parametrize("code", ["cp1252", "utf-16", "utf-16-le", "utf-8-sig"])
+def test_codes_of_text(tmp_path, code):
+    """As spreadsheets and loggers save it; a unit that is no ASCII among the headers."""
+    content = text("\t", header=("t_s", "u_V", "Winkel [°]")).encode(code)
+    (tmp_path / "rec.csv").write_bytes(b"\xff\xfe" + content if code == "utf-16-le" else content)
+    record = read_recording(tmp_path / "rec.csv", {"theta_rad": "Winkel [°]"})
+    np.testing.assert_allclose(record.y, np.radians(THETA))
+    assert any("Windows-1252" in problem for problem in record.problems) is (code == "cp1252")
+
+
 @pytest.mark.parametrize("suffix", [".tsv", ".txt", ".dat"])
 def test_other_endings_of_text(tmp_path, suffix):
     (tmp_path / f"rec{suffix}").write_text(text("\t"))

@@ -16,7 +16,6 @@ MALFORMED = {
     "no header": (lambda c: csv_text(c).split("\n", 1)[1], "there is no time"),
     "binary": (lambda c: bytes(range(256)) * 20, "UTF-8"),
     "binary that decodes": (lambda c: b"t_s,u_V\0\1\2\n" * 20, "binary"),
-    "UTF-16": (lambda c: csv_text(c).encode("utf-16"), "UTF-8"),
     "Parquet called CSV": (lambda c: b"PAR1" + bytes(400) + b"PAR1", "binary"),
     "one line of prose": (lambda c: "dear colleague, the recording follows", "no samples"),
     "duplicate column": (lambda c: csv_text(c).replace("u_V,", "t_s,", 1), "t_s stands there more than once"),

@@ -86,7 +86,8 @@ class _Parser:
         while self.rest and self.rest[-1] in ("+", "-"):
             sign = self.rest.pop()
             term = self._product(depth)
-            total = total + term if sign == "+" else total - term
+            with np.errstate(all="ignore"):
+                total = total + term if sign == "+" else total - term
         return total
 
     def _product(self, depth: int) -> Value:
@@ -96,7 +97,8 @@ class _Parser:
             other = self._factor(depth)
             if sign == "/" and np.any(np.asarray(other) == 0.0):
                 raise Unreadable("a division by zero")
-            total = total * other if sign == "*" else total / other
+            with np.errstate(all="ignore"):  # what is not finite is told of the column, with its row
+                total = total * other if sign == "*" else total / other
         return total
 
     def _factor(self, depth: int) -> Value:

@@ -332,7 +332,8 @@ class Read:
             notes: what is already to be told.
         """
         name, labels = self.name, dict(self.labels)
-        values = {field: x * factors[field] for field, x in printed.items()}
+        with np.errstate(all="ignore"):  # a NaN that signals, an infinity: told below, with its row
+            values = {field: x * factors[field] for field, x in printed.items()}
         fields = checked(values, labels, name)
         step = converter_step(printed["y"])
         rows = np.arange(fields["t"].size)

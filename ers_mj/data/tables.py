@@ -3,7 +3,9 @@
 What cannot be read is refused with one sentence (`InputError`).
 """
 
+import os
 import re
+import stat
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -20,16 +22,19 @@ BLANK = ("", "nan", "na", "n/a", "null", "none")  # a missing value in CSV, in a
 def split_spec(spec: str) -> tuple[Path, str | None]:
     """Path and run of "FILE#run=17"; a file that is really called so comes first."""
     path, mark, run = spec.rpartition("#run=")
-    return (Path(path), run) if mark and not Path(spec).is_file() else (Path(spec), None)
+    return (Path(path), run) if mark and not os.path.isfile(spec) else (Path(spec), None)
 
 
 def read_content(path: Path) -> bytes:
     try:
-        content = path.read_bytes()
+        is_device = stat.S_ISCHR(path.stat().st_mode)  # which may never end
+        content = b"" if is_device else path.read_bytes()
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read ({reason(error)})") from None
+    if is_device:
+        raise InputError(f"{path}: is a device, a file was expected")
     if not content.strip():
         raise InputError(f"{path}: the file is empty")
     return content

@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import glob
 import io
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from ers_mj.data.tables import reason
 from ers_mj.errors import InputError
 
 REQUIRED, OPTIONAL = ("name", "recordings"), ("datasheet", "holdout", "map")
@@ -102,12 +104,17 @@ def _paths(where: str, cell: str, folder: Path) -> tuple[str, ...]:
     out = []
     for part in filter(None, map(str.strip, cell.split(";"))):
         pattern, mark, run = part.partition("#")
-        if not glob.has_magic(pattern) or (folder / pattern).exists():
+        if not glob.has_magic(pattern) or os.path.exists(folder / pattern):
             out.append(part)
             continue
-        found = sorted(glob.glob(pattern, root_dir=folder, recursive=True))
+        try:
+            found = sorted(glob.glob(pattern, root_dir=folder, recursive=True))
+        except (RecursionError, re.error) as error:
+            raise InputError(f"{where}: {pattern[:80]!r} is no pattern of files ({reason(error)})") from None
         if not found:
-            raise InputError(f"{where}: {pattern!r} finds no file in {folder}, at least one recording was expected")
+            raise InputError(
+                f"{where}: {pattern[:80]!r} finds no file in {folder}, at least one recording was expected"
+            )
         out += [path + mark + run for path in found]
     return tuple(out)
 

@@ -22,6 +22,8 @@ from ers_mj.errors import InputError
 FORMAT = "CSV file"
 DELIMITERS = ",;\t|"
 COMMENT = re.compile(r"\s*(#|%|//)")
+UTF_16 = b"\xff\xfe", b"\xfe\xff"  # marks at the beginning
+BINARY = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f\x81\x8d\x8f\x90\x9d]")  # no characters of Windows-1252's text
 TOP = 60  # lines within which a header is looked for
 
 
@@ -52,14 +54,21 @@ def load(file: File) -> Loaded:
 
 
 def _decoded(file: File) -> Text:
+    """Header and rows. Text is in UTF-8, in UTF-16 where it begins so (as spreadsheets save it), or, where it is neither
+    and holds no sign of a binary file, in Windows-1252, as many loggers write ° and µ.
+    """
+    notes: tuple[str, ...] = ()
     try:
-        text = file.content.decode("utf-8-sig").lstrip()
+        text = file.content.decode("utf-16" if file.content.startswith(UTF_16) else "utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{file.name}: is not a text file in UTF-8 (byte {error.start} is no character)") from None
+        if BINARY.search(file.content) or file.content.startswith(UTF_16):
+            raise InputError(f"{file.name}: is not a text file in UTF-8 (byte {error.start} is no character)") from None
+        text, notes = file.content.decode("cp1252", "replace"), ("it is not in UTF-8, Windows-1252 was taken",)
+    text = text.lstrip()
     if "\0" in text:
         raise InputError(f"{file.name}: is a binary file, CSV was expected")
     header, *body = re.split(r"\r\n|\n|\r", text, maxsplit=1)
-    return Text(header, "".join(body))
+    return Text(header, "".join(body), notes)
 
 
 def _below_titles(text: Text) -> Text:
