@@ -59,7 +59,7 @@ def fit(
     lowers it to the one that was asked for. (Their plain mean asks more of a search that begins near the data: one bad
     block would send it back to the sum of squares.) The cost is that at ``tau``, wherever the search ends.
     """
-    run = begun(model, traces, rate)
+    run = begun(in_a_search(model, traces), traces, rate)
     slopes = Slopes(along.renewals, jacobian_of(run, traces, rate, along.known) if along.known is not None else None)
     now, blocks = math.inf, Blocks.of(traces)
     while True:
@@ -70,10 +70,10 @@ def fit(
         last = now <= 1.5 * tau
         at, least = (tau, tolerance) if last else (now, 0.3)
         found, run = descended(run, traces, rate, at, steps, least, slopes, along.by_tangents)
-        if last:
-            return found
-        if ceiling is not None and explained.cost(found.misfit, now) > _hopeless(ceiling, now):
-            return replace(found, cost=explained.cost(found.misfit, tau))
+        is_hopeless = ceiling is not None and explained.cost(found.misfit, now) > _hopeless(ceiling, now)
+        if last or is_hopeless or is_spent(found.model):
+            there = replace(found.model, effort=model.effort)
+            return replace(found, model=there, cost=found.cost if last else explained.cost(found.misfit, tau))
 
 
 def _hopeless(ceiling: np.ndarray, tau: float) -> float:
@@ -175,5 +175,5 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
                 model = best.model
         ends.append((float(np.sum(residuals(model, traces, 0.0) ** 2)), model))
     ends = [e for e in ends if np.isfinite(e[0])]
-    best = min(ends, key=lambda e: e[0], default=None)
-    return replace(found, model=replace(best[1], effort=found.model.effort)) if best else found
+    lowest = min(ends, key=lambda e: e[0], default=None)
+    return replace(found, model=replace(lowest[1], effort=found.model.effort)) if lowest else found

@@ -67,9 +67,8 @@ def _run_in(model: Model, trace: Trace, record: int, rate: float) -> tuple[np.nd
     key = (*plant.told, rate, model.offset(record), model.values.get("ampere"), model.dead_time)
     kept = trace.runs.get(key)
     if kept is not None:
-        flat, motion, beyond = kept
-        plant.count_outputs(trace.t, rate > 0, int(beyond[0]))
-        return flat, motion
+        plant.count_outputs(trace.t, rate > 0, int(kept[2][0]))
+        return kept[0], kept[1]
     (theta, *others), motion, beyond = model.observed(trace, record, rate)
     left = np.empty((1 + len(others), trace.t.size))
     left[0] = trace.weighed(theta)
