@@ -3,6 +3,7 @@
     python analysis/speed.py                       # cases of ../shared/concealed, both checkouts in turn: ratios
     python analysis/speed.py --growth 1 4 16 60    # minutes at 1 kHz: diagnose, identify, frequency, this checkout
     python analysis/speed.py --side-by-side        # by the clock: --jobs 2 beside --jobs 1, on an idle machine
+    python analysis/speed.py --inspect             # `ers inspect` of 100 000 rows beside reading them twice and a plot
 
 Seconds are a processor's in user mode, one thread, kernels compiled beforehand; of several rounds the least counts,
 since other work on a machine only adds. Seconds belong to a machine, ratios hold.
@@ -27,16 +28,32 @@ CASES = ("case-001", "case-010", "case-032", "case-053")  # three with one effec
 MOST, TWICE = 1.0 / 3.0, 1.7  # the bars: share of the older commit's time, and how much faster two threads are
 
 
-def taken(checkout: Path, cache: Path, arguments: list[str]) -> tuple[float, float]:
-    """(processor time in user mode [s], largest memory [MiB]) of `ers` from a checkout with a cache of its own."""
+TWICE_AND_PLOT = """
+import sys
+import ers_mj as ers
+record = [ers.read(sys.argv[1]) for _ in range(2)][0]
+from matplotlib.figure import Figure
+figure = Figure()
+above, below = figure.subplots(2, 1, sharex=True)
+above.plot(record.t, record.y)
+below.plot(record.t, record.u)
+figure.savefig(sys.argv[2])
+"""
+
+
+def taken(checkout: Path, cache: Path, arguments: list[str], script: str = "") -> tuple[float, float]:
+    """(processor time in user mode [s], largest memory [MiB]) of `ers` from a checkout with a cache of its own, or of a
+    script there.
+    """
     cache.mkdir(mode=0o700, exist_ok=True)
     environment = {**os.environ, "PYTHONPATH": str(checkout), "XDG_CACHE_HOME": str(cache), "OPENBLAS_NUM_THREADS": "1"}
+    what = ["-c", script] if script else ["-m", "ers_mj"]
     started = subprocess.Popen(
-        [sys.executable, "-m", "ers_mj", *arguments], env=environment, cwd=cache, stdout=subprocess.DEVNULL
+        [sys.executable, *what, *arguments], env=environment, cwd=cache, stdout=subprocess.DEVNULL
     )
     _, status, usage = os.wait4(started.pid, 0)
     if status:
-        raise SystemExit(f"ers {' '.join(arguments)} ended with {os.waitstatus_to_exitcode(status)}")
+        raise SystemExit(f"{' '.join(arguments)} ended with {os.waitstatus_to_exitcode(status)}")
     return usage.ru_utime, usage.ru_maxrss / 1024
 
 
@@ -103,6 +120,7 @@ def recorded(minutes: float, path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    from ers_mj.data.recording import write_recording
     from ers_mj.servo.datasheet import read_datasheet
     from ers_mj.servo.simulation import simulate_recording
 
@@ -112,7 +130,24 @@ def recorded(minutes: float, path: Path) -> None:
         u += 0.27 * generator.standard_normal() * np.sin(2 * np.pi * f * t + generator.uniform(0, 2 * np.pi))
     effects = [("stribeck", {"dF_s": 0.05, "v_s": 0.2})]
     columns = simulate_recording(read_datasheet("table1"), t, u, effects=effects, noise=2e-4, seed=1)
-    pq.write_table(pa.table(columns), path)
+    if path.suffix == ".csv":
+        write_recording(path, columns)
+    else:
+        pq.write_table(pa.table(columns), path)
+
+
+def look(rounds: int) -> int:
+    """Print what `ers inspect` of 100 000 rows with its page takes, of reading them twice and a plot; 1 above that."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        recorded(100 / 60, path := folder / "long.csv")
+        asked = ["inspect", str(path), "--out", str(folder / "out"), "--force"]
+        both = [asked, ""], [[str(path), str(folder / "plot.png")], TWICE_AND_PLOT]
+        inspected, plotted = (min(taken(ROOT, folder / "cache", *each)[0] for _ in range(rounds + 1)) for each in both)
+    print(
+        f"ers inspect {inspected:.2f} s, reading twice and a plot {plotted:.2f} s: {inspected / plotted:.2f} (bar: 1)"
+    )
+    return 0 if inspected <= plotted else 1
 
 
 def grow(minutes: list[float]) -> int:
@@ -144,7 +179,10 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--growth", nargs="+", type=float, metavar="MINUTES")
     parser.add_argument("--side-by-side", action="store_true")
+    parser.add_argument("--inspect", action="store_true")
     chosen = parser.parse_args()
+    if chosen.inspect:
+        return look(chosen.rounds)
     if chosen.side_by_side:
         return side_by_side(chosen.cases)
     return grow(chosen.growth) if chosen.growth else compare(chosen.cases, chosen.before, chosen.rounds)

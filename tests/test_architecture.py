@@ -13,7 +13,7 @@ MAY_READ = {
     "errors": (),
     "processes": (),
     "comparing": ("errors",),
-    "workers": ("errors",),
+    "workers": ("data", "errors"),
     "decisions": (),
     "solvers": (),
     "data": ("decisions", "errors", "processes"),
@@ -59,7 +59,7 @@ WRITERS = {
 }  # beside these only the tables of data/ open a file to write
 FAMILIES = {
     "data/consistency": ("sheet", "motion"),
-    "data/formats": ("base", "arrays", "clocks"),
+    "data/formats": ("base", "arrays", "clocks", "mat_elements"),
     "effects": ("base", "quantities"),
     "control/controllers": ("base", "finite_time", "pid"),
     "identification/minimisers": ("base", "iga"),

@@ -83,6 +83,21 @@ def test_a_channel_on_a_slower_clock_is_held_whatever_its_type(tmp_path, kind):
     assert told(record, "hold their last value")
 
 
+@pytest.mark.parametrize("late", [-0.004, -1e-5, 0.0, 1e-5, 0.004])
+def test_a_command_is_that_of_the_step_it_acts_in(tmp_path, late):
+    """A loop sends its command just after it has read the output, or just before the next reading."""
+    asammdf = needs("asammdf")
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([asammdf.Signal(THETA, T + BEGUN, name="Angle", unit="rad")])
+        mdf.append([asammdf.Signal(U, T + late + BEGUN, name="Volts", unit="V")])
+        mdf.save(tmp_path / "rec.mf4")
+    record = read_recording(tmp_path / "rec.mf4", {"theta_rad": "Angle", "u_V": "Volts"})
+    first = N - record.t.size  # the first angle comes before a command that is late
+    assert first <= 1
+    np.testing.assert_allclose(record.u, U[first:])
+    np.testing.assert_allclose(record.y, THETA[first:])
+
+
 def waveform(nptdms, name, x, offset, unit):
     begun = np.datetime64("2024-05-01T12:00:00", "us")
     properties = {"wf_start_time": begun, "wf_increment": 0.01, "wf_start_offset": offset, "unit_string": unit}

@@ -39,6 +39,14 @@ MAPPED = {
         {"Time [ms]": 1e3 * T, "v": U, "Angle (deg)": np.degrees(THETA)},
         {"t_s": "Time [ms]", "u_V": "v", "theta_rad": "Angle (deg)"},
     ),
+    "a unit that names end in": (
+        {"time_ms": 1e3 * T, "cmd_mV": 1e3 * U, "joint_deg": np.degrees(THETA)},
+        {"t_s": "time_ms", "u_V": "cmd_mV", "theta_rad": "joint_deg"},
+    ),
+    "names that end in words and letters": (
+        {"t_min": T, "v_in": U, "angle_rot": THETA},
+        {"t_s": "t_min", "u_V": "v_in", "theta_rad": "angle_rot"},
+    ),
     "the column's name less the unit of its header": (
         {"Time": 1e3 * T, "v": U, "angle": np.degrees(THETA)},
         {"t_s": "Time [ms]", "u_V": "v", "theta_deg": "angle"},

@@ -156,3 +156,10 @@ def test_a_motion_that_runs_away_is_not_a_number():
     softening = [("hinge_moment_cubic", np.array([-400.0, np.inf]))]
     theta = rudder(effects=softening).simulate(T, INPUTS["steps"](T) + 4.0).theta
     assert np.isnan(theta[-1]) and np.isfinite(theta[0])
+
+
+@pytest.mark.parametrize("b", [1e160, 1e-170, 0.0])
+def test_a_drive_beyond_all_sizes_is_refused(b):
+    """b^2 is beyond the numbers that there are, above or below."""
+    with pytest.raises(InputError, match="cannot be simulated"):
+        rudder(lumped(SHEET.to_lumped() | {"b": b}))

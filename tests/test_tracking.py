@@ -201,7 +201,8 @@ def test_a_growing_file_is_followed_until_ctrl_c(life, tmp_path):
     line = process.stdout.readline()
     process.send_signal(signal.SIGINT)
     rest, errors = process.communicate()
-    assert line.startswith("0.5 s") and "c_2" in line and process.returncode == 0 and errors == ""
+    assert line.startswith("0.5 s") and "c_2" in line
+    assert process.returncode == 130 and errors == "ers: stopped following s.csv\n"
 
 
 @pytest.mark.parametrize(

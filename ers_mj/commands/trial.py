@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
-from contextlib import closing
+import re
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.keeping import Kept, keep, results_folder
+from ers_mj.commands.keeping import DEFAULT_OUT, Kept, Place, keep, results_folder
 from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
 from ers_mj.commands.options import (
     add_cluster,
@@ -24,9 +27,13 @@ from ers_mj.commands.options import (
     swing_deg,
     whole,
 )
-from ers_mj.commands.output import Progress, bold, written
+from ers_mj.commands.output import Progress, bold, tell, written
 from ers_mj.door.saving import as_json, plain, report_writers, versions, write_results
 from ers_mj.errors import InputError
+from ers_mj.processes import stopping
+from ers_mj.processes.passing import remove
+from ers_mj.workers.finished import Finished
+from ers_mj.workers.held import held
 
 if TYPE_CHECKING:
     from ers_mj.control.monte_carlo import Spread
@@ -46,6 +53,7 @@ COLUMNS = (
 )
 
 RESULTS = ("trials.json", "report.html")
+KEPT = ".trial"  # in the folder of the results: the scattered servos that are finished
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -53,7 +61,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "trial",
         help="controllers in a closed loop, on either plant",
-        description="Run controllers in a closed loop and measure them. Lists with commas run every combination.",
+        description=(
+            "Run controllers in a closed loop and measure them. Lists with commas run every combination. Stopped, the"
+            " same command goes on\nwith the servos of --plants where it was."
+        ),
         epilog=(
             "examples:\n  ers trial\n  ers trial --controller ftrc,pid-ff,time-optimal --plant reduced,mujoco --case"
             " square,ramp,chirp --rate-hz 1000 --noise-deg 0.01\n  ers trial model.toml --design datasheet.toml --case"
@@ -69,6 +80,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add_laws(parser)
     _add_scatter(parser)
     add_cluster(parser)
+    parser.add_argument(
+        "--save-traces", action="store_true", help="write every trial as a CSV too, in a recording's columns"
+    )
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -83,8 +97,11 @@ def _add_what(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--controller",
         type=several(str, "controller"),
-        metavar="NAME,...",
-        help="ftrc, ftrc-literal, pid, pid-ff, hinf, time-optimal (default all)",
+        metavar="NAME|FILE.py,...",
+        help=(
+            "ftrc, ftrc-literal, pid, pid-ff, hinf, time-optimal, or a Python file with a class derived from"
+            " ers_mj.control.controllers.Controller (default all of ours)"
+        ),
     )
     parser.add_argument(
         "--plant", type=several(str, "plant"), default=["reduced"], metavar="reduced,mujoco", help="default reduced"
@@ -156,11 +173,49 @@ def _add_scatter(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run every combination, write, tell; 0."""
-    place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
-    from ers_mj.control.controllers import CONTROLLERS
-    from ers_mj.control.paper_claims import headline
-    from ers_mj.control.trial import try_out
+    """Run every combination, write, tell; 0, or 130 where it was stopped."""
+    place = _place(arguments)
+    try:
+        with _carried_on(arguments, place) as finished:
+            return _run(arguments, place, finished)
+    except KeyboardInterrupt:
+        kept = place is not None and (place.folder / KEPT).is_dir() and place.folder
+        stopping.tell(f"; {kept} keeps what was done, the same command goes on from there" if kept else "")
+        return stopping.STOPPED
+
+
+def _place(arguments: argparse.Namespace) -> Place | None:
+    """Where the results go; a folder that a trial of many servos was begun in may hold files."""
+    begun = arguments.plants > 0 and (Path(arguments.out or DEFAULT_OUT) / KEPT).is_dir()
+    return results_folder(arguments.out, arguments.force or begun, arguments.json, RESULTS)
+
+
+@contextmanager
+def _carried_on(arguments: argparse.Namespace, place: Place | None) -> Iterator[Finished | None]:
+    """The scattered servos that are finished, kept in the folder of the results until these are written; None where
+    there are no such servos, or no folder.
+    """
+    if place is None or not arguments.plants:
+        yield None
+        return
+    new = not place.folder.exists()
+    finished = Finished(place.folder / KEPT)
+    try:
+        with held(place.folder, "ers trial"):
+            if finished.folder.is_dir():
+                tell(f"{place.folder}: goes on where it was left")
+            yield finished
+    finally:
+        with suppress(OSError):
+            if new:
+                place.folder.rmdir()  # which it is not where anything is in it
+
+
+def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished | None) -> int:
+    from ers_mj.control.controllers import Servo
+    from ers_mj.control.own_law import law_of
+    from ers_mj.control.paper_claims import headline, is_papers
+    from ers_mj.control.trial import gains_of, try_out
 
     controllers = chosen_controllers(arguments)
     _refuse_cases(arguments)
@@ -170,7 +225,7 @@ def run(arguments: argparse.Namespace) -> int:
         trials = try_out(
             datasheet, controllers, arguments.plant, arguments.case, conditions, design=design, progress=progress
         )
-        spreads = _spreads(arguments, datasheet, controllers, conditions, design, hired, progress)
+        spreads = _spreads(arguments, datasheet, controllers, conditions, design, hired, finished, progress)
         document = plain(
             {
                 "trials": [t.as_document() for t in trials],
@@ -179,13 +234,18 @@ def run(arguments: argparse.Namespace) -> int:
                 "robustness": [x.as_document() for x in spreads],
                 "scatter": arguments.scatter,
                 "conditions": conditions.as_document(),
-                "controllers": {name: CONTROLLERS[name].sentence for name in controllers},
+                "controllers": {name: law_of(name).sentence for name in controllers},
+                "gains": {name: gains_of(name, Servo.of(design), conditions) for name in controllers},
+                "papers_settings": is_papers(datasheet, design, conditions),
                 "datasheet": datasheet.name or arguments.model,
                 "design": design.name or arguments.design,
                 "versions": versions(),
             }
         )
-        kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress))
+        traces = trials if arguments.save_traces else []
+        kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress, traces))
+    if finished is not None and not kept.code:
+        remove(finished.folder)
     print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
     return kept.code
 
@@ -196,8 +256,13 @@ def _crew(arguments: argparse.Namespace) -> Crew:
     Raises:
         InputError: a cluster is asked for and there is nothing to share out, or it cannot be used.
     """
+    from ers_mj.control.own_law import is_own
+
     if arguments.cluster is not None and not arguments.plants:
         raise InputError("--cluster shares out the servos of --plants, none are asked for; give --plants N with it")
+    own = next((name for name in arguments.controller or () if is_own(name)), None)
+    if arguments.cluster is not None and own is not None:
+        raise InputError(f"--cluster: workers have no {own}, a law of one's own runs on this machine alone")
     return crew_of(arguments)
 
 
@@ -208,6 +273,7 @@ def _spreads(
     conditions: Conditions,
     design: Datasheet,
     hired: Crew,
+    finished: Finished | None,
     progress: Progress,
 ) -> list[Spread]:
     """The same on scattered servos, none where none are asked for."""
@@ -217,7 +283,7 @@ def _spreads(
         return []
     fleet = Fleet(datasheet, arguments.plants, arguments.scatter, design)
     asked = controllers, arguments.plant, arguments.case
-    return scatter(fleet, *asked, conditions, crew=hired, progress=progress)
+    return scatter(fleet, *asked, conditions, crew=hired, finished=finished, progress=progress)
 
 
 def _refuse_cases(arguments: argparse.Namespace) -> None:
@@ -267,12 +333,30 @@ def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> li
     return notes
 
 
-def _write(folder: Path, document: dict, trials: list[Trial], spreads: list[Spread], progress: Progress) -> list[Path]:
+def _write(
+    folder: Path, document: dict, trials: list[Trial], spreads: list[Spread], progress: Progress, traces: list[Trial]
+) -> list[Path]:
     from ers_mj.report.trial_report import trial_page
 
     progress("drawing the report", 1.0)
     page = trial_page(document, trials, spreads)
-    return write_results(folder, report_writers("trials.json", document, page))
+    beside = {_trace_name(t): partial(_write_trace, t) for t in traces}
+    return write_results(folder, report_writers("trials.json", document, page) | beside)
+
+
+def _trace_name(trial: Trial) -> str:
+    return re.sub(r"[^\w.-]+", "-", f"trace-{trial.case}-{trial.plant}-{trial.controller}") + ".csv"
+
+
+def _write_trace(trial: Trial, file: Path) -> None:
+    """What a recording of this trial would be, up to where it was given up."""
+    import numpy as np
+
+    from ers_mj.data.recording import write_recording
+
+    run, ran = trial.run, np.isfinite(trial.run.u)
+    columns = {"t_s": run.reference.t, "theta_ref_rad": run.reference.theta, "u_V": run.u, "theta_rad": run.measured}
+    write_recording(file, {name: x[ran] for name, x in columns.items()})
 
 
 # -- the trials in lines --------------------------------------------------------------------------------------------

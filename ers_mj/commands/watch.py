@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from ers_mj.commands.options import mapping, number, pair
 from ers_mj.door.saving import plain
 from ers_mj.errors import InputError
+from ers_mj.processes import stopping
 
 if TYPE_CHECKING:
     from ers_mj.online.moving_horizon import Estimate
@@ -69,7 +70,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Follow until the stream ends or Ctrl-C; 0."""
+    """Follow until the stream ends, 0; or until Ctrl-C, 130 as everywhere, with all that was told before it shown."""
     chosen = mapping(arguments.map)
     if arguments.stream != "-" and not Path(arguments.stream).is_file():
         what = "is a folder" if Path(arguments.stream).is_dir() else "there is no such file"
@@ -84,7 +85,9 @@ def run(arguments: argparse.Namespace) -> int:
         for estimate in _estimates(stream, _pieces(arguments.stream, arguments.once), datasheet, show):
             show(estimate)
     except KeyboardInterrupt:
-        pass
+        show.end()
+        stopping.tell(f" following {stream.name}")
+        return stopping.STOPPED
     show.end()
     return 0
 

@@ -7,7 +7,10 @@ fleet (datasheet, count, spread), seed -> servos -> trials of each -> distributi
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +19,13 @@ from ers_mj.control.metrics import Measures
 from ers_mj.control.references import Reference
 from ers_mj.control.trial import Conditions, references, try_out
 from ers_mj.effects import BY_NAME
-from ers_mj.errors import ErsError
+from ers_mj.errors import ErsError, Unwritable
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import EffectSettings
 from ers_mj.workers.base import Crew, Task
+from ers_mj.workers.finished import Finished
 from ers_mj.workers.here import Here
+from ers_mj.workers.versions import code
 
 ALONE = Here(1)
 SCATTERED = ("J", "B", "K_t", "K_e", "k_s", "T_LH", "F_c", "R", "L")
@@ -38,6 +43,8 @@ TOLD = (
 )
 Progress = Callable[[str, float], None]
 Key = tuple[str, str, str]  # controller, plant, case
+Found = tuple[Key, dict[str, Any]]  # the measures of one trial
+Wanted = tuple[Sequence[str], Sequence[str], Sequence[Reference]]  # controllers, plants, cases
 
 
 @dataclass(frozen=True)
@@ -132,32 +139,59 @@ def scatter(
     conditions: Conditions,
     *,
     crew: Crew = ALONE,
+    finished: Finished | None = None,
     progress: Progress = lambda text, fraction: None,
 ) -> list[Spread]:
     """Try all combinations on every servo of a fleet, by these workers, which do not change the result. Servo k has
     the noise of seed + k.
+
+    Args:
+        finished: servos that are there already, and where those that are tried now are kept.
 
     Raises:
         InputError: as :func:`ers_mj.control.trial.try_out`.
     """
     aims = references(cases, Servo.of(fleet.design or fleet.datasheet), conditions)  # workers have no files of ours
     wanted = tuple(controllers), tuple(plants), tuple(aims)
-    tasks = [Task(str(k), _one, (fleet, k, wanted, conditions)) for k in range(fleet.count)]
-    found: list[dict[Key, Measures]] = [{}] * fleet.count
-    for count, done in enumerate(crew.run(tasks), start=1):
+    asked = "" if finished is None else _asked(fleet, wanted, conditions)
+    found: dict[str, list[Found]] = {}
+    for k in range(fleet.count):
+        if finished is not None and (kept := finished.value(str(k), asked)) is not None:
+            found[str(k)] = kept
+    tasks = [Task(str(k), _one, (fleet, k, wanted, conditions)) for k in range(fleet.count) if str(k) not in found]
+    for done in crew.run(tasks):
         if done.lost:
             raise ErsError(f"servo {int(done.name) + 1} of {fleet.count}: {done.lost}")
-        found[int(done.name)] = done.value
-        progress(f"servo {count} of {fleet.count}", count / fleet.count)
-    return [Spread(*key, measures=tuple(measures[key] for measures in found)) for key in found[0]]
+        found[done.name] = done.value
+        if finished is not None:
+            with suppress(Unwritable):  # the answer counts, which is written elsewhere if need be
+                finished.keep(done.name, asked, done.value)
+        progress(f"servo {len(found)} of {fleet.count}", len(found) / fleet.count)
+    each = zip(*(found[str(k)] for k in range(fleet.count)), strict=True)  # the same trials in the same order
+    return [_spread(servos) for servos in each]
 
 
-def _one(
-    fleet: Fleet, k: int, wanted: tuple[Sequence[str], Sequence[str], Sequence[Reference]], conditions: Conditions
-) -> dict[Key, Measures]:
-    """All trials of servo k: {(controller, plant, case): measures}."""
+def _spread(servos: Sequence[Found]) -> Spread:
+    """One trial on all servos."""
+    controller, plant, case = servos[0][0]
+    return Spread(controller, plant, case, tuple(Measures(**measures) for _, measures in servos))
+
+
+def _asked(fleet: Fleet, wanted: Wanted, conditions: Conditions) -> str:
+    """Hash of all that the trials of a fleet depend on."""
+    controllers, plants, aims = wanted
+    digest = sha256(repr((fleet, controllers, plants, conditions, code())).encode())
+    for aim in aims:
+        digest.update(repr((aim.name, aim.jumps)).encode())
+        for x in (aim.t, aim.theta, aim.omega, aim.alpha):
+            digest.update(x.tobytes())
+    return digest.hexdigest()
+
+
+def _one(fleet: Fleet, k: int, wanted: Wanted, conditions: Conditions) -> list[Found]:
+    """All trials of servo k, as plain values."""
     random = np.random.default_rng([conditions.seed, k])
     sheet, effects = scattered(fleet.datasheet, conditions.effects, fleet.spread, random)
     its_own = replace(conditions, effects=effects, seed=conditions.seed + k)
     trials = try_out(sheet, *wanted, its_own, design=fleet.design or fleet.datasheet)
-    return {(t.controller, t.plant, t.case): t.measures for t in trials}
+    return [((t.controller, t.plant, t.case), t.measures.as_document()) for t in trials]

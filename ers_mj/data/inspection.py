@@ -136,9 +136,19 @@ def inspected(record: Recorded) -> Inspection:
 def speed_of(record: Recorded) -> np.ndarray:
     """The output's speed (N,) by differences over about 20 ms, or three samples."""
     y = np.interp(record.t, record.t[record.valid], record.y[record.valid])
-    k = max(1, round(0.01 / float(np.median(np.diff(record.t)))))
+    k = _half_span(record)
     late, early = np.minimum(np.arange(y.size) + k, y.size - 1), np.maximum(np.arange(y.size) - k, 0)
     return (y[late] - y[early]) / (record.t[late] - record.t[early])
+
+
+def _half_span(record: Recorded) -> int:
+    """Samples on either side, of the difference that a speed is."""
+    return max(1, round(0.01 / float(np.median(np.diff(record.t)))))
+
+
+def _speed_noise(record: Recorded, noise: float) -> float:
+    """What noise of the output, standard deviation, does to :func:`speed_of`."""
+    return noise / (np.sqrt(2.0) * _half_span(record) * float(np.median(np.diff(record.t))))
 
 
 def _channel(name: str, x: np.ndarray, record: Recorded) -> Channel:
@@ -213,10 +223,11 @@ class Motion:
 def _motion(record: Recorded, v: np.ndarray) -> Motion:
     top = float(np.quantile(np.abs(v), 0.99))
     noise = noise_sigma(record.y[record.valid], record.quantum)
-    still = np.abs(v) < max(SEEING.rest * top, 1e-300)
-    signs = np.sign(np.where(np.abs(v) < 3.0 * SEEING.rest * top, 0.0, v))
+    rest = max(SEEING.rest * top, 1e-300)
+    still, moves = np.abs(v) < rest, np.abs(v) > 3.0 * max(rest, _speed_noise(record, noise))
+    signs = np.sign(np.where(moves, v, 0.0))
     moving = signs[signs != 0.0]
-    edges = np.flatnonzero(np.diff(np.r_[0, still.astype(int)]) == 1)
+    told = np.r_[True, moves[still | moves]]  # what is neither keeps what was before
     travel = float(np.ptp(record.y[record.valid]))
     return Motion(
         moves_up=float(np.mean(signs > 0)),
@@ -224,7 +235,7 @@ def _motion(record: Recorded, v: np.ndarray) -> Motion:
         rests=float(np.mean(still)),
         slow=float(np.mean(~still & (np.abs(v) < SEEING.slow * top))),
         reversals=int(np.count_nonzero(np.diff(moving) != 0.0)),
-        stops=int(edges.size),
+        stops=int(np.count_nonzero(told[:-1] & ~told[1:])),
         travel_steps=travel / max(record.quantum, noise),
     )
 
@@ -251,7 +262,7 @@ def _tells(record: Recorded, v: np.ndarray, spectrum: tuple[np.ndarray, np.ndarr
         Tells(
             "breaking loose and creep before it",
             m.stops >= SEEING.settled and m.rests > SEEING.share,
-            f"it comes to rest {m.stops} times",
+            f"it comes to rest {m.stops} times and rests for {m.rests:.0%} of the time",
         ),
         Tells(
             "a spring, gravity or another force by place",

@@ -20,7 +20,7 @@ import numpy as np
 
 from ers_mj.data.expressions import Column, Unreadable, columns_of, tokens, value
 from ers_mj.data.tables import listed, read_content, reason
-from ers_mj.data.units import COUNTS, Unit, conversion, is_unit, split_header
+from ers_mj.data.units import COUNTS, Unit, conversion, is_unit, split_header, suffix_of
 from ers_mj.errors import InputError
 
 KEYS = ("map", "input", "second", "episode", "dbc")  # of a mapping that is kept in a TOML
@@ -95,8 +95,13 @@ def source_of(
 
 
 def _column(contract: str, text: str, part: Column, target: Target, file_units: Mapping[str, str], name: str) -> Source:
-    """A column by itself, in the unit that its file or its header says, else in that of the contract's name."""
+    """A column by itself, in the unit that its file or its header says, or its name ends in, else in that of the
+    contract's name.
+    """
     said = file_units.get(part[0]) or split_header(part[0])[1]
+    if said is None and (ending := suffix_of(part[0])) and (turned := conversion(ending, target[0])):
+        told = "" if turned.factor == target[1] else f"{contract} is {part[0]}, in {ending} as its name says"
+        return Source(text, (part,), turned, told=told)
     if said is None or not is_unit(said) or target[0] == "-":
         return Source(text, (part,), Unit("", target[1]))
     turned = _conversion(contract, said, target[0], name)

@@ -98,6 +98,7 @@ TEMPERATURES = {
     **{name: Unit("temperature", 5 / 9, -160 / 9) for name in ("f", "°f", "degf", "fahrenheit")},
 }
 COUNTS = ("count", "counts", "cnt", "cnts", "tick", "ticks", "lsb", "inc", "incs", "increments", "steps", "raw")
+WORDS = ("in", "min", "rev", "rot", "turn", "none", "bool", "ratio", "second")  # as the end of a name
 MEGA = ("MNm", "MN m", "MV", "MA", "MH", "MOhm")  # in lower case these would be thousandths
 BASE = {  # the unit of a recording -> dimension, and what of the table's unit it is
     "s": ("time", 1.0),
@@ -149,6 +150,14 @@ def conversion(text: str, target: str) -> Unit | None:
 def is_unit(text: str) -> bool:
     """Whether a text is a unit, or counts, as logs write them."""
     return unit_named(text) is not None or counts_per_turn(text) is not None or text.strip().lower() in COUNTS
+
+
+def suffix_of(name: str) -> str | None:
+    """The unit that a name ends in: "pos_mm", "speed_rpm"; None where it ends in none, or in what may be a word or a
+    letter of the field.
+    """
+    suffix = name.rpartition("_")[2] if "_" in name else ""
+    return suffix if len(suffix) > 1 and suffix.lower() not in WORDS and unit_named(suffix) is not None else None
 
 
 def split_header(header: str) -> tuple[str, str | None]:

@@ -22,6 +22,7 @@ from ers_mj.errors import ErsError
 from ers_mj.fleet.diagnosing import COLUMNS, Row, Settings, diagnosed, failed, fingerprint, read_servo
 from ers_mj.fleet.manifest import Servo
 from ers_mj.workers.base import Crew, Task
+from ers_mj.workers.finished import Finished
 from ers_mj.workers.held import held
 from ers_mj.workers.versions import sources
 
@@ -37,6 +38,11 @@ class Batch:
     settings: Settings
     rows: dict[str, Row] = field(default_factory=dict)
     asked: dict[str, str] = field(default_factory=dict)  # fingerprints
+
+    @property
+    def finished(self) -> Finished:
+        """The rows in its folder."""
+        return Finished(self.folder / KEPT)
 
     def table(self) -> str:
         """batch.csv: all digits of every number, nothing where there is none."""
@@ -127,8 +133,7 @@ def _keep(batch: Batch, row: Row, files: dict[str, bytes]) -> None:
     batch.rows[name] = row
     if files:
         write_results(batch.folder / name, {file: _writer(content) for file, content in files.items()})
-        kept = {"asked": batch.asked[name], "row": row}
-        write_file(batch.folder / KEPT / f"{name}.json", json.dumps(kept).encode())
+        batch.finished.keep(name, batch.asked[name], row)
 
 
 def _writer(content: bytes) -> Callable[[Path], None]:
@@ -141,10 +146,5 @@ def _write(path: Path, content: bytes) -> None:
 
 def _kept(batch: Batch, servo: Servo) -> Row | None:
     """The row that is there, None where there is none or something that it depends on has changed."""
-    asked = batch.asked[servo.name]
-    try:
-        kept = json.loads((batch.folder / KEPT / f"{servo.name}.json").read_text("utf-8"))
-    except (OSError, ValueError):
-        return None
     there = (batch.folder / servo.name / "diagnosis.json").is_file()
-    return kept["row"] if there and asked and kept.get("asked") == asked else None
+    return batch.finished.value(servo.name, batch.asked[servo.name]) if there else None

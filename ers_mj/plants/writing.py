@@ -35,10 +35,10 @@ def write_coefficients(skeleton: Skeleton, c: Coefficients, timestep: float) -> 
     """Write all of c onto the skeleton's spec.
 
     Raises:
-        InputError: b is zero, or the back-EMF or the timestep negative.
+        InputError: b is zero or beyond all sizes, or the back-EMF or the timestep negative.
     """
-    if c.b == 0 or not math.isfinite(c.b):
-        raise InputError(f"b is {c.b:g}: a drive whose input does nothing cannot be simulated")
+    if not 0.0 < skeleton.inertia * c.b * c.b < math.inf:
+        raise InputError(f"b is {c.b:g}: a drive whose input does nothing, or moves all there is, cannot be simulated")
     if c.a_emf < 0 or c.tau_e < 0:
         raise InputError(f"a_emf is {c.a_emf:g} and tau_e {c.tau_e:g}, both zero or more were expected")
     _write_solver(skeleton.spec, timestep)
@@ -77,7 +77,7 @@ def _write_motor(skeleton: Skeleton, c: Coefficients) -> None:
     motor.gear[0] = math.copysign(skeleton.K_t, c.b)
     gain = motor_gain(skeleton, c)
     if c.a_emf > 0:
-        resistance = c.a_emf / (skeleton.inertia * c.b**2)
+        resistance = c.a_emf / (skeleton.inertia * c.b * c.b)
         motor.set_to_dcmotor(motorconst=[gain, gain], resistance=resistance, inductance=[c.tau_e * resistance, 0.0])
         return
     motor.gaintype, motor.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE

@@ -16,7 +16,7 @@ import numpy as np
 
 from ers_mj.report import page
 
-PARTS = "base", "traces", "figures", "page"
+PARTS = "base", "timeline", "traces", "figures", "recordings", "page"
 ABSENT = 2**16 - 1  # the packed number that stands for none; the others are steps from the lowest to the highest value
 NO_SCRIPT = (
     "The charts are drawn by a script inside this page, which is switched off here; every number that was found stands"

@@ -5,33 +5,33 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ers_mj.data.inspection import Inspection
-from ers_mj.report import page
+from ers_mj.report import charts, page
+from ers_mj.report.charts import packed
 from ers_mj.report.display import shown
-from ers_mj.report.drawing import both_widths, margins, restart_ids
-from ers_mj.report.style import STYLE
-from ers_mj.report.thinning import decimate
+from ers_mj.report.thinning import decimate, merged
 
-POINTS = {True: 900, False: 450}
+POINTS = 6000  # of a series: enough for a zoom to a tenth
+BANDS = 600  # of a spectrum
 HEADS = ("channel", ">refresh", ">lowest", ">highest", ">noise", ">quantum", ">at an end", ">blank")
 
 
 def inspect_page(document: Mapping, found: Sequence[Inspection]) -> str:
     """The page as HTML, of what `ers inspect --json` prints and the recordings behind it."""
-    restart_ids()
     faults = document["faults"]
     several = ("s"[: len(faults) != 1], "s"[: len(found) != 1])
     sentence = f"{len(faults)} fault{several[0]} in {len(found)} recording{several[1]}"
     counts = (("input", document["input_kind"]), ("recordings", len(found)), ("faults", len(faults)))
     tiles = [(name, page.text(value)) for name, value in counts]
     parts = [page.header("consistent", "Recordings", "ers inspect", sentence, tiles)]
-    parts += [_one(one, inspection) for one, inspection in zip(document["recordings"], found)]
-    return page.frame("Recordings", "consistent", "\n".join(parts))
+    parts += [_one(one, k) for k, one in enumerate(document["recordings"])]
+    drawn = {f"{name}-{k}": draw(one) for k, one in enumerate(found) for name, draw in DRAWN.items()}
+    return charts.frame("Recordings", "consistent", "\n".join(parts), {"charts": drawn})
 
 
-def _one(one: Mapping, inspection: Inspection) -> str:
+def _one(one: Mapping, k: int) -> str:
+    """The section of recording k."""
     lead = (
         f"{one['samples']} samples, {one['duration_s']:.4g} s at {one['rate_hz']:.5g} Hz; 95 % of the input's power"
         f" lies below {one['input_band_hz']:.3g} Hz."
@@ -41,9 +41,9 @@ def _one(one: Mapping, inspection: Inspection) -> str:
     content = [
         page.listed(one["problems"]),
         page.table(HEADS, rows),
-        page.figure(both_widths(lambda width: _over_time(inspection, width), "input and output over time")),
-        page.figure(both_widths(lambda width: _over_range(inspection, width), "where the time is spent")),
-        page.figure(both_widths(lambda width: _over_frequency(inspection, width), "power over frequency")),
+        charts.place(f"recorded-{k}", "input and output over time"),
+        charts.place(f"coverage-{k}", "where the time is spent"),
+        charts.place(f"power-{k}", "power over frequency"),
         page.listed(tells),
     ]
     return page.section(page.text(one["file"]), page.text(lead), "\n".join(content))
@@ -55,47 +55,54 @@ def _cells(c: Mapping) -> tuple[str, ...]:
     return (page.text(c["name"]), f"{c['refresh_s']:.4g} s", *told, page.share(c["at_ends"]), str(c["blanks"]))
 
 
-def _over_time(inspection: Inspection, width: float) -> Figure:
-    r, points = inspection.record, POINTS[width == STYLE.wide]
+def _recorded(inspection: Inspection) -> dict:
+    """Output and input over time, and the faults that have a place there."""
+    r = inspection.record
     u, y = shown(r.input_unit), shown(r.output_unit)
-    figure = Figure(figsize=(width, 4.0))
-    above, below = figure.subplots(2, 1, sharex=True)
-    margins(figure)
-    above.plot(*decimate(r.t, y.factor * r.y, points), color=STYLE.after, linewidth=1.0)
-    below.plot(*decimate(r.t, u.factor * r.u, points), color=STYLE.ink, linewidth=0.8)
-    for fault in r.faults:
-        if fault.region:
-            above.axvspan(*fault.region, color=STYLE.shade, alpha=0.25, linewidth=0)
-    above.set_ylabel(f"output [{y.label}]")
-    below.set_ylabel(f"input [{u.label}]")
-    below.set_xlabel("time [s]")
-    return figure
+    closest = float(r.t[-1] - r.t[0]) / POINTS
+    return {
+        "kind": "recorded",
+        "panels": [
+            {"name": f"output [{y.label}]", "unit": y.label, "kind": "after", "held": False},
+            {"name": f"input [{u.label}]", "unit": u.label, "kind": "input", "held": True},
+        ],
+        "shaded": [list(span) for span in merged(tuple(f.region for f in r.faults if f.region), closest)],
+        "levels": [[_series(r.t, y.factor * r.y), _series(r.t, u.factor * r.u)]],
+    }
 
 
-def _over_range(inspection: Inspection, width: float) -> Figure:
+def _series(t: np.ndarray, x: np.ndarray) -> dict:
+    at, thinned = decimate(t, x, POINTS)
+    return {"t": packed(at), "y": packed(thinned)}
+
+
+def _coverage(inspection: Inspection) -> dict:
+    """The share of the time [%] over output, speed and input."""
     r = inspection.record
     y, u = shown(r.output_unit), shown(r.input_unit)
-    labels = {"output": f"output [{y.label}]", "speed": f"speed [{y.label}/s]", "input": f"input [{u.label}]"}
-    figure = Figure(figsize=(width, 2.4))
-    axes = figure.subplots(1, 3, sharey=True)
-    figure.subplots_adjust(left=0.1, right=0.98, bottom=0.25, top=0.95, wspace=0.12)
-    for ax, (name, (edges, share)) in zip(axes, inspection.coverage.items()):
-        factor = u.factor if name == "input" else y.factor
-        ax.stairs(100 * share, factor * edges, fill=True, color=STYLE.measured)
-        ax.set_xlabel(labels[name])
-    axes[0].set_ylabel("time [%]")
-    return figure
+    names = {"output": f"output [{y.label}]", "speed": f"speed [{y.label}/s]", "input": f"input [{u.label}]"}
+    panels = [
+        {
+            "name": names[name],
+            "edges": ((u if name == "input" else y).factor * edges).tolist(),
+            "share": (100.0 * share).tolist(),
+        }
+        for name, (edges, share) in inspection.coverage.items()
+    ]
+    return {"kind": "coverage", "panels": panels}
 
 
-def _over_frequency(inspection: Inspection, width: float) -> Figure:
-    f, u, y = inspection.spectrum
-    figure = Figure(figsize=(width, 2.8))
-    ax = figure.subplots()
-    margins(figure)
-    for power, colour, label in ((u, STYLE.ink, "input"), (y, STYLE.after, "output")):
-        if np.max(power[1:]) > 0.0:
-            ax.loglog(f[1:], power[1:] / np.max(power[1:]), color=colour, linewidth=1.0, label=label)
-    ax.set_ylabel("power over its peak")
-    ax.set_xlabel("frequency [Hz]")
-    ax.legend(fontsize=8)
-    return figure
+def _power(inspection: Inspection) -> dict:
+    """Power densities over their peaks [dB]: the largest of each of some hundred bands that widen with frequency."""
+    f, u, y = (x[1:] for x in inspection.spectrum)
+    begins = np.unique(np.geomspace(1, f.size, BANDS).astype(int)) - 1
+    levels = []
+    for kind, name, power in (("input", "input", u), ("after", "output", y)):
+        if (peak := float(power.max())) > 0.0:
+            share = np.maximum.reduceat(power, begins) / peak
+            decibels = 10.0 * np.log10(np.where(share > 0.0, share, np.nan))
+            levels.append({"kind": kind, "name": name, "y": packed(decibels)})
+    return {"kind": "power", "f": packed(np.log10(f[begins])), "levels": levels}
+
+
+DRAWN = {"recorded": _recorded, "coverage": _coverage, "power": _power}

@@ -26,6 +26,9 @@ class Bounds:
     near: float = 0.1  # half travels by which theta_0 or a stop may lie beyond the travel
     smallest: float = 0.5  # of the noise: a smaller width cannot be seen, and makes the simulation chatter
     fewest_cycles: int = 3  # of a frequency within the longest recording: a slower swing bends to any drift
+    # of a sample, in which a damped or sprung motion settles by a factor of e: of a faster one no sample tells, and its
+    # rates grow together without end
+    fastest: float = 0.05
     # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
     state_prior: float = 0.2
     load_prior: float = 1.0  # the same of a load
@@ -65,7 +68,14 @@ def of_base(names: Sequence[str], priors: Mapping[str, tuple[float, float]], sca
     """The free numbers of the baseline."""
     if not names:
         return []
-    ends = {"theta_0": _near_travel(scales), "emf_share": (0.02, 0.999), "tau_e": _tau_bounds(scales)}
+    rate = 1.0 / (BOUNDS.fastest * scales.sample_time)
+    ends = {
+        "theta_0": _near_travel(scales),
+        "emf_share": (0.02, 0.999),
+        "tau_e": _tau_bounds(scales),
+        "a_1": (1e-9, rate**2),
+        "a_2": (1e-9, rate),
+    }
     return [
         Free("base", name, 0, name != "theta_0", scales.position, *ends.get(name, (1e-9, np.inf)), priors.get(name))
         for name in names

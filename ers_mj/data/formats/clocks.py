@@ -1,7 +1,9 @@
 """Signals that were logged on clocks of their own, put on one: that of the output, the others held until their next
 value.
 
-No signal is interpolated: between two samples nothing is known but the last one.
+No signal is interpolated: between two samples nothing is known but the last one. What was measured is the last value at
+each time. A command is the one that holds for most of the step that follows: a loop sends its command shortly after it
+has read the output, and the last one before would be late by a step.
 """
 
 from __future__ import annotations
@@ -16,6 +18,9 @@ from ers_mj.data.columns import COLUMNS
 from ers_mj.data.formats.base import Loaded
 from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
+
+COMMANDS = ("u", "reference", "direction", "enable")  # fields
+MOST = 0.49  # of a step: whether a command that comes at its middle is the step's or the next one's is left to rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +56,8 @@ def on_one_clock(signals: Sequence[Signal], wanted: Mapping[str, str], name: str
     times, rows = times[keep], order[first][keep]
     columns = {"t_s": times - times[0]}
     for s in known:
-        values = s.values[rows].astype(float) if s is base else _held(s, times)
+        at = times + MOST * _steps(times) if _is_command(s, wanted) else times
+        values = s.values[rows].astype(float) if s is base else _held(s, at)
         columns["t_s of the file" if s.name == "t_s" else s.name] = values
     told = [*notes, *_told(base, others, base.t.size - first.size)]
     return Loaded(pa.table(columns), tuple(told), {s.name: s.unit for s in known if s.unit}, _no_numbers(signals))
@@ -68,7 +74,7 @@ def _told(base: Signal, others: Sequence[Signal], doubled: int) -> list[str]:
     if others:
         told.append(
             f"the time is that of {base.name}; {len(others)} signal{'s'[: len(others) > 1]} on other clocks"
-            f" ({listed((s.name for s in others), 6)}) hold their last value"
+            f" ({listed((s.name for s in others), 6)}) hold their last value, commands that of most of a step"
         )
     return told
 
@@ -95,6 +101,20 @@ def _base(signals: Sequence[Signal], wanted: Mapping[str, str]) -> Signal:
 
 def _is_wanted(signal: Signal, wanted: Mapping[str, str]) -> bool:
     return signal.name in COLUMNS or any(signal.name in text for text in wanted.values())
+
+
+def _is_command(signal: Signal, wanted: Mapping[str, str]) -> bool:
+    """Whether it is sent to the servo, not measured there."""
+    names = [signal.name, *(contract for contract, text in wanted.items() if signal.name in text)]
+    return any(name in COLUMNS and COLUMNS[name].field in COMMANDS for name in names)
+
+
+def _steps(times: np.ndarray) -> np.ndarray:
+    """From each time to the next (N,), in a gap and at the end the ordinary one."""
+    if times.size < 2:
+        return np.zeros(times.size)
+    dt = np.diff(times)
+    return np.append(np.minimum(dt, np.median(dt)), np.median(dt))
 
 
 def _held(signal: Signal, times: np.ndarray) -> np.ndarray:

@@ -5,7 +5,9 @@ comments on top and units below.
 from __future__ import annotations
 
 import io
+import itertools
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import pyarrow as pa
@@ -61,13 +63,13 @@ def _decoded(file: File) -> Text:
 
 
 def _below_titles(text: Text) -> Text:
-    """Past comments and titles: down to the first line that has several cells and is no comment; where numbers follow
-    a comment at once, that comment is the header.
+    """Past comments and titles: down to the first line that is no comment and has as many cells as what stands above
+    the first row of numbers; where numbers follow a comment at once, that comment is the header.
     """
     lines = re.split(r"\r\n|\n|\r", text.body, maxsplit=TOP)
     lines, rest = [text.header, *lines[:TOP]], "\n".join(lines[TOP:])
     several = [k for k, line in enumerate(lines) if _cells_in(line) > 1 and not COMMENT.match(line)]
-    first = several[0] if several else 0
+    first = _header_among([(k, lines[k]) for k in several]) if several else 0
     if first and _is_numbers(lines[first]) and _is_header_of(lines[first - 1], lines[first]):
         first -= 1
     if not first and not COMMENT.match(lines[0]):
@@ -76,6 +78,17 @@ def _below_titles(text: Text) -> Text:
     body = "\n".join(lines[first + 1 :] + ([rest] if rest else []))
     told = f"the first {first} line{'s'[: first > 1]}, comments or titles, are skipped"
     return Text(header, body, (*text.notes, told) if first else text.notes)
+
+
+def _header_among(lines: Sequence[tuple[int, str]]) -> int:
+    """The number of the header among numbered lines of several cells: titles have fewer, or fewer that are filled."""
+    above = list(itertools.takewhile(lambda numbered: not _is_numbers(numbered[1]), lines))
+    if not above or len(above) == len(lines):  # no header, or no row of numbers to measure by
+        return lines[0][0]
+    sign = max(DELIMITERS, key=above[-1][1].count)
+    filled = lambda line: sum(bool(cell.strip()) for cell in line.split(sign))
+    width, most = above[-1][1].count(sign), filled(above[-1][1])
+    return next(k for k, line in above if line.count(sign) == width and filled(line) >= most)
 
 
 def _is_header_of(line: str, row: str) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ers_mj.data.formats import arrays
 from ers_mj.data.formats.base import File, Loaded, library
+from ers_mj.data.formats.mat_elements import refuse_damaged
 from ers_mj.errors import InputError
 
 FORMAT = "MAT file"
@@ -26,6 +27,7 @@ def load(file: File) -> Loaded:
 def _of_v5(file: File) -> dict[str, np.ndarray]:
     from scipy.io import loadmat, matlab  # here alone: it takes long to import
 
+    refuse_damaged(file.content, file.name)
     found = loadmat(io.BytesIO(file.content), simplify_cells=True)
     for name, value in found.items():
         if isinstance(value, matlab.MatlabOpaque) or name == "__function_workspace__":

@@ -1,5 +1,5 @@
 // Charts from the page's JSON block, drawn as SVG as wide as there is room: scales, axes, lines, what all charts do.
-// base -> traces, figures -> page; charts.py joins them into one script. Nothing is fetched or evaluated.
+// base -> timeline -> traces, recordings; base -> figures; all -> page; charts.py joins them into one script. Nothing is fetched or evaluated.
 const DATA = JSON.parse(document.getElementById("chart-data").textContent);
 const WIDE = 620; // [px] from which panels stand side by side
 const PRINTED = 700; // [px] width of a chart on paper

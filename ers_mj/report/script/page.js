@@ -20,7 +20,8 @@ function switches() {
 
 // -- the page ------------------------------------------------------------------------------------------------------
 
-const KINDS = { trace: Trace, map: HeatMap, spectrum: Spectrum, ladder: Ladder };
+const KINDS = { trace: Trace, map: HeatMap, spectrum: Spectrum, ladder: Ladder,
+  recorded: Recorded, coverage: Coverage, power: Power };
 for (const host of document.querySelectorAll("figure[data-chart]")) {
   const data = DATA.charts[host.dataset.chart];
   const chart = new KINDS[data.kind](host, data);
