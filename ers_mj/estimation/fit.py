@@ -15,7 +15,7 @@ import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.decisions import explained
-from ers_mj.estimation.descent import Slopes, descended
+from ers_mj.estimation.descent import Slopes, descended, in_a_search, is_spent
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.jacobian import jacobian_of
 from ers_mj.estimation.objective import Fit, begun, residuals
@@ -59,7 +59,7 @@ def fit(
     lowers it to the one that was asked for. (Their plain mean asks more of a search that begins near the data: one bad
     block would send it back to the sum of squares.) The cost is that at ``tau``, wherever the search ends.
     """
-    run = begun(model, traces, rate)
+    run = begun(in_a_search(model, traces), traces, rate)
     slopes = Slopes(along.renewals, jacobian_of(run, traces, rate, along.known) if along.known is not None else None)
     now, blocks = math.inf, Blocks.of(traces)
     while True:
@@ -70,10 +70,10 @@ def fit(
         last = now <= 1.5 * tau
         at, least = (tau, tolerance) if last else (now, 0.3)
         found, run = descended(run, traces, rate, at, steps, least, slopes, along.by_tangents)
-        if last:
-            return found
-        if ceiling is not None and explained.cost(found.misfit, now) > _hopeless(ceiling, now):
-            return replace(found, cost=explained.cost(found.misfit, tau))
+        is_hopeless = ceiling is not None and explained.cost(found.misfit, now) > _hopeless(ceiling, now)
+        if last or is_hopeless or is_spent(found.model):
+            there = replace(found.model, effort=model.effort)
+            return replace(found, model=there, cost=found.cost if last else explained.cost(found.misfit, tau))
 
 
 def _hopeless(ceiling: np.ndarray, tau: float) -> float:
@@ -158,13 +158,16 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
     """The fit carried on in free run by plain least squares, where model error and not noise decides.
 
     The free run has more than one valley, so it is reached directly and by way of slower observers; the lower one
-    counts.
+    counts. All of it together may simulate as much as one search.
     """
     if not explained.is_model_error(found.misfit):
         return found
-    ends = []
+    ends: list[tuple[float, Model]] = []
+    begun = in_a_search(found.model, traces)
     for rates in ((0.0,), (1.0, 0.0), (2.0, 0.5, 0.0)):
-        model = found.model
+        model = begun
+        if ends and is_spent(model):
+            break
         for rate in rates:
             level = float(np.mean(Blocks.of(traces).misfit(residuals(model, traces, rate))))
             if np.isfinite(level):
@@ -172,4 +175,5 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
                 model = best.model
         ends.append((float(np.sum(residuals(model, traces, 0.0) ** 2)), model))
     ends = [e for e in ends if np.isfinite(e[0])]
-    return replace(found, model=min(ends, key=lambda e: e[0])[1]) if ends else found
+    lowest = min(ends, key=lambda e: e[0], default=None)
+    return replace(found, model=replace(lowest[1], effort=found.model.effort)) if lowest else found
