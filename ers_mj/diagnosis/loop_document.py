@@ -76,7 +76,7 @@ def told(case: LoopCase) -> Diagnosis:
 def _effect(case: LoopCase, name: str) -> dict:
     effect, entries = BY_NAME[name], _effect_parameters(case, name)
     values = {k: shown(e["value"], e["unit"]) for k, e in entries.items()}
-    if effect.in_loop:
+    if effect.in_loop and name not in case.model.names:
         sentence = effect.loop_sentence.format(value=next(iter(values.values())))
     else:
         sentence = effect.describe(values)
@@ -99,7 +99,7 @@ def _effect(case: LoopCase, name: str) -> dict:
 
 def _effect_parameters(case: LoopCase, name: str) -> dict[str, dict]:
     effect, y = BY_NAME[name], case.output_unit
-    if effect.in_loop:
+    if effect.in_loop and name not in case.model.names:
         letter = next(x for x in effect.in_loop if x in case.model.free)
         own = letter if letter in ("L", "R", "creep") else effect.parameters[0].name
         entry = _entry(case.intervals.told("", letter), case.model[letter], LETTERS[letter].unit.format(y=y))

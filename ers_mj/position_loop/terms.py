@@ -141,7 +141,7 @@ def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
     """
     found = [
         *_of_the_loop(model, runs),
-        Term(Presliding.name, tuple(model.fixed(heavy=y).having(creep=x) for x, y in SIZES.creeps)),
+        Term(Presliding.name, tuple(_giving(model))),
         Term(CONSTANT, (model.having(hold=0.0),)),
         Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
         *_transmissions(model, error),
@@ -167,6 +167,16 @@ def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
     if "L" in model.free:
         found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
     return found
+
+
+def _giving(model: LoopModel) -> Iterator[LoopModel]:
+    """Friction that creeps, as MuJoCo's does, and of one body one that a bristle carries."""
+    for creep, heavy in SIZES.creeps:
+        yield model.fixed(heavy=heavy).having(creep=creep)
+    if not any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+        for start in BY_NAME[Presliding.name].starts(model.scales):
+            if np.isfinite(start[0]) and not np.isfinite(start[2]):
+                yield model.with_effect(Presliding.name, start)
 
 
 def _asleep(model: LoopModel) -> Iterator[LoopModel]:
@@ -226,7 +236,7 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
     """A play or a shaft, with the loop's sensor and the log's on either side; of a loop on the motor's side friction is
     partly the load's.
     """
-    if any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+    if any(BY_NAME[name].subsystem == "transmission" or name == Presliding.name for name in model.names):
         return []
     contact = min(60.0, 0.35 / model.scales.sample_time)
     play = [np.array([x * error, rho, 0.8, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]
