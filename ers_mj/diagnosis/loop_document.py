@@ -190,7 +190,7 @@ def _views(case: LoopCase, samples: Samples) -> list[RecordView]:
     for base, model, fold in zip(
         case.confirmed.before_models, case.confirmed.models, case.confirmed.folds, strict=True
     ):
-        for run in fold.held:
+        for run in (one for one in fold.held if one.name not in seen):
             out.append(_view(case, run, base, model, True, ()))
             seen.add(run.name)
     for k, run in enumerate(case.runs):

@@ -6,6 +6,7 @@ A limit or an effect is begun from a start of its own; where one changes what th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -83,6 +84,8 @@ class Sizes:
     gaps: tuple[float, ...] = (0.4, 1.5)  # of the error that is left
     shares: tuple[float, ...] = (0.3,)  # of the inertia that the motor's side bears
     parted: float = 1.3  # noise levels of error from which a second body is tried
+    least: float = 0.02  # of a law's start, and
+    most: float = 3.0  # of it, to which a secant may scale it
     periods: tuple[int, ...] = (2, 4, 8, 16)  # of cogging within the travel
 
 
@@ -223,6 +226,20 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
         rest = starts[0][1:]  # the torque that the gear carries is the integrator's own
         return [model.with_effect(name, np.array([mu, *rest])) for mu in (0.05, 0.3)]
     return [model.with_effect(name, start) for start in starts]
+
+
+def form_of(model: LoopModel, name: str) -> tuple[bool, ...]:
+    """Which of an effect's numbers a model has."""
+    return tuple(bool(x) for x in np.isfinite(dict(model.effects)[name]))
+
+
+def sized(model: LoopModel, name: str, size: float) -> LoopModel:
+    """A model with an effect of a law so many times as large, where its law has a size and that sense is its own."""
+    effect, values = BY_NAME[name], dict(model.effects)[name].copy()
+    for k in range(effect.sized):
+        if size > 0.0 or not effect.parameters[k].positive:
+            values[k] *= math.copysign(min(max(abs(size), SIZES.least), SIZES.most), size)
+    return model.with_effect(name, values)
 
 
 def stops(model: LoopModel, low: float, high: float) -> list[LoopModel]:
