@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import gc
 import os
 import shlex
 import sys
@@ -20,6 +21,8 @@ from ers_mj.commands.output import quietly
 from ers_mj.errors import ErsError, InputError
 from ers_mj.processes import stopping
 
+# objects made before garbage is looked for: imports make a million that stay, and arrays go without
+SELDOM = (50_000, 20, 20)
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # of a place that takes no more
 LONGEST = 300  # of a sentence that refuses, in characters
 
@@ -88,6 +91,7 @@ def shortened(text: str) -> str:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 a check failed, 2 bad input, 130 interrupted."""
     _ready_streams()
+    gc.set_threshold(*SELDOM)
     try:
         given = list(sys.argv[1:] if argv is None else argv)
         arguments = parse(given)

@@ -39,7 +39,7 @@ def evidence(unit="rad") -> Evidence:
     rms = rng.uniform(size=(6, 4))
     rms[0] = np.nan
     rungs = (
-        Rung((), 0.0, 0.0, 0.05, False, "", 6),
+        Rung((), 0.0, 0.0, 0.05, False, "", 6, 0.0),
         Rung(("stribeck",), 30.0, 5.0, 0.01, True, NASTY, 3, 30.0),
         Rung(("backlash", "end_stop"), 2.0, 0.3, None, False, "did not converge", 6, 12.0),
     )

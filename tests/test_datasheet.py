@@ -71,6 +71,7 @@ MODELS = {
     "parameters": Datasheet({"J": 0.1 + 0.2, "theta_0": -1 / 3, "n": 22.26}),
     "lumped": Datasheet(lumped={"b": -math.pi, "a_1": 5e-324, "c_2": 1e308}, sample_rate_hz=1e3),
     "both": Datasheet(TABLE_1, {"a_1": 28.3}, 500.0, baseline={"k_s/J": 28.29, "b": -1e-17, 'Grün "x"\\': 2.0}),
+    "a screw's": Datasheet(lumped={"b": 2.0}, output_unit="m", input_unit="N m", baseline={"tau_e": 0.0}),
     "effects": Datasheet(
         {"J": 1.0},
         effects=(("stribeck", {"F_s": 0.1, "omega_s": 1e-3}), ("sensor_lag", {}), ("stribeck", {"F_s": 0.2})),
@@ -111,6 +112,7 @@ MALFORMED = {
     "unknown key": ("[parameters]\nKt = 1\n", "no key 'Kt'; did you mean K_t? known are J, B, K_t"),
     "parameter among the lumped": ("[lumped]\nJ = 1\n", "known are a_1, a_2, b, c_1, c_2, theta_0"),
     "unknown recording key": ("[parameters]\nJ = 1\n[recording]\nrate = 3\n", "known are sample_rate_hz"),
+    "unknown unit": ('[parameters]\nJ = 1\n[recording]\noutput_unit = "deg"\n', "one of rad, m, V was expected"),
     "text": ('[parameters]\nJ = "0.0031"\n', "[parameters] J is text, a number was expected"),
     "boolean": ("[parameters]\nJ = true\n", "J is true or false"),
     "list": ("[parameters]\nJ = [1.0]\n", "J is a list"),

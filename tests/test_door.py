@@ -19,6 +19,13 @@ T = np.arange(1500) / RATE
 DEAD = [("drive_dead_zone", {"d": 0.3})]
 
 
+SCREW = {
+    "lumped": {"a_2": 20.0, "b": 3.0},
+    "baseline": {"tau_e": 0.0},
+    "recording": {"output_unit": "m", "input_unit": "N m"},
+}
+
+
 def arrays(input: str = "multisine", seed: int = 0) -> dict:
     """What a user has after a run: arrays."""
     run = ers.simulate("table1", input, duration=3.0, rate_hz=RATE, effects=DEAD, noise=1.5e-4, seed=seed)
@@ -190,6 +197,9 @@ def test_arrays_that_are_no_recording_are_refused(given, words):
         (lambda: ers.load_model("table1", output_unit="deg"), "there is no output unit 'deg'; there are rad, m, V"),
         (lambda: ers.load_model(ers.Datasheet(parameters={"JJ": 1.0})), "there is no key 'JJ'"),
         (lambda: ers.load_model(ers.Datasheet(lumped={"a_2": -1.0, "b": 1.0})), "negative a_2"),
+        (lambda: ers.load_model(SCREW, output_unit="rad"), "its output unit is m, but rad was given"),
+        (lambda: ers.diagnose(ers.from_arrays(**arrays()), SCREW), "its output is in rad and that of datasheet in m"),
+        (lambda: ers.identify(ers.from_arrays(**arrays()), SCREW), "its output is in rad and that of datasheet in m"),
         (lambda: ers.load_model(3), "a path, a mapping, a datasheet or a model was expected"),
         (lambda: ers.simulate(input="stepz"), "no input of that name"),
         (lambda: ers.simulate(plant="real"), "there is no plant 'real'; there are reduced, mujoco"),
@@ -207,6 +217,14 @@ def test_what_cannot_be_is_one_sentence(call, words):
     with pytest.raises(ers.ErsError, match=words) as caught:
         call()
     assert isinstance(caught.value, ValueError) and "\n" not in str(caught.value)
+
+
+def test_a_models_file_tells_its_units(tmp_path):
+    model = ers.load_model(SCREW)
+    assert (model.output_unit, model.input_unit, model.signals) == ("m", "N m", ("tau_cmd_Nm", "x_m"))
+    assert ers.load_model(model.save(tmp_path)) == model
+    exported = model.export(tmp_path / "out")
+    assert "slide" in (tmp_path / "out" / "joint.xml").read_text() and exported.files
 
 
 # -- models -----------------------------------------------------------------------------------------------------------

@@ -28,7 +28,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 exported = pytest.importorskip("exported", reason="analysis/ is not beside the tests")
 MOST = 0.01  # of the response's RMS
 COMPILER = shutil.which("cc")
-RUN = ("stribeck", "limit and delay", "stops, dead zone", "loop, gravity")  # all of them: analysis/exported.py
+# all of them: analysis/exported.py
+RUN = (
+    "stribeck", "limit and delay", "stops, dead zone", "loop, gravity", "loop, late damping", "loop, stops",
+    "loop, slide",
+)  # fmt: skip
 
 
 def module(path):
@@ -105,12 +109,14 @@ def test_python_controls_system_is_the_module_alone(limited):
     np.testing.assert_allclose(np.sort(control.poles(made.linear())), np.sort(control.poles(model.to_control())))
 
 
-def test_a_loops_linear_system_follows_its_reference():
-    _, servo = exported.of(exported.MODELS["loop"])
+@pytest.mark.parametrize("name", ["loop", "loop, late damping"])
+def test_a_loops_linear_system_follows_its_reference(name):
+    _, servo = exported.of(exported.MODELS[name])
     namespace: dict = {}
     exec(TARGETS["control"].write(servo).content.decode(), namespace)
     linear = namespace["linear"]()
     assert linear.input_labels == ["theta_ref_rad"] and control.dcgain(linear) == pytest.approx(1.0)
+    assert np.all(control.poles(linear).real < 0.0)
 
 
 def test_the_fmu_is_source_that_compiles_without_a_word(limited, tmp_path):

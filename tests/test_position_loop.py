@@ -15,9 +15,10 @@ from ers_mj.errors import InputError
 from ers_mj.position_loop.identified import identify_loop
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, runs_of
-from ers_mj.position_loop.saved import model_of, simulate_loop
+from ers_mj.position_loop.saved import looped_plant, model_of, simulate_loop
 from ers_mj.position_loop.weak_form import rough_starts
 from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.servo.simulation import kernel_effects
 
 LIMITED = {"K": 900.0, "L": 150.0, "a_2": 20.0, "c_2": 8.0, "tau_s": 0.012}
 
@@ -51,6 +52,43 @@ def test_a_loop_without_friction_follows_its_transfer_function():
     fine = np.arange(0.0, 1.0, 1e-4)
     _, y, _ = lsim(([400.0], [1.0, 20.0, 400.0]), np.where(fine < 0.1 - 1e-9, 0.0, 0.5), fine, interp=False)
     assert np.max(np.abs(motion - np.interp(t, fine, y))) < 2e-4
+
+
+def test_a_late_damping_follows_its_transfer_function():
+    from scipy.signal import lsim
+
+    t, lag = np.arange(0.0, 1.0, 0.002), 0.006
+    values = {"K": 400.0, "D": 12.0, "lag_s": lag, "a_2": 8.0}
+    motion = LoopModel(values, ()).predicted(run_of(t, np.where(t < 0.1, 0.0, 0.5)))
+    fine = np.arange(0.0, 1.0, 1e-4)
+    system = [400.0 * lag, 400.0], [lag, 1.0 + 8.0 * lag, 20.0 + 400.0 * lag, 400.0]
+    _, y, _ = lsim(system, np.where(fine < 0.1 - 1e-9, 0.0, 0.5), fine, interp=False)
+    assert np.max(np.abs(motion - np.interp(t, fine, y))) < 3e-4
+    there = looped_plant(Datasheet(lumped={"a_2": 8.0}, loop={k: values[k] for k in ("K", "D", "lag_s")}))
+    twin = there.simulate(t, np.where(t < 0.1, 0.0, 0.5), (0.0, 0.0), 0.0)
+    assert np.max(np.abs(twin - np.interp(t, fine, y))) < 5e-3
+
+
+def test_a_filtered_derivative_does_not_bend_the_other_numbers():
+    true = {"K": 1400.0, "D": 30.0, "lag_s": 0.006, "L": 200.0, "a_2": 25.0, "c_2": 10.0, "tau_s": 0.012}
+    found = identify_loop(recorded(true, seeds=(1, 2, 3)))
+    assert found.intervals.model.kind == "PD"
+    for letter, near in (("K", 0.03), ("c_2", 0.04), ("L", 0.01), ("lag_s", 0.2)):
+        assert found.intervals.told("", letter).value == pytest.approx(true[letter], rel=near), letter
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_what_the_gain_register_multiplies_is_found(whole):
+    true, runs = {"K": 700.0, "D": 20.0, "L": 150.0, "a_2": 20.0, "c_2": 8.0, "tau_s": 0.012}, []
+    for seed, kp in ((1, 1.0), (2, 1.0), (3, 3.0), (4, 3.0)):
+        t, r = steps_of(seed)
+        model = LoopModel(true | {"K": true["K"] * kp, "D": true["D"] * (kp if whole else 1.0)}, ())
+        y = model.predicted(run_of(t, r)) + 3e-4 * np.random.default_rng(seed).standard_normal(t.size)
+        columns = {"t_s": t, "theta_ref_rad": r, "theta_rad": y, "kp": np.full(t.size, kp)}
+        runs.append(from_columns(columns, input_column="theta_ref_rad"))
+    found = identify_loop(runs).intervals
+    assert found.model.whole is whole
+    assert found.told("", "D").value == pytest.approx(20.0, rel=0.1)
 
 
 def test_friction_holds_within_its_width():
@@ -104,7 +142,8 @@ def test_a_bare_loop_is_identified():
 
 def test_a_limit_and_gravity_are_named_and_nothing_else():
     effects = ((GravityImbalance.name, np.array([12.0, 0.0])),)
-    document = diagnose(recorded(LIMITED, effects=effects), None, jobs=1).document
+    found = diagnose(recorded(LIMITED, effects=effects), None, jobs=1)
+    document, told = found.document, found.evidence.told[0]
     named = [m["effect"] for m in document["missing"]]
     assert set(named) == {VoltageSaturation.name, GravityImbalance.name, InputDelay.name}
     row = document["parameters"]["L"]
@@ -113,6 +152,8 @@ def test_a_limit_and_gravity_are_named_and_nothing_else():
     assert document["data"]["input_kind"] == "position"
     assert not document["remainder"]["significant"]
     assert document["fit"]["measure"] == "free_run"
+    assert list(told.without) == named
+    assert all(np.std(told.measured - alone) > np.std(told.measured - told.after) for alone in told.without.values())
 
 
 def test_a_recorded_duty_tells_the_input_gain_and_gains_differ_between_recordings():
@@ -163,6 +204,14 @@ def test_a_model_is_written_and_read_again(tmp_path):
     model = model_of(sheet)
     assert model["K"] == 900.0
     assert model.names == (GravityImbalance.name,)
+
+
+def test_a_light_motor_that_bears_all_friction_is_read_again():
+    play = {"gap": 0.01, "rho": 0.06, "phi": 1.0}
+    sheet = Datasheet(lumped={"a_2": 20.0}, effects=((Backlash.name, play),), loop={"K": 400.0}, loop_sensor="link")
+    assert model_of(sheet).effects[0][1][1:3] == pytest.approx([0.06, 1.0])
+    with pytest.raises(InputError, match=r"phi = 1 lies outside 0 \.\. 0\.9"):
+        kernel_effects([(Backlash.name, {"gap": 0.01, "phi": 1.0})])
 
 
 @pytest.mark.parametrize(

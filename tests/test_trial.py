@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from ers_mj.control.metrics import energy, measured, overshoot, settling_time
 from ers_mj.control.paper_claims import claims, headline
 from ers_mj.control.references import CASES, Reference, named, read_reference
 from ers_mj.control.trial import Conditions, needed, try_out
+from ers_mj.data.recording import read_recording
 from ers_mj.effects import BY_NAME
 from ers_mj.servo.datasheet import read_datasheet, write_model
 from ers_mj.servo.simulation import kernel_effects
@@ -264,13 +266,62 @@ def test_a_table_and_a_page_are_written(tmp_path, capsys):
     page = read((tmp_path / "out" / "report.html").read_text())
     words = " ".join(page.words)
     assert (
-        "The paper's claims" in words
+        "The paper's claims are for its own servo" in words
+        and "P 5, I 1.2, D 0.1" in words
         and "Square (Case 1), reduced plant" in words
         and len(page.ids) == len(set(page.ids))
     )
     assert not [x for x in page.references if not x.startswith("#")]
     assert json.loads((tmp_path / "out" / "trials.json").read_text())["notes"]
     assert cli.main(arguments) == 2 and "--force" in capsys.readouterr().err
+
+
+def test_the_papers_claims_stand_beside_its_own_settings(tmp_path, capsys):
+    arguments = ["trial", "--controller", "ftrc,pid", "--out", str(tmp_path / "out"), "--quiet"]
+    assert cli.main(arguments) == 0
+    words = " ".join(read((tmp_path / "out" / "report.html").read_text()).words)
+    assert "Claims for FTRC" in words and "settles within 100 ms" in words
+
+
+OWN = """from ers_mj.control.controllers import Controller
+
+class Proportional(Controller):
+    sentence = "as much as it is off"
+
+    def law(self, s):
+        return 40.0 * s.x2 + self.servo.spring(s.theta) / self.servo.b
+"""
+
+
+def test_a_law_of_ones_own_runs_beside_ours_and_traces_are_recordings(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(OWN)
+    arguments = ["trial", "--controller", "mine.py,pid", "--rate-hz", "1000", "--save-traces", "--plants", "2"]
+    assert cli.main([*arguments, "--json", "--out", "out"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [t["controller"] for t in told["trials"]] == ["mine.py", "pid"] and told["trials"][0]["stable"]
+    assert told["controllers"]["mine.py"] == "as much as it is off" and len(told["robustness"]) == 2
+    trace = read_recording(Path("out") / "trace-step-reduced-mine.py.csv")
+    assert trace.input_unit == "V" and np.std(trace.y) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (None, "mine.py: there is no such file"),
+        ("x = 1 /", "mine.py: cannot be run (SyntaxError"),
+        ("import nothing_of_that_name", "cannot be run (ModuleNotFoundError"),
+        ("x = 1", "was expected, not none"),
+        (OWN + OWN.replace("Proportional", "Other"), "was expected, not Proportional, Other"),
+    ],
+)
+def test_a_file_that_is_no_law_is_one_sentence(text, says, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    if text is not None:
+        Path("mine.py").write_text(text)
+    assert cli.main(["trial", "--controller", "mine.py"]) == 2
+    error = capsys.readouterr().err
+    assert says in error and error.count("\n") == 1
 
 
 def test_a_model_with_its_effects_is_a_plant_and_a_design(tmp_path, capsys):

@@ -42,8 +42,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="NAME,...",
         help=f"{', '.join(TARGETS)} (default all)",
     )
-    parser.add_argument("--output-unit", choices=OUTPUT_UNITS, default="rad", help="of the model (default rad)")
-    parser.add_argument("--input-unit", choices=INPUT_UNITS, default="V", help="of the model (default V)")
+    parser.add_argument("--output-unit", choices=OUTPUT_UNITS, help="of the model (default: as its file tells, or rad)")
+    parser.add_argument("--input-unit", choices=INPUT_UNITS, help="of the model (default: as its file tells, or V)")
     add_out(parser)
     parser.add_argument("--json", action="store_true", help="print files and losses as one JSON object")
     parser.set_defaults(run=run)

@@ -123,8 +123,8 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, write, tell; 0."""
     place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
-    from ers_mj.control.controllers import CONTROLLERS
     from ers_mj.control.frequency.study import study
+    from ers_mj.control.own_law import law_of
 
     controllers = chosen_controllers(arguments)
     datasheet, design = plant_and_design(arguments.datasheet, arguments.design)
@@ -136,7 +136,7 @@ def run(arguments: argparse.Namespace) -> int:
         document = plain(
             _document(found, conditions)
             | {
-                "controllers": {name: CONTROLLERS[name].sentence for name in controllers},
+                "controllers": {name: law_of(name).sentence for name in controllers},
                 "datasheet": datasheet.name or arguments.datasheet,
                 "design": design.name or arguments.design,
                 "problems": {r.name: list(r.problems) for r in recordings},

@@ -53,12 +53,15 @@ def chosen_controllers(arguments: argparse.Namespace) -> list[str]:
     """The names of --controller, all where none is given.
 
     Raises:
-        InputError: there is no controller of that name.
+        InputError: there is no controller of that name, or a Python file that is none.
     """
     from ers_mj.control.controllers import CONTROLLERS
+    from ers_mj.control.own_law import is_own, law_of
 
     chosen = arguments.controller or list(CONTROLLERS)
-    refuse_unknown("--controller", chosen, CONTROLLERS)
+    refuse_unknown("--controller", [name for name in chosen if not is_own(name)], CONTROLLERS)
+    for name in chosen:
+        law_of(name)
     return chosen
 
 

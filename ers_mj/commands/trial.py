@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,6 +80,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add_laws(parser)
     _add_scatter(parser)
     add_cluster(parser)
+    parser.add_argument(
+        "--save-traces", action="store_true", help="write every trial as a CSV too, in a recording's columns"
+    )
     add_out(parser)
     add_common(parser)
     parser.set_defaults(run=run)
@@ -92,8 +97,11 @@ def _add_what(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--controller",
         type=several(str, "controller"),
-        metavar="NAME,...",
-        help="ftrc, ftrc-literal, pid, pid-ff, hinf, time-optimal (default all)",
+        metavar="NAME|FILE.py,...",
+        help=(
+            "ftrc, ftrc-literal, pid, pid-ff, hinf, time-optimal, or a Python file with a class derived from"
+            " ers_mj.control.controllers.Controller (default all of ours)"
+        ),
     )
     parser.add_argument(
         "--plant", type=several(str, "plant"), default=["reduced"], metavar="reduced,mujoco", help="default reduced"
@@ -204,9 +212,10 @@ def _carried_on(arguments: argparse.Namespace, place: Place | None) -> Iterator[
 
 
 def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished | None) -> int:
-    from ers_mj.control.controllers import CONTROLLERS
-    from ers_mj.control.paper_claims import headline
-    from ers_mj.control.trial import try_out
+    from ers_mj.control.controllers import Servo
+    from ers_mj.control.own_law import law_of
+    from ers_mj.control.paper_claims import headline, is_papers
+    from ers_mj.control.trial import gains_of, try_out
 
     controllers = chosen_controllers(arguments)
     _refuse_cases(arguments)
@@ -225,13 +234,16 @@ def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished 
                 "robustness": [x.as_document() for x in spreads],
                 "scatter": arguments.scatter,
                 "conditions": conditions.as_document(),
-                "controllers": {name: CONTROLLERS[name].sentence for name in controllers},
+                "controllers": {name: law_of(name).sentence for name in controllers},
+                "gains": {name: gains_of(name, Servo.of(design), conditions) for name in controllers},
+                "papers_settings": is_papers(datasheet, design, conditions),
                 "datasheet": datasheet.name or arguments.model,
                 "design": design.name or arguments.design,
                 "versions": versions(),
             }
         )
-        kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress))
+        traces = trials if arguments.save_traces else []
+        kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress, traces))
     if finished is not None and not kept.code:
         remove(finished.folder)
     print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
@@ -244,8 +256,13 @@ def _crew(arguments: argparse.Namespace) -> Crew:
     Raises:
         InputError: a cluster is asked for and there is nothing to share out, or it cannot be used.
     """
+    from ers_mj.control.own_law import is_own
+
     if arguments.cluster is not None and not arguments.plants:
         raise InputError("--cluster shares out the servos of --plants, none are asked for; give --plants N with it")
+    own = next((name for name in arguments.controller or () if is_own(name)), None)
+    if arguments.cluster is not None and own is not None:
+        raise InputError(f"--cluster: workers have no {own}, a law of one's own runs on this machine alone")
     return crew_of(arguments)
 
 
@@ -316,12 +333,30 @@ def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> li
     return notes
 
 
-def _write(folder: Path, document: dict, trials: list[Trial], spreads: list[Spread], progress: Progress) -> list[Path]:
+def _write(
+    folder: Path, document: dict, trials: list[Trial], spreads: list[Spread], progress: Progress, traces: list[Trial]
+) -> list[Path]:
     from ers_mj.report.trial_report import trial_page
 
     progress("drawing the report", 1.0)
     page = trial_page(document, trials, spreads)
-    return write_results(folder, report_writers("trials.json", document, page))
+    beside = {_trace_name(t): partial(_write_trace, t) for t in traces}
+    return write_results(folder, report_writers("trials.json", document, page) | beside)
+
+
+def _trace_name(trial: Trial) -> str:
+    return re.sub(r"[^\w.-]+", "-", f"trace-{trial.case}-{trial.plant}-{trial.controller}") + ".csv"
+
+
+def _write_trace(trial: Trial, file: Path) -> None:
+    """What a recording of this trial would be, up to where it was given up."""
+    import numpy as np
+
+    from ers_mj.data.recording import write_recording
+
+    run, ran = trial.run, np.isfinite(trial.run.u)
+    columns = {"t_s": run.reference.t, "theta_ref_rad": run.reference.theta, "u_V": run.u, "theta_rad": run.measured}
+    write_recording(file, {name: x[ran] for name, x in columns.items()})
 
 
 # -- the trials in lines --------------------------------------------------------------------------------------------

@@ -46,7 +46,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="show the plant in three dimensions",
         description=(
             "The plant in MuJoCo's viewer, or in a picture. A recording is replayed: what was measured is the"
-            " translucent rudder."
+            " translucent ghost. A model is drawn as what it is: the rudder, an arm under gravity, a carriage, a blade."
         ),
         epilog=(
             "examples:\n  ers view --linkage rod\n  ers view model.toml --replay run1.csv --render replay.gif\n"
@@ -169,6 +169,7 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
 
     from ers_mj.plants.inputs import INPUTS, RATE_HZ
     from ers_mj.servo.datasheet import read_plant
+    from ers_mj.servo.units import output_unit_of
     from ers_mj.view import model_file, replay
 
     t = np.arange(1 if name is None else max(2, round(arguments.duration * RATE_HZ) + 1)) / RATE_HZ
@@ -176,8 +177,9 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
     moments = replay.moments_of(t, FILM.fps, arguments.duration)
     if _is_mjcf(arguments.model):
         return model_file.simulated_file(model_file.read_plant(Path(arguments.model)), t, u, moments)
+    sheet = read_plant(arguments.model)
     plant = replay.plant_of(
-        read_plant(arguments.model), arguments.linkage or "constant", math.radians(arguments.gap or 0.0)
+        sheet, arguments.linkage or "constant", math.radians(arguments.gap or 0.0), output_unit_of(sheet.output_unit)
     )
     return replay.simulated(plant, t, u, moments)
 

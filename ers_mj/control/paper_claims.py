@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ers_mj.control.metrics import Measures
-from ers_mj.control.trial import Trial
+from ers_mj.control.trial import Conditions, Trial
+from ers_mj.servo.datasheet import TABLE_1, Datasheet
 
 LAW, FAIR, RIVALS = "ftrc", "pid-ff", ("pid", "hinf")
 
@@ -38,6 +39,15 @@ class Claim:
     case: str
     measured: str
     holds: bool | None
+
+
+def is_papers(datasheet: Datasheet, design: Datasheet, conditions: Conditions) -> bool:
+    """Whether these are the paper's settings, which its claims are for: Table 1's servo, known as it is, and the gains,
+    references, rate and voltage of its trials; a play, a linkage and an inductance are among its plants.
+    """
+    as_built = replace(conditions, gap=0.0, linkage="constant", inductance=False)
+    known = dict(datasheet.parameters) == dict(design.parameters) == TABLE_1
+    return known and not datasheet.effects and as_built == Conditions()
 
 
 def headline(trials: Sequence[Trial]) -> str:

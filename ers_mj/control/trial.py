@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from ers_mj.control.closed_loop import Run, Sampled, Sensor, close
-from ers_mj.control.controllers import CONTROLLERS, Controller, Gains, PidGains, Servo
+from ers_mj.control.controllers import Controller, Gains, PidGains, Servo
 from ers_mj.control.controllers.base import FILTER_S
 from ers_mj.control.metrics import Measures, measured
+from ers_mj.control.own_law import law_of
 from ers_mj.control.references import CASES, Reference, named, read_reference
 from ers_mj.effects import BY_NAME
 from ers_mj.errors import InputError
@@ -159,7 +160,7 @@ def try_out(
 
     Args:
         datasheet: the plant.
-        controllers, plants, cases: names; a case may be a file, or a reference.
+        controllers, plants, cases: names; a controller may be a Python file, a case a file or a reference.
         conditions: of all trials.
         design: what the controllers know of the plant; the datasheet itself where None.
         progress: told (text, fraction).
@@ -186,9 +187,18 @@ def try_out(
 
 def make_controller(name: str, known: Servo, rate_hz: float, conditions: Conditions) -> Controller:
     """A controller, new, of the conditions' limit, filter and gains."""
-    law = CONTROLLERS[name]
+    law = law_of(name)
     options = {law.takes: getattr(conditions, law.takes)} if law.takes else {}
     return law(known, rate_hz, conditions.u_max, filter_s=conditions.filter_s, **options)
+
+
+def gains_of(name: str, known: Servo, conditions: Conditions) -> str:
+    """The gains with which a law of this name runs, in words; empty where it has none."""
+    law = law_of(name)
+    if not law.takes:
+        return ", ".join(f"{key} {x:.4g}" for key, x in law.told_gains(known).items())
+    told = getattr(conditions, law.takes).as_document()
+    return ", ".join(f"{key} {x if isinstance(x, str) else format(x, '.4g')}" for key, x in told.items())
 
 
 def run_once(plant: Plant, controller: str, known: Servo, aim: Reference, conditions: Conditions) -> Run:

@@ -141,7 +141,7 @@ class Case:
         """The held-out scores before and after, recalibrated."""
         c = self.confirmed
         before, after = (
-            pooled([recalibrated(m, fold.held_out, c.measure)[0] for m, fold in zip(models, c.parts)])
+            pooled([recalibrated(m, fold.held_out, c.measure).score for m, fold in zip(models, c.parts)])
             for models in (c.base_models, c.models)
         )
         return before, after

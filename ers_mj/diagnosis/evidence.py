@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -38,8 +39,8 @@ class RecordView:
 
 @dataclass(frozen=True)
 class Rung:
-    """One candidate: what it gains in block cost over what its round began with, how surely, what it scores on held-out
-    data, and ``total``, what it takes off the baseline's block cost.
+    """One candidate: what it gains in block cost over what its round began with, how surely (``z``), what it scores on
+    held-out data, and ``total``, what it takes off the baseline's block cost; NaN where that is not told.
     """
 
     effects: tuple[str, ...]
@@ -49,7 +50,7 @@ class Rung:
     chosen: bool
     note: str
     parameters: int
-    total: float = 0.0
+    total: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)

@@ -191,26 +191,29 @@ def _views(case: LoopCase, samples: Samples) -> list[RecordView]:
         case.confirmed.before_models, case.confirmed.models, case.confirmed.folds, strict=True
     ):
         for run in fold.held:
-            out.append(_view(run, base, model, True, ()))
+            out.append(_view(case, run, base, model, True, ()))
             seen.add(run.name)
     for k, run in enumerate(case.runs):
         if run.name not in seen:
-            out.append(_view(run, case.base, case.model, False, shaded(run, k, samples)))
+            out.append(_view(case, run, case.base, case.model, False, shaded(run, k, samples)))
     return out
 
 
-def _view(run: Run, base: LoopModel, model: LoopModel, is_held: bool, spans: tuple) -> RecordView:
-    return RecordView(run.name, is_held, run.t, run.r, run.y, base.predicted(run), model.predicted(run), spans)
+def _view(case: LoopCase, run: Run, base: LoopModel, model: LoopModel, is_held: bool, spans: tuple) -> RecordView:
+    """One recording beside the runs of both models, and of the second without each of the effects that are named."""
+    less = {name: without(model, name).predicted(run) for name in case.told_effects}
+    runs = base.predicted(run), model.predicted(run)
+    return RecordView(run.name, is_held, run.t, run.r, run.y, *runs, spans, less)
 
 
 def _ladder(case: LoopCase) -> Iterator[Rung]:
     chosen = case.selection.chosen
-    yield Rung((), 0.0, 0.0, case.confirmed.before.rmse, not case.names, "bare loop", case.confirmed.base.size)
+    yield Rung((), 0.0, math.nan, case.confirmed.before.rmse, not case.names, "bare loop", case.confirmed.base.size)
     for left in case.selection.named:
-        yield Rung((left.name,), left.gain, 0.0, None, False, "over the best refit without it", chosen.size)
+        yield Rung((left.name,), left.gain, math.nan, None, False, "over the best refit without it", chosen.size)
     if case.names:
         gain = sum(x.gain for x in case.selection.named)
-        yield Rung(case.names, gain, 0.0, case.confirmed.after.rmse, True, "the answer", chosen.size)
+        yield Rung(case.names, gain, math.nan, case.confirmed.after.rmse, True, "the answer", chosen.size)
     for ranked in case.selection.rounds:
         for c in ranked[:6]:
-            yield Rung((c.name,), c.gain, 0.0, None, False, "compared", c.fit.size)
+            yield Rung((c.name,), c.gain, math.nan, None, False, "compared", c.fit.size)

@@ -19,7 +19,7 @@ from ers_mj.servo.model import Model
 
 HELD_SECONDS, LEFT_OUT_SECONDS = (
     10.0,
-    2.5,
+    1.5,
 )  # [s] of held-out recordings, and of those left out in turn, that are run in MuJoCo, which takes a thousand times as
 # long as the reduced model
 

@@ -16,7 +16,7 @@ Ends = tuple[float | None, float | None]  # of a 95 % interval
 
 def record_state(case: Case, held: Sequence[Trace]) -> list[dict]:
     """What differs between recordings beyond chance: training ones as fitted, held-out ones as recalibrated."""
-    later = [recalibrated(model, h)[1] for model, h in zip(case.confirmed.models, held)]
+    later = [recalibrated(model, h).states for model, h in zip(case.confirmed.models, held)]
     errors = case.state_errors()
     found = ((name, *_values(case, name, errors, later)) for name in STATES)
     return [_told(case, name, values, ci95) for name, values, ci95 in found if _differs(case, name, values, ci95)]

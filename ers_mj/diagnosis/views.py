@@ -42,7 +42,8 @@ def _view(case: Case, base: Model, model: Model, trace: Trace, record: int, is_h
 def ladder(case: Case) -> Iterator[Rung]:
     """The baseline, and what each round compared."""
     c = case.confirmed
-    yield Rung((), 0.0, 0.0, pooled(c.before).rmse, not case.model.names, "refitted baseline", case.start.fit.size)
+    bare, alone = case.start.fit.size, not case.model.names
+    yield Rung((), 0.0, 0.0, pooled(c.before).rmse, alone, "refitted baseline", bare, 0.0)
     for ranked in case.selection.rounds:
         for candidate in ranked:
             names = candidate.fit.model.names

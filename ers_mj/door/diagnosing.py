@@ -14,7 +14,7 @@ from ers_mj.door.model import Model
 from ers_mj.door.reading import Given, recordings_of
 from ers_mj.door.results import Progress, Result, Writers, parameter_rows, silent
 from ers_mj.door.saving import report_writers, today, write_text
-from ers_mj.door.together import refuse_mixed_inputs, refuse_twice
+from ers_mj.door.together import refuse_mixed_inputs, refuse_other_units, refuse_twice
 from ers_mj.errors import InputError
 from ers_mj.selection.budget import QUICK, SEARCH
 from ers_mj.servo.datasheet import write_model
@@ -144,6 +144,7 @@ def diagnose(
     refuse_twice(trained, held)
     refuse_mixed_inputs([*trained, *held])
     sheet, search = known(datasheet), QUICK if quick else SEARCH
+    refuse_other_units(sheet, trained)
     with threadpool_limits(1):  # ours are for recordings and effects; small matrices are slower on many, and differ
         found = pipeline.diagnose(trained, sheet, held, seed=seed, jobs=jobs, progress=progress, search=search)
     return Diagnosis(found)

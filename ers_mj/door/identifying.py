@@ -16,7 +16,7 @@ from ers_mj.door.model import Model
 from ers_mj.door.reading import Given, recordings_of
 from ers_mj.door.results import Progress, Result, Writers, parameter_rows, silent
 from ers_mj.door.saving import report_writers, versions
-from ers_mj.door.together import refuse_mixed_inputs, refuse_twice
+from ers_mj.door.together import refuse_mixed_inputs, refuse_other_units, refuse_twice
 from ers_mj.errors import InputError, refuse_other
 from ers_mj.identification import estimate
 from ers_mj.identification.answer import Identified
@@ -82,7 +82,7 @@ class Identification(Result):
 
     def _writers(self) -> Writers:
         return report_writers("identify.json", self._document, self._page()) | {
-            "model.toml": lambda path: write_model(path, self._found.model)
+            "model.toml": lambda path: write_model(path, self.model.datasheet)
         }
 
 
@@ -106,7 +106,7 @@ class LoopIdentification(Identification):
 
     def _writers(self) -> Writers:
         return report_writers("identify.json", self._document, self._page()) | {
-            "model.toml": lambda path: write_model(path, self._model)
+            "model.toml": lambda path: write_model(path, self.model.datasheet)
         }
 
 
@@ -164,8 +164,10 @@ def identify(
         refuse_beside_a_loop(settings, datasheet is not None)
         with threadpool_limits(1):
             return LoopIdentification(identify_loop(given, settings.jobs, progress), given, settings.seed)
+    sheet = known_plant(datasheet)
+    refuse_other_units(sheet, given)
     with threadpool_limits(1):
-        found = estimate.identify(given, known_plant(datasheet), settings, progress)
+        found = estimate.identify(given, sheet, settings, progress)
     return Identification(found, given)
 
 

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ers_mj.data.columns import COLUMNS, INPUTS, input_name
+from ers_mj.data.columns import input_name
 from ers_mj.data.recording import Recording
 from ers_mj.door.known import Known, known
 from ers_mj.door.results import frame, framed
 from ers_mj.door.saving import make_room, plain
 from ers_mj.door.simulating import Simulation, Voltage, simulate
-from ers_mj.errors import InputError, refuse_other
+from ers_mj.errors import InputError
 from ers_mj.position_loop.saved import looped_plant
 from ers_mj.servo.datasheet import Datasheet, write_model
 from ers_mj.servo.simulation import build_plant, inertia_of
+from ers_mj.servo.units import Unit, input_unit_of, output_unit_of
 
 if TYPE_CHECKING:
     import control
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
     from ers_mj.plants.mechanical import MechanicalPlant
     from ers_mj.plants.reduced import ReducedModel
 
-INPUT_UNITS = ("%", *dict.fromkeys(COLUMNS[name].unit for name in INPUTS))
 OUTPUT_NAMES = {"rad": "theta_rad", "m": "x_m", "V": "y_sensor_V"}
 
 
@@ -41,13 +42,13 @@ class Model:
 
     Args:
         datasheet: a path (a datasheet or model.toml), "table1", a mapping laid out as the TOML, a datasheet, a model.
-        output_unit: rad, m or V, which Eq. (6)'s letters are in.
-        input_unit: V, % of duty, N m or A.
+        output_unit: rad, m or V, which Eq. (6)'s letters are in. None: as the file tells, rad where it does not.
+        input_unit: V, % of duty, N m or A. None: as the file tells, V where it does not.
         inductance: whether the winding's time constant acts; by default where a diagnosis has found one, and not that
             of a bare datasheet.
 
     Raises:
-        InputError: the datasheet cannot be meant, or there is no such unit.
+        InputError: the datasheet cannot be meant, there is no such unit, or the file tells another one.
 
     Examples:
         >>> import ers_mj as ers
@@ -59,16 +60,14 @@ class Model:
     """
 
     def __init__(
-        self, datasheet: Known, *, output_unit: str = "rad", input_unit: str = "V", inductance: bool | None = None
+        self, datasheet: Known, *, output_unit: Unit = None, input_unit: Unit = None, inductance: bool | None = None
     ):
         sheet = known(datasheet)
         if sheet is None:
             raise InputError("no datasheet was given, a path, a mapping, a datasheet or a model was expected")
-        refuse_other("output unit", output_unit, OUTPUT_NAMES)
-        refuse_other("input unit", input_unit, INPUT_UNITS)
-        self._datasheet = sheet
-        self.output_unit: Final = output_unit
-        self.input_unit: Final = input_unit
+        self.output_unit: Final = output_unit_of(sheet.output_unit, output_unit, sheet.name)
+        self.input_unit: Final = input_unit_of(sheet.input_unit, input_unit, sheet.name)
+        self._datasheet = replace(sheet, output_unit=self.output_unit, input_unit=self.input_unit)
         self.inductance: Final = sheet.baseline.get("tau_e", 0.0) > 0 if inductance is None else inductance
         self._loop: Stepper | None = None
 
@@ -349,8 +348,7 @@ class Model:
                 yield effect, name, x
 
     def save(self, path: str | os.PathLike[str], force: bool = False) -> Path:
-        """Write the model as TOML, which `load_model` reads back exactly; in a folder that exists it is called
-        model.toml.
+        """Write the model as TOML, which `load_model` reads back exactly; called model.toml in a folder that exists.
 
         Raises:
             InputError: the file exists already and no `force` is given, or it cannot be written.
@@ -383,13 +381,12 @@ class Model:
         return framed(model_page(repr(self)[1:-1], self._numbers()), 420)
 
 
-def load_model(path: Known, output_unit: str = "rad", input_unit: str = "V") -> Model:
+def load_model(path: Known, output_unit: Unit = None, input_unit: Unit = None) -> Model:
     """A model from a file: a datasheet, or the model.toml that a diagnosis writes.
 
     Args:
         path: the file; "table1" is the paper's servo.
-        output_unit: of the servo, which the file does not tell: rad, m or V.
-        input_unit: as well: V or %.
+        output_unit, input_unit: as `Model` takes them.
 
     Raises:
         InputError: the file cannot be meant, in one sentence.

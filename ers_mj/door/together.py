@@ -9,6 +9,7 @@ from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
     from ers_mj.data.recording import Recording
+    from ers_mj.servo.datasheet import Datasheet
 
 
 def refuse_twice(recordings: list[Recording], holdout: list[Recording]) -> None:
@@ -53,3 +54,21 @@ def refuse_mixed_inputs(recordings: list[Recording]) -> None:
                 f"{odd.name}: its {noun} is in {getattr(odd, attribute)} and that of {other.name} in {common}, "
                 "recordings of one unit were expected"
             )
+
+
+def refuse_other_units(sheet: Datasheet | None, recordings: list[Recording]) -> None:
+    """Raise InputError where a datasheet tells its units, and recordings are in others."""
+    if sheet is None:
+        return
+    first = recordings[0]
+    told = (sheet.output_unit, first.output_unit, "output"), (sheet.input_unit, first.input_unit, "input")
+    for known, recorded, noun in told:
+        if known and _percent(known) != _percent(recorded):
+            raise InputError(
+                f"{first.name}: its {noun} is in {_percent(recorded)} and that of {sheet.name or 'the datasheet'} in"
+                f" {_percent(known)}, one unit was expected"
+            )
+
+
+def _percent(unit: str) -> str:
+    return "%" if unit == "pct" else unit

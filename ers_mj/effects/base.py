@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.linalg.blas import dtbsv
 
 from ers_mj.decisions.thresholds import Policy
 from ers_mj.effects.quantities import Coefficients, Parameter, Scales, Symptoms, Twin
 
+FORGOTTEN = 1e-20  # share of what was before that counts as nothing
 LEAST_IRON = 0.25  # share of an inductance that no current saturates
 RETURNS = (
     2.0  # periods of a torque that returns with the angle which the travel must hold: less is a spring or a weight
@@ -267,9 +267,16 @@ class Sensor(Effect):
 
 
 def recursive(decay: np.ndarray, driven: np.ndarray) -> np.ndarray:
-    """z (N,) of z[k] = decay[k] z[k - 1] + driven[k], from z[0] = driven[0]: a triangular system of two diagonals."""
-    band = np.vstack([np.ones(driven.size), np.append(-decay[1:], 0.0)])
-    return dtbsv(1, band, driven, lower=1)
+    """z (N,) of z[k] = decay[k] z[k - 1] + driven[k], from z[0] = driven[0], by doubling: of what lies 1, 2, 4 ...
+    samples back, until nothing of it is left.
+    """
+    z, kept, back = driven.copy(), np.append(0.0, decay[1:]), 1
+    while back < z.size and kept.any():
+        z[back:] += kept[back:] * z[:-back]
+        kept[back:] *= kept[:-back]
+        kept[np.abs(kept) < FORGOTTEN] = 0.0
+        back *= 2
+    return z
 
 
 def law(function: Callable) -> staticmethod:

@@ -76,6 +76,7 @@ def source_of(servo: Servo) -> str:
         "version": __version__,
         "step": repr(p.step),
         "rest": repr(servo.rest),
+        "held": repr(servo.held),
         "servo_fields": _fields(scalars, {name: x.size for name, x in arrays.items()}),
         "state_fields": _fields((*STATE, *WITHIN), {**kept, **{name: x.size for name, x in fixed.items()}}),
         "servo_values": _values(scalars, arrays),
@@ -111,7 +112,7 @@ def _description(servo: Servo, guid: str) -> str:
     (into, out), y = servo.signals, servo.output_unit
     numbers = servo.portable.numbers
     variables = [
-        _variable(into, 0, "input", "discrete", 'start="0.0"', servo.input_unit, "held within a step"),
+        _variable(into, 0, "input", "discrete", f'start="{servo.held!r}"', servo.input_unit, "held within a step"),
         _variable(out, 1, "output", "continuous", "", y, "what the sensor shows"),
         _variable("speed", 2, "local", "continuous", "", f"{y}/s", "of the output"),
         _variable("start", 3, "parameter", "fixed", f'start="{servo.rest!r}"', y, "where it rests at the beginning"),

@@ -26,6 +26,10 @@ INVERSE = (
     "stops, and friction below breakaway, are as stiff as written against J alone: in a robot they scale with its"
     " inertia at the joint (dof_invweight0)"
 )
+PLAIN = (
+    "a slide along an axis of a body whose centre of mass is its origin: MuJoCo then takes dof_invweight0 from the mass"
+    " without the armature, and friction and stops give way; the file moves the centre by a millimetre"
+)
 WEIGHTS = "the bodies of your robot bring their own weight: give them the masses and centres that they have"
 LATE = "the delay is written half a timestep less than a whole number of steps: MuJoCo's clock would add one at times"
 RESET = "a controller that resets by writing qpos and qvel leaves old commands in the delay: use mj_resetData"
@@ -98,7 +102,8 @@ class OwnJoint:
             "c_1": 0.0, "fall": 0.0, "k_bristle": 0.0, "parted": 0.0, "rho": 0.0, "beta": 0.0, "phi": 0.0, "gap": 0.0,
             "c_2_plus": level, "c_2_minus": level, "a_mech_plus": damping, "a_mech_minus": damping,
             "bias": pushed(c) if c.a_1 > 0 else 0.0, "tau_e": c.tau_e if self.lines.kind == "dcmotor" else 0.0,
-            "I": 0.0, "R": math.inf, "band": 0.0, "lost": 0.0, "least": 0.0, "most": math.inf, "dead_time": 0.0,
+            "I": 0.0, "lag": 0.0, "R": math.inf, "band": 0.0, "lost": 0.0, "least": 0.0, "most": math.inf,
+            "dead_time": 0.0,
             "at_motor": 0.0, "log_at_motor": 0.0, "buried": 1.0,
         }  # fmt: skip
         return bare(self.servo.portable, off, None if clip is None else clipping(clip))
@@ -109,6 +114,7 @@ class OwnJoint:
         lines, hinge = self.lines.xml, ' axis="0 1 0"'
         joint = next(line for line in lines.splitlines() if line.startswith("<joint")).replace("/>", f"{hinge}/>")
         actuator = next(line for line in lines.splitlines() if line.startswith("<actuator"))
+        centre = "0 0 0" if self.servo.is_angle else "0.001 0 0"  # see PLAIN
         size, name = repr(NEGLIGIBLE * self.inertia), self.servo.name.replace("--", "- -")
         told = [sentence.replace("--", "- -") for sentence in self.lines.left_out] or ["nothing"]
         lost = "\n".join(f"     {sentence}" for sentence in told)
@@ -120,7 +126,7 @@ class OwnJoint:
   <option timestep="{self.timestep!r}" integrator="implicitfast" gravity="0 0 0"/>
   <worldbody>
     <body name="output">
-      <inertial pos="0 0 0" mass="{size}" diaginertia="{size} {size} {size}"/>
+      <inertial pos="{centre}" mass="{size}" diaginertia="{size} {size} {size}"/>
       <!-- the joint -->
       {joint}
     </body>
@@ -150,6 +156,7 @@ class OwnJoint:
         unit = "kg m^2" if self.servo.is_angle else "kg"
         found = {
             PER_INERTIA.format(unit=unit): self.servo.inertia is None,
+            PLAIN: not self.servo.is_angle,
             WEIGHTS: math.hypot(c.g_s, c.g_c) > 0,
             LATE: "delay" in lines.actuator,
             RESET: "delay" in lines.actuator,

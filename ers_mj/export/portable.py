@@ -25,7 +25,9 @@ from ers_mj.plants.reduced import lowered
 
 LONGEST = 2e-4  # [s] of a step
 SPRING_STEP = 0.35  # frequency [rad/s] of the stiffest spring times the step
-STATE = ("t", "theta", "w", "j", "theta_m", "w_m", "z", "xi", "r", "drive", "carried", "sensed", "before", "count")
+STATE = (
+    "t", "theta", "w", "j", "theta_m", "w_m", "z", "xi", "slow", "r", "drive", "carried", "sensed", "before", "count",
+)  # fmt: skip
 WITHIN = (  # a step, not from one to the next
     "asked", "e", "ahead", "fresh", "late", "force", "brake", "push", "damp", "wall", "d_wall", "touch", "d_touch",
 )  # fmt: skip

@@ -179,6 +179,9 @@ def command_loop(c, x):
     x.r = r
     x.e = mean - (x.theta_m if c.at_motor > 0.0 else x.theta)
     x.ahead = c.K * pushed(c, x.e) + x.xi
+    if c.lag > 0.0:
+        lag_behind(c, x)
+        x.ahead -= c.D * x.slow
     back = c.dead_time / c.h
     x.fresh = max(1.0 - back, 0.0)
     x.late = 0.0
@@ -187,7 +190,18 @@ def command_loop(c, x):
         x.late = late(x.drives, c.drives_kept, x.count, back)
     x.j = x.drive
     x.force = x.fresh * x.ahead + x.late
-    x.brake = x.fresh * c.D + c.a_emf
+    x.brake = x.fresh * own_damping(c) + c.a_emf
+
+
+def lag_behind(c, x):
+    """Bring the speed that the firmware has on by half a step."""
+    w = x.w_m if c.at_motor > 0.0 else x.w
+    x.slow = w + (x.slow - w) * math.exp(-0.5 * c.h / c.lag)
+
+
+def own_damping(c):
+    """What the firmware's damper makes of the speed itself."""
+    return 0.0 if c.lag > 0.0 else c.D
 
 
 def ask(c, x, v):
@@ -198,7 +212,7 @@ def ask(c, x, v):
 
 def asked_of(c, x, w_before, w):
     """What the firmware asks for at the mean of two speeds."""
-    return x.ahead - 0.5 * c.D * (w_before + w)
+    return x.ahead - 0.5 * own_damping(c) * (w_before + w)
 
 
 def integrate(c, x, v):
@@ -258,6 +272,8 @@ def settle_one(c, x):
         integrate(c, x, v)
     x.w = w
     x.w_m = w
+    if c.looped > 0.0 and c.lag > 0.0:
+        lag_behind(c, x)
 
 
 def touch(c, x):
@@ -306,7 +322,7 @@ def settle_two(c, x):
             ask(c, x, v)
         elif c.looped > 0.0:
             x.force = x.fresh * x.ahead + x.late
-            x.brake = x.fresh * c.D + c.a_emf
+            x.brake = x.fresh * own_damping(c) + c.a_emf
         w_m = turn_motor(c, x, w, level_m)
         if c.looped > 0.0 and c.at_motor > 0.0:
             v = asked_of(c, x, x.w_m, w_m)
@@ -319,6 +335,8 @@ def settle_two(c, x):
         x.carried = x.touch
     x.w = w
     x.w_m = w_m
+    if c.looped > 0.0 and c.lag > 0.0:
+        lag_behind(c, x)
 
 
 # -- a step -----------------------------------------------------------------------------------------------------------

@@ -52,8 +52,16 @@ class Servo:
 
     @property
     def rest(self) -> float:
-        """Where it rests without an input [output unit]."""
-        return 0.0 if self.loop else self.coefficients.theta_0
+        """Where it begins [output unit]: theta_0; behind a loop 0, or midway between stops that 0 is not within."""
+        if self.loop is None:
+            return self.coefficients.theta_0
+        lower, upper = self.lowered.lower, self.lowered.upper
+        return 0.0 if lower < 0.0 < upper else 0.5 * (lower + upper)
+
+    @property
+    def held(self) -> float:
+        """The input under which it begins [input unit]."""
+        return self.rest if self.loop else 0.0
 
     @cached_property
     def plant(self) -> ReducedModel:

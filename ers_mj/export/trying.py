@@ -17,12 +17,12 @@ STEPS = np.array([0, 0, 1, 1, 0, -1, -1, 0])  # of half a second each, as a shar
 
 def excitation(servo: Servo) -> tuple[np.ndarray, np.ndarray]:
     """(t [s], input), each (N,): two sines and steps, through friction and springs to a few rad/s, or of some 0.4 rad
-    where a position is commanded.
+    where a position is commanded, about where it begins.
     """
     t = np.arange(round(RATE_HZ * DURATION)) / RATE_HZ
     size = _travel(servo) if servo.loop else _input(servo)
     wave = sum(share * np.sin(2.0 * np.pi * f * t) for f, share in (SLOW, FAST))
-    return t, size * (wave + 0.4 * STEPS[(t / 0.5).astype(int) % STEPS.size])
+    return t, servo.held + size * (wave + 0.4 * STEPS[(t / 0.5).astype(int) % STEPS.size])
 
 
 def response(servo: Servo, p: Portable, t: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -45,6 +45,6 @@ def _input(servo: Servo) -> float:
 
 def _travel(servo: Servo) -> float:
     q, c = servo.loop, servo.lowered
-    ends = [abs(x) for x in (c.lower, c.upper) if math.isfinite(x)]
+    ends = [abs(x - servo.rest) for x in (c.lower, c.upper) if math.isfinite(x)]
     size = 0.4 if servo.is_angle or q is None or not math.isfinite(q.L) else 3.0 * q.L / q.K
     return min([size, *ends])

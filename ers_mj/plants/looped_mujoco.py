@@ -19,6 +19,7 @@ def firmware_alone(q: LoopNumbers) -> tuple[str, ...]:
     """What of a firmware's loop no position actuator of MuJoCo has."""
     found = {
         "integral action": q.I > 0.0,
+        "the lag of the speed that the firmware damps": q.lag > 0.0,
         "the limit of the reference's speed": math.isfinite(q.R),
         "the dead band": q.band > 0.0 or q.least > 0.0,
         "the limit of the motor's torque": math.isfinite(q.most),
@@ -108,11 +109,11 @@ class LoopedPlant:
 
 
 class _Firmware:
-    """The loop's own state: the limited reference and the integral."""
+    """The loop's own state: the limited reference, the integral, the speed that its damping has."""
 
     def __init__(self, q: LoopNumbers, t: np.ndarray, r: np.ndarray, before: float):
         self.q, self.t, self.asked, self.before = q, t, r, before
-        self.r, self.xi = before, 0.0
+        self.r, self.xi, self.slow = before, 0.0, 0.0
 
     def drive(self, at: float, theta: float, w: float, h: float) -> float:
         """Drive acceleration for the next h [s], the output seen at theta with the speed w."""
@@ -127,7 +128,8 @@ class _Firmware:
             size = 0.0 if size <= q.band else min(size - q.lost, 30.0 * (size - q.band))
         if q.least > 0.0 and size > 0.0:
             size = max(size, q.least / q.K)
-        v = q.K * math.copysign(size, e) + self.xi - q.D * w
+        self.slow = w + (self.slow - w) * math.exp(-h / q.lag) if q.lag > 0.0 else w
+        v = q.K * math.copysign(size, e) + self.xi - q.D * self.slow
         if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
             self.xi = min(max(self.xi + h * q.I * e, -q.L), q.L)
         return min(max(v, -q.L), q.L)

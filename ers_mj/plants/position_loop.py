@@ -1,7 +1,7 @@
 """A servo with the loop of its own firmware between the commanded position and the motor: reference in, motion out.
 
     r_R   the reference tau late, its speed within +-R
-    v     = K e + xi - D w,  e = r_R - theta (of the body that the loop's sensor sees),  xi' = I e
+    v     = K e + xi - D s,  e = r_R - theta (of the body that the loop's sensor sees),  xi' = I e,  lag s' = w - s
     drive = v within +-L, ``dead_time`` late, its current within +-most
     theta'' = drive - a_emf w + Eq. (6)'s forces and the laws of effects, friction set-valued
 
@@ -30,17 +30,19 @@ PAST = 512  # steps of the drive that are kept: the longest dead time
 class LoopNumbers(NamedTuple):
     """The firmware's numbers.
 
-    K [1/s^2], D [1/s] and I [1/s^3] of the loop, its limit L [output unit/s^2], latency tau [s] of the reference, dead
-    time [s] of the drive, R the limit of the reference's speed; ``band`` the error [output unit] within which the drive
-    sleeps and ``lost`` what is still missing outside it; ``least`` the smallest drive outside the band; ``most`` the
-    largest motor torque; ``creep`` [1/s] the speed's factor below breakaway (infinite: friction holds) and ``heavy``
-    how much slower the body answers there (MuJoCo's constraint: 10), as ``buried`` within a stop (20); ``share`` the
-    motor's of the inertia, behind which a gear rubs; ``grease`` [1/s] what drags the load along within a play;
-    ``at_motor`` 1 where the loop's sensor sits on the motor's side, ``log_at_motor`` the recording's.
+    K [1/s^2], D [1/s] and I [1/s^3] of the loop, ``lag`` [s] of the speed that D multiplies, the loop's limit L
+    [output unit/s^2], latency tau [s] of the reference, dead time [s] of the drive, R the limit of the reference's
+    speed; ``band`` the error [output unit] within which the drive sleeps and ``lost`` what is still missing outside
+    it; ``least`` the smallest drive outside the band; ``most`` the largest motor torque; ``creep`` [1/s] the speed's
+    factor below breakaway (infinite: friction holds) and ``heavy`` how much slower the body answers there (MuJoCo's
+    constraint: 10), as ``buried`` within a stop (20); ``share`` the motor's of the inertia, behind which a gear rubs;
+    ``grease`` [1/s] what drags the load along within a play; ``at_motor`` 1 where the loop's sensor sits on the
+    motor's side, ``log_at_motor`` the recording's.
     """
 
     K: float
     D: float = 0.0
+    lag: float = 0.0
     I: float = 0.0
     L: float = np.inf
     tau: float = 0.0
@@ -65,8 +67,8 @@ Q = numba.from_dtype(LOOP)
 
 
 class Moving(NamedTuple):
-    """Angle and speed of the load and of the motor's side, the loop's integral, the limited reference, the drive, the
-    torque that the gear carried last.
+    """Angle and speed of the load and of the motor's side, the loop's integral, the speed that it has, the limited
+    reference, the drive, the torque that the gear carried last.
     """
 
     theta: float
@@ -74,12 +76,13 @@ class Moving(NamedTuple):
     theta_m: float
     w_m: float
     xi: float
+    slow: float
     r: float
     drive: float
     carried: float
 
 
-M8 = types.NamedUniTuple(F, 8, Moving)
+M9 = types.NamedUniTuple(F, 9, Moving)
 PAIR = types.UniTuple(F, 2)
 
 
@@ -162,7 +165,15 @@ def _limited(q, v):
     return min(max(v, -q.L), q.L)
 
 
-@unit(M8(C, Q, F, M8, F, F, F, F))
+@inline
+def _damped(q, slow, w, h):
+    """(D that acts on the speed itself, the late speed in the middle of a step that begins at the speed w)."""
+    if q.lag > 0.0:
+        return 0.0, w + (slow - w) * math.exp(-0.5 * h / q.lag)
+    return q.D, w
+
+
+@unit(M9(C, Q, F, M9, F, F, F, F))
 def _one_body(c, q, t, x, r, fresh, late, h):
     """The state h later under the mean reference r, where of the drive the share ``fresh`` is the present one and the
     rest ``late``.
@@ -175,10 +186,11 @@ def _one_body(c, q, t, x, r, fresh, late, h):
     wall, d_wall = _wall(c, theta)
     a = (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     level = _level(c, theta, x.w, x.carried)
-    push, ahead = hold + wall, q.K * _pushed(q, e) + x.xi
+    D, slow = _damped(q, x.slow, x.w, h)
+    push, ahead = hold + wall, q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
     mass = q.buried if wall != 0.0 else 1.0
-    w = _slipped(mass, push + fresh * ahead + late, a + fresh * q.D + c.a_emf, level, q.creep, q.heavy, x.w, h)
-    v = ahead - 0.5 * q.D * (x.w + w)
+    w = _slipped(mass, push + fresh * ahead + late, a + fresh * D + c.a_emf, level, q.creep, q.heavy, x.w, h)
+    v = ahead - 0.5 * D * (x.w + w)
     if abs(v) > q.L:
         drive = fresh * math.copysign(q.L, v) + late
         w = _slipped(mass, push + drive, a + c.a_emf, level, q.creep, q.heavy, x.w, h)
@@ -195,10 +207,10 @@ def _one_body(c, q, t, x, r, fresh, late, h):
         xi = _limited(q, xi + h * q.I * e)
     carried = (1.0 - q.share) * (w - x.w) / h - push
     theta += 0.5 * h * w
-    return Moving(theta, w, theta, w, xi, x.r, _limited(q, v), carried)
+    return Moving(theta, w, theta, w, xi, _damped(q, slow, w, h)[1], x.r, _limited(q, v), carried)
 
 
-@unit(M8(C, Q, F, M8, F, F, F, F))
+@unit(M9(C, Q, F, M9, F, F, F, F))
 def _two_bodies(c, q, t, x, r, fresh, late, h):
     """As ``_one_body``, of a motor and a load with a play or a shaft between them."""
     theta, theta_m = x.theta + 0.5 * h * x.w, x.theta_m + 0.5 * h * x.w_m
@@ -217,9 +229,10 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
     a = (1.0 - c.beta) * (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     a_m = c.beta * (c.a_mech_plus if x.w_m > 0.0 else c.a_mech_minus) + c.a_emf
     level, level_m = _level(c, theta, x.w, x.drive), _level(c, theta, x.w_m, x.drive)
-    ahead = q.K * _pushed(q, e) + x.xi
+    D, slow = _damped(q, x.slow, seen, h)
+    ahead = q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
     w, w_m = x.w, x.w_m
-    v = ahead - q.D * seen
+    v = ahead - D * seen
     for _ in range(3):
         w = _slipped(
             1.0 - c.rho,
@@ -236,16 +249,16 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
             w_m = _slipped(
                 c.rho,
                 fresh * ahead + late + between,
-                a_m + fresh * q.D + d,
+                a_m + fresh * D + d,
                 c.phi * level_m,
                 q.creep,
                 q.heavy,
                 x.w_m,
                 h,
             )
-            v = ahead - 0.5 * q.D * (x.w_m + w_m)
+            v = ahead - 0.5 * D * (x.w_m + w_m)
         else:
-            v = ahead - 0.5 * q.D * (x.w + w)
+            v = ahead - 0.5 * D * (x.w + w)
         if q.at_motor == 0.0 or abs(v) > q.L:
             w_m = _slipped(
                 c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, q.heavy, x.w_m, h
@@ -253,8 +266,9 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
     xi = x.xi
     if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
         xi = _limited(q, xi + h * q.I * e)
+    slow = _damped(q, slow, w_m if q.at_motor > 0.0 else w, h)[1]
     theta, theta_m = theta + 0.5 * h * w, theta_m + 0.5 * h * w_m
-    return Moving(theta, w, theta_m, w_m, xi, x.r, _limited(q, v), touch)
+    return Moving(theta, w, theta_m, w_m, xi, slow, x.r, _limited(q, v), touch)
 
 
 @inline
@@ -286,7 +300,7 @@ def _started(c, q, theta, w, r):
         hold += total_torque(c, theta, 0.0, 0.0, 0.0)
     v = q.K * (r - theta)
     xi = _limited(q, -hold) - v if q.I > 0.0 else 0.0
-    return Moving(theta, w, theta, w, xi, r, _limited(q, v + xi - q.D * w), 0.0)
+    return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0)
 
 
 @kernel(types.void(READ, READ, READ_BOOL, VECTOR, VECTOR, F, F, F, N, TABLE))
@@ -314,7 +328,7 @@ def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
             now = x.r + min(max(asked - x.r, -q.R * h), q.R * h)
             mean = 0.5 * (x.r + now) if q.R < np.inf else asked
             fresh, late = _late_drive(q, past, step, h) if enable[i] else (0.0, 0.0)
-            x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, now, x.drive, x.carried)
+            x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, x.slow, now, x.drive, x.carried)
             if c.two_body > 0:
                 x = _two_bodies(c, q, at, x, mean, fresh, late, h)
             else:

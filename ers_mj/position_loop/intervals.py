@@ -16,8 +16,8 @@ from ers_mj.position_loop.model import Free, LoopModel
 RUN = 5  # neighbouring blocks that are taken as one
 FEWEST = 3  # left-out refits from which they count
 TOLD = 0.7  # half width of a logarithm up to which a number is told
-INEXACT, CLOCK = 0.0025, 0.00025  # standard deviations of what firmware and simulation do in steps: relative, and [s]
-RATES = ("K", "D", "I", "a_2")
+INEXACT, CLOCK = 0.0025, 0.00075  # standard deviations of what firmware and simulation do in steps: relative, and [s]
+RATES = ("K", "I", "a_2", "c_2")
 COMBINED = ("a_2+D", "c_2/K", "(a_2+D)/K", "L/K", "I/K")
 
 
@@ -60,7 +60,8 @@ class Intervals:
         spread += inverse * float(np.mean(e * e))
         if len(left_out) >= FEWEST and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
-        spread += np.diag([_inexact(f, q, rate) ** 2 for f, q in zip(layout, model.vector(layout), strict=True)])
+        steps = [_inexact(f, q, rate, model["K"]) for f, q in zip(layout, model.vector(layout), strict=True)]
+        spread += np.diag(np.square(steps))
         return Intervals(model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
 
     def told(self, owner: str, name: str) -> Told | None:
@@ -117,10 +118,12 @@ class Intervals:
         return Told(value, (value * math.exp(-half), value * math.exp(half)), half < TOLD)
 
 
-def _inexact(f: Free, z: float, rate: float) -> float:
+def _inexact(f: Free, z: float, rate: float, K: float) -> float:
     """Standard deviation of a transformed number by what steps leave untold: a motion that is damped at a ``rate``
-    [1/s] and goes on in steps of h has rates wrong by rate h / 2.
+    [1/s] and goes on in steps of h has rates wrong by rate h / 2; a drive that is late by h acts as the damping -K h.
     """
+    if f.name == "D":
+        return K * CLOCK / f.size
     if f.name in ("tau_s", "dead_time_s"):
         return CLOCK / f.size
     relative = math.hypot(INEXACT, 0.5 * rate * CLOCK) if f.name in RATES else INEXACT

@@ -34,6 +34,7 @@ class Letter:
 LETTERS: Mapping[str, Letter] = {
     "K": Letter("1/s^2", lower=1e-3),
     "D": Letter("1/s", positive=False, lower=-math.inf, size=10.0),
+    "lag_s": Letter("s", lower=1e-4, upper=0.05),  # of the speed that D multiplies
     "I": Letter("1/s^3", lower=1e-6),
     "L": Letter("{y}/s^2", math.inf, lower=1e-6),
     "tau_s": Letter("s", positive=False, upper=0.3, size=0.01),
@@ -89,13 +90,15 @@ class Free:
 @dataclass(frozen=True)
 class LoopModel:
     """Values of LETTERS (those that are not there are absent), those that are ``free``, effects (name, parameters) with
-    laws of their own, and the side on which loop and log sit (see SIDES).
+    laws of their own, and the side on which loop and log sit (see SIDES). The firmware's gain register multiplies the
+    error alone, or of a ``whole`` loop its integral and the damping as well.
     """
 
     values: Mapping[str, float]
     free: tuple[str, ...]
     effects: tuple[tuple[str, np.ndarray], ...] = ()
     side: str = "load"
+    whole: bool = False
     scales: Scales = field(default=None, repr=False)  # type: ignore[assignment]  # one that is only simulated has none
 
     def __getitem__(self, letter: str) -> float:
@@ -195,10 +198,12 @@ class LoopModel:
         """The firmware's numbers and the plant (laid out, see laws.laid_out) of one run."""
         light = self.lightness(run)
         v = {n: self[n] * (light if n in SCALED else 1.0) for n in LETTERS}
+        beside = run.gain if self.whole else 1.0
         loop = LoopNumbers(
             K=v["K"] * run.gain,
-            D=v["D"],
-            I=v["I"] * run.gain,
+            D=v["D"] * beside,
+            lag=v["lag_s"],
+            I=v["I"] * beside,
             L=v["L"],
             tau=v["tau_s"],
             dead_time=v["dead_time_s"],
@@ -263,7 +268,7 @@ class LoopModel:
 
 def only_letters(model: LoopModel, letters: tuple[str, ...]) -> LoopModel:
     """The model of which these letters alone are fitted, and no effect's numbers."""
-    return _OnlyLetters(model.values, letters, model.effects, model.side, model.scales)
+    return _OnlyLetters(model.values, letters, model.effects, model.side, model.whole, model.scales)
 
 
 class _OnlyLetters(LoopModel):

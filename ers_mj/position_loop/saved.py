@@ -9,7 +9,7 @@ from ers_mj.errors import InputError
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.position_loop import LoopNumbers
-from ers_mj.position_loop.model import LETTERS, LoopModel
+from ers_mj.position_loop.model import LETTERS, WIDER, LoopModel
 from ers_mj.position_loop.runs import Run
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import kernel_effects
@@ -26,7 +26,8 @@ def model_of(datasheet: Datasheet) -> LoopModel:
     if not datasheet.loop:
         raise InputError(f"{datasheet.name}: has no [loop], a model of a position command was expected")
     lumped = {k: v for k, v in datasheet.lumped.items() if k in LETTERS}
-    return LoopModel({**lumped, **datasheet.loop}, (), kernel_effects(datasheet.effects), datasheet.loop_sensor)
+    effects = kernel_effects(datasheet.effects, wider=WIDER)
+    return LoopModel({**lumped, **datasheet.loop}, (), effects, datasheet.loop_sensor)
 
 
 def loop_of(datasheet: Datasheet) -> tuple[Coefficients, tuple[tuple[str, np.ndarray], ...], LoopNumbers]:

@@ -29,6 +29,7 @@ from ers_mj.position_loop.terms import (
     Term,
     delayed_within,
     is_there,
+    lagging,
     other_shares,
     present,
     stops,
@@ -135,7 +136,7 @@ class Selector:
             if self._may_gain(current):
                 tried = self._ranked(current, self._terms(current, (name,)))
                 rounds += [(c,) for c in tried if self._takes_most(current, c)]
-                current = rounds[-1][0].fit if rounds else current
+                current = self._firmware(rounds[-1][0].fit) if rounds else current
         while len(rounds) < EFFORT.rounds and self._may_gain(current):
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
             ranked = self.compared(current)
@@ -169,8 +170,22 @@ class Selector:
             values = {**first.values, "K": 1.5 * first.values["K"], "L": 1.3 * first.values["L"]}
             starts.append(self.begun(Rough(values, first.left)))
         found = self._whole(best(starts, self.screen, EFFORT.full, EFFORT.several))
+        found = self._firmware(found)
         within = self._whole(best(delayed_within(found.model), self.screen, EFFORT.full))
-        return self.unburdened(within if gain(found, within) > 0.0 else found)
+        return self.unburdened(within if gain(found, within) > self.policy.loop_gain else found)
+
+    def _firmware(self, fit: Fit) -> Fit:
+        """The fit, or a better one of the same loop in another firmware: the speed that it damps lags behind; its gain
+        register multiplies the other parts of the loop, too, which only records at several gains tell.
+        """
+        if "D" in fit.model.free and "lag_s" not in fit.model.free:
+            late = self._whole(best(lagging(fit.model), self.screen, EFFORT.full))
+            damps = late.model["D"] > self.policy.loop_damping * late.model["a_2"]
+            fit = late if gain(fit, late) > 0.0 or (damps and late.cost < fit.cost) else fit
+        if any(run.gain != self.runs[0].gain for run in self.runs) and {"D", "I"} & set(fit.model.free):
+            other = fitted(replace(fit.model, whole=not fit.model.whole), self.data, EFFORT.full)
+            fit = min(fit, other, key=lambda one: one.cost)
+        return fit
 
     def aligned(self, base: Fit) -> Fit:
         """The bare loop once the logs' offsets against the first one are taken off, where they leave half of what it
@@ -288,7 +303,9 @@ class Selector:
         for name, values in model.effects:
             if name != GRAVITY:
                 begun = [m.with_effect(name, values) for m in begun]
-        return replace(term, starts=(*term.starts, *(replace(m, side=model.side) for m in begun)), is_bent=True)
+        return replace(
+            term, starts=(*term.starts, *(replace(m, side=model.side, whole=model.whole) for m in begun)), is_bent=True
+        )
 
     def _stopped(self, model: LoopModel) -> list[LoopModel]:
         """Stops at the ends of the travel, beside what a regression makes of the rest of it."""

@@ -38,7 +38,7 @@ LAWS = (GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, Asymme
 
 OWN = {
     INTEGRAL: ("I",),
-    DERIVATIVE: ("D",),
+    DERIVATIVE: ("D", "lag_s"),
     WITHIN: ("dead_time_s",),
     STARTING: ("least",),
     SPRING: ("a_1",),
@@ -72,6 +72,7 @@ class Sizes:
     )  # [1/s], and how heavy
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
     bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K
+    lags: tuple[float, ...] = (0.003, 0.008)  # [s] of the speed that the firmware damps
     pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
     speeds: tuple[float, ...] = (1.0, 0.8)  # of the largest speed that is seen
@@ -123,10 +124,10 @@ def without(model: LoopModel, name: str) -> LoopModel:
     if name in (INTEGRAL, STARTING, SPRING, CONSTANT):
         return model.lacking(*OWN[name])
     if name == DERIVATIVE:
-        return model.having(a_2=model["a_2"] + max(model["D"], 0.0)).lacking("D")
+        return model.having(a_2=model["a_2"] + max(model["D"], 0.0)).lacking(*OWN[DERIVATIVE])
     gone = model.lacking(*BY_NAME[name].in_loop)
     if name == VoltageSaturation.name and gone["dead_time_s"] == 0.0:
-        gone = gone.having(a_2=max(model["a_2"] + model["D"], 1e-3)).lacking("D")
+        gone = gone.having(a_2=max(model["a_2"] + model["D"], 1e-3)).lacking(*OWN[DERIVATIVE])
     return gone
 
 
@@ -162,6 +163,17 @@ def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
     if "L" in model.free:
         found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
     return found
+
+
+def lagging(model: LoopModel) -> tuple[LoopModel, ...]:
+    """The loop whose damping has the speed late: damping D times lag takes from the inertia, which the bare loop's
+    K, D and c_2, told per inertia, had to bring.
+    """
+    found = []
+    for late in SIZES.lags:
+        heavier = 1.0 / (1.0 + max(model["D"], 0.0) * late)
+        found.append(model.having(lag_s=late, **{x: model[x] * heavier for x in ("K", "D", "c_2") if x in model.free}))
+    return tuple(found)
 
 
 def delayed_within(model: LoopModel) -> tuple[LoopModel, ...]:

@@ -220,6 +220,11 @@ def ladder(rungs: Sequence[Rung], evidence: Evidence) -> dict:
     }
 
 
+def has_totals(rungs: Sequence[Rung]) -> bool:
+    """Whether what the candidates take off the baseline's cost is told."""
+    return any(np.isfinite(rung.total) for rung in rungs)
+
+
 def rung_name(rung: Rung) -> str:
     """The effects of a rung, "baseline" where there are none."""
     return " + ".join(name.replace("_", " ") for name in rung.effects) or "baseline"

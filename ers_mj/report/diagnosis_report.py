@@ -70,7 +70,7 @@ def _chart_data(document: Mapping, evidence: Evidence) -> dict:
         out["map"] = diagnosis_charts.residual_map(evidence.residual_map, evidence)
     if _has_spectrum(document, evidence):
         out["spectrum"] = diagnosis_charts.spectrum(evidence.spectrum, evidence)
-    if evidence.ladder:
+    if diagnosis_charts.has_totals(evidence.ladder):
         out["ladder"] = diagnosis_charts.ladder(evidence.ladder, evidence)
     switched = diagnosis_charts.switched(records[0], effects, _error_unit(document, evidence)) if effects else {}
     return {"charts": out, "switched": switched}

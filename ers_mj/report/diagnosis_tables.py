@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 
 from ers_mj.diagnosis.evidence import Evidence, Rung
 from ers_mj.report import charts, page
-from ers_mj.report.diagnosis_charts import MOST_RUNGS, rung_name
+from ers_mj.report.diagnosis_charts import MOST_RUNGS, has_totals, rung_name
 from ers_mj.report.display import NONE, Unit, figure, interval, measured, missing, shown
 
 FITS = (
@@ -25,21 +25,25 @@ FITS = (
 
 
 def candidates(evidence: Evidence, unit: Unit) -> str:
-    """The section of everything that was tried, as a figure and as a table, errors in this unit."""
+    """The section of everything that was tried, as a table, and as a figure where costs can be told beside each other;
+    errors in this unit.
+    """
     if not evidence.ladder:
         return ""
-    drawn = charts.place(
-        "ladder", "the candidates and what each takes off the cost; the same stands in the table below"
+    lead = (
+        "Every candidate was fitted in simulation. Gain is how much it lowers the robust cost of its round, z how"
+        " surely, paired by blocks of time, numbers how many it adds."
     )
+    drawn = ""
+    if has_totals(evidence.ladder):
+        lead += " The chart shows what each takes off the baseline’s cost."
+        drawn = charts.place(
+            "ladder", "the candidates and what each takes off the cost; the same stands in the table below"
+        )
     heads = ["candidate", f">held-out error [{page.text(unit.label)}]", ">gain", ">z", ">numbers", "note"]
     table = page.table(heads, [(_rung(rung, unit), "chosen" if rung.chosen else "") for rung in evidence.ladder])
     if len(evidence.ladder) > MOST_RUNGS:
         table = f"<details><summary>All {len(evidence.ladder)} candidates as a table</summary>{table}</details>"
-    lead = (
-        "Every candidate was fitted in simulation. The chart shows by how much it lowers the baseline’s robust cost; in"
-        " the table gain is the same against its round’s, z how surely, paired by blocks of time, numbers how many it"
-        " adds."
-    )
     return page.section("The candidates", lead, drawn + table)
 
 

@@ -26,7 +26,7 @@ def trial_page(document: Mapping, trials: Sequence[Trial], spreads: Sequence[Spr
     restart_ids()
     groups = dict.fromkeys((t.case, t.plant) for t in trials)
     sections = [
-        _claims(trials),
+        _claims(trials) if document["papers_settings"] else "",
         *(_group([t for t in trials if (t.case, t.plant) == key]) for key in groups),
         _robustness(document, spreads),
         _laws(document),
@@ -136,14 +136,21 @@ def _cells(trial: Trial) -> tuple[str, ...]:
 
 
 def _laws(document: Mapping) -> str:
-    rows = [((page.text(name), page.text(sentence)), "") for name, sentence in document["controllers"].items()]
+    rows = [
+        ((page.text(name), page.text(sentence), page.text(document["gains"][name] or NONE)), "")
+        for name, sentence in document["controllers"].items()
+    ]
     lead = (
         "Settling: within 2 % of a jump's height, the longest of all jumps, or of the amplitude where nothing jumps."
         " Steady-state error: mean absolute error over the last 20 % of the time. Chatter: mean change of the voltage"
         " from sample to sample. Energy: the integral of u i, mostly holding current; with Table 1's K_t and K_e, which"
         " differ by 1.69, 41 % of the back-EMF's power has nowhere to go."
     )
-    return page.section("Laws and measures", lead, page.table(["law", ""], rows) + page.listed(document["notes"]))
+    if not document["papers_settings"]:
+        lead += " The paper's claims are for its own servo, gains, references, rate and voltage: not compared here."
+    return page.section(
+        "Laws and measures", lead, page.table(["law", "", "gains"], rows) + page.listed(document["notes"])
+    )
 
 
 def _footer(document: Mapping) -> str:

@@ -17,10 +17,11 @@ class Search:
 
     Screening: ``most_sent`` candidates are refitted at most in the first round, ``most_bent`` there from a bent
     baseline, ``later`` beside an effect; those with a share ``promising`` of the best promise, or ``promising_dear``
-    where a simulation takes long; further places of a bent baseline ask those with ``less``, and what promises
-    ``unlikely`` of that to first order is not simulated; where a model is quiet a secant must promise ``least_promise``
-    of the gain that matters. A start is scaled to between ``least_size`` and ``most_size`` of itself, and its secant
-    taken again where that is ``another`` size.
+    where a simulation takes long. What promises ``unlikely`` of that to first order is not simulated, and of what no
+    first order tells ``beside_tries`` more starts than are refitted; where a model is quiet a secant must promise
+    ``least_promise`` of the gain that matters. Further places of a bent baseline ask those with ``less``, from the
+    ``asked_again`` foremost of their starts. A start is scaled to between ``least_size`` and ``most_size`` of itself,
+    and its secant taken again where that is ``another`` size.
     """
 
     most_sent: int = 10
@@ -29,7 +30,9 @@ class Search:
     promising: float = 0.25
     promising_dear: float = 0.6
     less: float = 0.1
-    unlikely: float = 0.1
+    asked_again: int = 6
+    beside_tries: int = 2
+    unlikely: float = 0.5
     least_promise: float = 0.6
     least_size: float = 0.002
     most_size: float = 3.0

@@ -110,13 +110,25 @@ class _Race(Refits):
         return early
 
     def _run_ahead(self, labels: Sequence[Label]) -> list[Early]:
-        """All starts of these fitted to the end, on Jacobians of their own."""
+        """All starts of these fitted a few steps, and those to the end, on Jacobians of their own, that are not far
+        behind the best of their effect.
+        """
         begun = [(label, begin) for label in labels for begin in self.starts[label]]
-        ends = self.fitted(begun, 20, Along(renewals=20))
-        early = [(label, begin, found) for (label, begin), (_, found) in zip(begun, ends, strict=True)]
-        for label, _, found in early:
+        search = self.bench.search
+        first = [found for _, found in self.fitted(begun, search.glance, Along(renewals=search.renewals))]
+        most: dict[str, float] = {}
+        for ((name, _), _), found in zip(begun, first, strict=True):
+            most[name] = max(most.get(name, 0.0), self.won(found))
+
+        def on(item: tuple[Label, Fit]) -> Fit:
+            (name, _), found = item
+            near = self.won(found) >= (1.0 - search.behind) * most[name]
+            return self.on(found, 20, Along(renewals=20)) if near else found
+
+        ends = self.bench.each(on, [(label, found) for (label, _), found in zip(begun, first, strict=True)])
+        for (label, _), found in zip(begun, ends, strict=True):
             self.best[label] = min(self.best[label], found, key=self.total)
-        return early
+        return [(label, begin, found) for (label, begin), found in zip(begun, ends, strict=True)]
 
     def _not_dear_beside_an_effect(self) -> list[str]:
         """All that promise beside an effect and are not dear: a borrowed Jacobian has been bent by two there."""

@@ -336,7 +336,7 @@ def _recalibrated(
     if parts[0].training is not None:
         return None
     with_it, without = (
-        pooled([recalibrated(m, fold.held_out, measure)[0] for m, fold in zip(some, parts)]).rmse
+        pooled([recalibrated(m, fold.held_out, measure).score for m, fold in zip(some, parts)]).rmse
         for some in (models, lesser)
     )
     return with_it, without

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.data.prepared import Blocks, Trace
+from ers_mj.data.prepared import Blocks, Trace, start_samples
 from ers_mj.decisions.explained import cost
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import Along, fit
@@ -197,12 +197,29 @@ def _beside(slopes: Columns, begun: Model, fold: Fold, traces: Sequence[Trace]) 
     return {key: slopes[whole][rows] for key, whole in keys.items()}
 
 
-def recalibrated(
-    model: Model, trace: Trace, measure: Measure = FREE_RUN
-) -> tuple[Score, dict[str, tuple[float, float, float]]]:
+@dataclass(frozen=True)
+class Recalibrated:
+    """A recording whose gain, friction level and (where the plant feels position) offset were fitted on its first 30 %:
+    the ``model`` with these as the second recording's of ``heads``, and the score of the rest.
+    """
+
+    model: Model
+    heads: Sequence[Trace]
+    tau: float
+    score: Score
+
+    @property
+    def states(self) -> dict[str, tuple[float, float, float]]:
+        """What was fitted: (value, lower, upper end of 95 %) each."""
+        layout = self.model.layout()
+        widths = half_widths(self.model, self.heads, (), self.tau)
+        ends = {f.name: f.ends(q, w) for f, q, w in zip(layout, self.model.vector(layout), widths)}
+        return {name: (float(v[1]), *ends[name]) for name, v in (self.model.states or {}).items()}
+
+
+def recalibrated(model: Model, trace: Trace, measure: Measure = FREE_RUN) -> Recalibrated:
     """Gain, friction level and (where the plant feels position) offset fitted on the first 30 % of a recording; the
-    score is taken on the rest. They stay neutral unless they buy their price there. Each is (value, lower, upper end of
-    95 %).
+    score is taken on the rest. They stay neutral unless they buy their price there.
     """
     cut = int(RECALIBRATED * trace.t.size)
     head = trace.part(0, cut)
@@ -215,15 +232,11 @@ def recalibrated(
     )
     if model.values["a_1"] > 0 or model.values["c_1"] > 0:
         pair = pair.with_state("offset", 2)
-    blank = replace(head, valid=np.zeros(head.t.size, bool), counts=np.zeros_like(head.counts), channels=())
+    brief = head.part(0, start_samples(head.t))
+    blank = replace(brief, valid=np.zeros(brief.t.size, bool), counts=np.zeros_like(brief.counts), channels=())
     misfit = Blocks.of([blank, head]).misfit(residuals(pair, [blank, head], OBSERVER_RATE))
     tau = tau_of(misfit[blank.counts.size :])
     found = fit(pair, [blank, head], tau=tau, steps=10)
     if cost(misfit, tau) - cost(found.misfit, tau) < 0.5 * found.size:
         found = replace(found, model=pair)
-    layout = found.model.layout()
-    widths = half_widths(found.model, [blank, head], (), tau)
-    ends = {f.name: f.ends(q, w) for f, q, w in zip(layout, found.model.vector(layout), widths)}
-    return scored(found.model, trace, 1, cut, measure), {
-        name: (float(v[1]), *ends[name]) for name, v in found.model.states.items()
-    }
+    return Recalibrated(found.model, (blank, head), tau, scored(found.model, trace, 1, cut, measure))

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from ers_mj.data.prepared import BLOCK, Trace
 from ers_mj.decisions.explained import cost
@@ -29,8 +28,8 @@ class Nearing:
     """
 
     lead: float = 0.1
-    tail: float = 2.0
-    simulations: int = 60
+    tail: float = 1.25
+    simulations: int = 40
     within: float = 0.05
     outweighing: float = 5.0
     idle: float = 0.1
@@ -186,6 +185,8 @@ def brought_nearer(gain: Gain, effect: Effect, start: np.ndarray) -> np.ndarray:
     step = [0.03 if effect.parameters[k].name == "t_0" else 0.3 * start[k] for k in free]
     bounds = [(effect.parameters[k].lower, effect.parameters[k].upper) for k in free]
     first = np.clip(start[free] + np.vstack([np.zeros(len(free)), np.diag(step)]), *np.transpose(bounds))
+    from scipy.optimize import minimize  # takes as long to import as a search
+
     found = minimize(
         lambda p: -gain(whole(p)),
         first[0],

@@ -14,12 +14,13 @@ from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.objective import Run, run_of
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.budget import SEARCH, Search
-from ers_mj.selection.impulse_search import impulses
-from ers_mj.selection.secants import View, first_order, hopeful, of_each_form, promise, view_of
+from ers_mj.selection.impulse_search import NEARING, impulses
+from ers_mj.selection.secants import View, by_recordings, first_order, hopeful, of_each_form, promise, view_of
 from ers_mj.selection.spectrum import waves_of
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 HOTTEST, LENGTHS = 3, (0.08, 0.25)  # blocks in which an impulse is looked for, and lengths [s] from which it is fitted
+BEFORE, AFTER = 0.5, NEARING.tail + 0.25  # [s] around such a block in which an impulse may change something
 LEAST_IMPULSE = 3.0  # of C that a recording must leave for an impulse to be looked for: half of what one must buy
 
 
@@ -98,6 +99,7 @@ class _Screening:
         self.most = search.later if first.names else search.most_bent if bent else search.most_sent
         self.promises: dict[str, float] = {}
         self.begins: dict[str, list[list[Begin]]] = {}
+        self.foremost: dict[str, list[np.ndarray]] = {}  # of an effect's starts, asked from further places
 
     @property
     def screened(self) -> Screened:
@@ -111,45 +113,68 @@ class _Screening:
         return [name for name in names if self.promises.get(name, 0.0) >= bar]
 
     def look_from(self, view: View, known: Columns, names: Sequence[str]) -> None:
-        """Ask the effects what they promise from one place, the likeliest to first order first."""
-        is_first, sparse = view.place is self.first, view.sparse()
-        scales = replace(view.place.scales, hot=hot_spans(view.run, self.bench))
+        """Ask the effects what they promise from one place, the likeliest to first order first, and of what happens
+        once last.
+        """
+        is_first, scales, some = view.place is self.first, view.place.scales, view.foremost()
+        sparse = some.sparse()
         if is_first and self.bent:
             scales = replace(scales, waves=waves_of(view.run, self.bench.traces))
-        starts = {name: BY_NAME[name].starts(scales) for name in names if is_first or not BY_NAME[name].once}
-        told = {
-            name: first_order(sparse if BY_NAME[name].wave else view, BY_NAME[name], some)
-            for name, some in starts.items()
+        starts = {
+            name: self.foremost.get(name) or BY_NAME[name].starts(scales) for name in names if not BY_NAME[name].once
         }
-        shares = {name: max((share for share, _ in some), default=math.inf) for name, some in told.items()}
+        told = {
+            name: first_order(some if BY_NAME[name].follows_current else sparse, BY_NAME[name], begun)
+            for name, begun in starts.items()
+        }
+        shares = {name: max((share for share, _ in each), default=math.inf) for name, each in told.items()}
         for name in sorted(starts, key=lambda name: -shares[name]):
-            if shares[name] < self._likely() and not view.place.plant().bends:
+            if shares[name] < self._likely(is_first) and not view.place.plant().bends:
                 self.promises.setdefault(name, shares[name])
                 continue
-            found = self._found(view, BY_NAME[name], starts[name], told[name])
-            if found:
-                self._keep(BY_NAME[name], found, known, is_first)
+            self._keep(BY_NAME[name], self._found(view, BY_NAME[name], starts[name], told[name]), known, is_first)
+        for name in names if is_first else ():
+            if BY_NAME[name].once:
+                self._keep(BY_NAME[name], self._struck(view, BY_NAME[name]), known, is_first)
 
-    def _likely(self) -> float:
-        """What an effect must promise to first order to be simulated: of what follows from the second best promise,
-        since the best one's may be a fork.
-        """
+    def _second(self) -> float:
+        """The second best promise: the best one's may be a fork."""
         lasting = (promise for other, promise in self.promises.items() if not BY_NAME[other].once)
-        second = sorted((0.0, 0.0, *lasting))[-2]
-        return self.bench.search.unlikely * max(self.floor, self.bench.search.promising * second)
+        return sorted((0.0, 0.0, *lasting))[-2]
+
+    def _likely(self, is_first: bool) -> float:
+        """What an effect must promise to first order to be simulated."""
+        search = self.bench.search
+        share = search.unlikely if is_first else search.less
+        return share * max(self.floor, search.promising * self._second())
+
+    def _struck(self, view: View, effect: Effect) -> list[tuple[float, Model]]:
+        """What impulses gain, where all that is left around a place is enough for one to be refitted."""
+        spans = hot_spans(view.run, self.bench, self.bench.search.promising * self._second())
+        starts = effect.starts(replace(view.place.scales, hot=spans))
+        found = impulses(view.run, effect, starts, view.targets[0].power, self.bench.traces, self.bench.tau)
+        return sorted(found, key=lambda p: -p[0])
 
     def _found(
         self, view: View, effect: Effect, starts: Sequence[np.ndarray], told: Sequence[tuple[float, float]]
     ) -> list[tuple[float, Model]]:
         """What the starts promise, with the models as large as they ask for, the best first."""
-        if effect.once:
-            found = impulses(view.run, effect, starts, view.targets[0].power, self.bench.traces, self.bench.tau)
-        else:
-            some = hopeful(effect, starts, told, max(effect.tries, self.tries))
-            found = [p for start, size in some if (p := promise(view, effect, start, size)) is not None]
-        return sorted(found, key=lambda p: -p[0])
+        tries = max(effect.tries, self.tries)
+        if not told:
+            starts = by_recordings(view, effect, starts, tries + self.bench.search.beside_tries)
+        some = hopeful(effect, starts, told, tries)
+        found = [
+            (p, k) for k, (start, size) in enumerate(some) if (p := promise(view, effect, start, size)) is not None
+        ]
+        found.sort(key=lambda item: -item[0][0])
+        likely = [starts[k] for k in sorted(range(len(told)), key=lambda k: -told[k][0])]
+        likely = likely or [some[k][0] for _, k in found]
+        self.foremost.setdefault(effect.name, likely[: self.bench.search.asked_again])
+        return [p for p, _ in found]
 
     def _keep(self, effect: Effect, found: list[tuple[float, Model]], known: Columns, is_first: bool) -> None:
+        if not found:
+            return
         best, name = found[0][0], effect.name
         of_forms = of_each_form(found, lambda p: p[1].effects[-1][1])[: max(effect.tries, self.tries)]
         begun = [Begin(model, known) for _, model in of_forms]
@@ -161,23 +186,29 @@ class _Screening:
             self.promises[name] = max(self.promises.get(name, 0.0), best)
 
 
-def hot_spans(run: Run, bench: Bench) -> tuple[tuple[int, float, float], ...]:
+def hot_spans(run: Run, bench: Bench, least: float = 0.0) -> tuple[tuple[int, float, float], ...]:
     """Spans (recording, begin [s], length [s]) around the blocks of largest misfit, where something may have struck, in
-    recordings that leave enough for it.
+    recordings that leave enough for it; not where the surroundings leave less than the ``least`` share of C.
     """
     traces, blocks, peak = bench.traces, Blocks.of(bench.traces), math.log(bench.policy.peak)
     record = np.repeat(np.arange(len(traces)), [t.counts.size * (1 + len(t.channels)) for t in traces])
     within = np.concatenate([np.tile(np.arange(t.counts.size), 1 + len(t.channels)) for t in traces])
     misfit = blocks.misfit(run.left)
+    left = score(misfit, bench.tau)
 
     def may_hold_one(k: int) -> bool:
         mine = misfit[record == k]
         enough = attainable(mine, blocks.counts[record == k], bench.tau) >= LEAST_IMPULSE
-        return enough or score(mine, bench.tau).max() >= peak
+        return enough or left[record == k].max() >= peak
+
+    def leaves_enough(b: int) -> bool:
+        after = (within - within[b]) * BLOCK
+        around = (record == record[b]) & (after >= -BEFORE) & (after <= AFTER)
+        return float(left[around].sum()) >= least * float(left.sum())
 
     able = [k for k in range(len(traces)) if may_hold_one(k)]
-    order = np.argsort(-score(misfit, bench.tau), kind="stable")
-    worst = [b for b in order[:HOTTEST] if record[b] in able]
+    order = np.argsort(-left, kind="stable")
+    worst = [b for b in order[:HOTTEST] if record[b] in able and leaves_enough(b)]
     return tuple(
         (int(record[b]), float(traces[record[b]].t[0] + within[b] * BLOCK), length) for b in worst for length in LENGTHS
     )

@@ -14,12 +14,13 @@ import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME, Effect
-from ers_mj.estimation.jacobian import central_jacobian
+from ers_mj.estimation.jacobian import jacobian_of
 from ers_mj.estimation.objective import Run, residuals
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
-SPARSE = 2e-3  # [s] between the samples that tell a wave's share to first order
+SPARSE = 4e-3  # [s] between the samples that tell a share to first order
+MOST = 0.5  # of what is left, in the recordings by which starts are chosen
 # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
 RUNAWAY = 1e12
 
@@ -74,6 +75,22 @@ class View:
         """Whether what a secant asks for is another size than that at which it was taken."""
         return not 1.0 / self.search.another < factor < self.search.another
 
+    def foremost(self) -> View:
+        """The view of the recordings that leave most, as few as hold MOST of it together: enough to choose by. All of
+        them where the model tells them apart.
+        """
+        target, ends = self.targets[0], np.cumsum([0, *(trace.rows for trace in self.traces)])
+        powers = np.add.reduceat(target.residual**2, ends[:-1])
+        order = np.argsort(-powers, kind="stable")
+        enough = int(np.searchsorted(np.cumsum(powers[order]), MOST * target.power)) + 1
+        if self.place.states or self.place.local or enough >= len(self.traces):
+            return self
+        records = sorted(order[:enough].tolist())
+        rows = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in records])
+        fewer = [Target(t.root[rows], np.linalg.qr(t.basis[rows])[0], t.residual[rows]) for t in self.targets]
+        place, motions = self.place.of_records(records), tuple(self.run.motions[k] for k in records)
+        return View(Run(place, self.run.left[rows], motions), fewer, [self.traces[k] for k in records], self.search)
+
     def sparse(self) -> View:
         """The view with samples SPARSE apart, where they are uniform: enough to choose by among many waves. (Of a
         friction that follows the current the first order tells nothing at such samples.)
@@ -106,7 +123,7 @@ def view_of(run: Run, traces: Sequence[Trace], tau: float, search: Search = SEAR
     place, e = run.model, run.left
     blocks, layout = Blocks.of(traces), place.layout()
     m = blocks.misfit(e)
-    jacobian = central_jacobian(place, layout, place.vector(layout), traces, OBSERVER_RATE)
+    jacobian = jacobian_of(run, traces, OBSERVER_RATE, by_tangents=False)
     free, targets = np.array([not place.at_bound(f) for f in layout], bool), []
     for level in (tau, max(tau, float(np.mean(m)))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
@@ -127,7 +144,8 @@ def first_order(view: View, effect: Effect, starts: Sequence[np.ndarray]) -> lis
     with many starts are asked, and no size told.
     """
     bends = view.place.plant().bends
-    if not starts or effect.once or not effect.tangible or bends and not is_chosen(effect, starts):
+    is_law = bool(effect.torque or effect.friction)
+    if not starts or effect.once or not effect.tangible or bends and not (is_law and is_chosen(effect, starts)):
         return []
     waves, ends, changes = 2 if effect.wave else 1, view.ends(effect), _tangents(view, effect, starts)
     told = [_shares(changes, waves, ends, target, effect.signed) for target in view.targets]
@@ -152,8 +170,19 @@ def _tangents(view: View, effect: Effect, starts: Sequence[np.ndarray]) -> np.nd
 
 
 def is_chosen(effect: Effect, starts: Sequence[np.ndarray], tries: int | None = None) -> bool:
-    """Whether an effect has more starts than are tried, of which the first order tells the best: those of a law."""
-    return len(starts) > (effect.tries if tries is None else tries) + 1 and bool(effect.torque or effect.friction)
+    """Whether an effect has more starts than are tried, of which the first order tells the best."""
+    return len(starts) > (effect.tries if tries is None else tries) + 1
+
+
+def by_recordings(view: View, effect: Effect, starts: Sequence[np.ndarray], most: int) -> Sequence[np.ndarray]:
+    """The starts of an effect that no first order tells, of many as many as promise ``most`` in the recordings that
+    leave most.
+    """
+    fewer = view.foremost()
+    if fewer is view or len(starts) <= most:
+        return starts
+    shares = {k: found[0] for k, start in enumerate(starts) if (found := promise(fewer, effect, start, 1.0))}
+    return [starts[k] for k in sorted(sorted(shares, key=lambda k: -shares[k])[:most])]
 
 
 def hopeful(

@@ -4,6 +4,7 @@ resolve.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -33,6 +34,7 @@ class Sizes:
 
 SIZES = Sizes()
 LAGS = 8  # samples of memory that are taken from what is left
+ECHO, FULL = 1.0, 512  # [s] in which a wave dies out after its recording; lengths of which spectra are made fast
 KINDS = "torque", "friction", "reading"  # where a wave may act
 
 
@@ -72,27 +74,28 @@ def waves_of(run: Run, traces: Sequence[Trace], sizes: Sizes = SIZES) -> tuple[t
 
 def _compared(left: np.ndarray, trace: Trace, rates: np.ndarray, a_2: float) -> list[tuple[np.ndarray, np.ndarray]]:
     """(products with what is left, squared sizes) (orders,) of waves of each kind and each of these ``rates`` [1/output
-    unit], in one recording.
+    unit], which are evenly apart, in one recording: both by Parseval's theorem, since filters are products of spectra.
     """
-    from scipy.signal import lfilter  # takes a second to import
-
     h = trace.sample_time
     y = np.interp(trace.t, trace.t[trace.valid], trace.y[trace.valid])
     way = np.sign(np.convolve(np.gradient(y, h), np.ones(5) / 5, "same"))
-    slow, fast = np.exp(-OBSERVER_RATE * h), np.exp(-a_2 * h)
-
-    def through(wave: np.ndarray) -> np.ndarray:
-        return lfilter([h * h], [1.0, -slow - fast, slow * fast], wave)
-
+    size = FULL * math.ceil((y.size + ECHO / h) / FULL)
+    back = np.exp(-2j * np.pi * np.fft.fftfreq(size))  # by a sample
+    moves = h * h / ((1.0 - np.exp(-OBSERVER_RATE * h) * back) * (1.0 - np.exp(-a_2 * h) * back))
     white = _whitening(left)
-    left = lfilter(white, 1.0, left)
-    left = left / max(float(np.std(left)), 1e-300)
+    left = np.convolve(left, white)[: left.size]
+    there = np.fft.fft(left / max(float(np.std(left)), 1e-300), size) / size
+    white = np.fft.fft(white, size)
+    through = (white * moves, white * moves, white)
+    sought = [there * each.conj() for each in through]
+    gains = [np.abs(each) ** 2 / size for each in through]
+    wave, further = np.exp(1j * rates[0] * y), np.exp(1j * (rates[1] - rates[0]) * y)
     out = [(np.empty(rates.size, complex), np.empty(rates.size)) for _ in KINDS]
-    for k, rate in enumerate(rates):
-        wave = np.exp(1j * rate * y)
-        for (hit, power), moved in zip(out, (through(wave), through(wave * way), wave), strict=True):
-            seen = lfilter(white, 1.0, moved)
-            hit[k], power[k] = left @ seen.conj(), float(np.vdot(seen, seen).real)
+    for k in range(rates.size):
+        straight, either = np.fft.fft(wave, size), np.fft.fft(wave * way, size)
+        for (hit, power), kind, gain, spectrum in zip(out, sought, gains, (straight, either, straight), strict=True):
+            hit[k], power[k] = np.vdot(spectrum, kind), gain @ (spectrum.real**2 + spectrum.imag**2)
+        wave *= further
     return out
 
 

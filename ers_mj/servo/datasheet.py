@@ -21,6 +21,7 @@ from typing import Any
 
 from ers_mj.data.whole import write_whole
 from ers_mj.errors import InputError
+from ers_mj.servo.units import told_units
 
 # Table 1 of the paper (Energies 2020): the values of its joint simulation model, as printed but for the units
 # of L and theta_0. K_t and K_e differ (ratio 1.69) although they are one constant in SI: both are kept. The
@@ -61,8 +62,8 @@ SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect", "
 VERDICTS = ("consistent", "parameters_only", "missing_physics", "unexplained")
 KINDS, SENSORS = ("P", "PD", "PI", "PID"), ("load", "link", "motor")  # of a firmware's loop, and where its sensor sits
 LOOP = (
-    "K", "D", "I", "L", "tau_s", "dead_time_s", "R", "band", "least", "most", "creep", "heavy", "buried", "share",
-    "grease", "rotor", "hold",
+    "K", "D", "lag_s", "I", "L", "tau_s", "dead_time_s", "R", "band", "least", "most", "creep", "heavy", "buried",
+    "share", "grease", "rotor", "hold",
 )  # fmt: skip
 
 
@@ -74,6 +75,7 @@ class Datasheet:
         parameters: Table 1's letters, SI, any subset.
         lumped: Eq. (6)'s, in output unit/s^2 per input unit.
         sample_rate_hz: of the recordings it comes with [Hz], or None.
+        output_unit, input_unit: of these recordings, see servo.units; empty where not told.
         effects: the physics that a diagnosis added, each a name and its parameters.
         baseline: what a diagnosis refitted, by free names.
         loop: the firmware's loop under a position command, by LOOP's letters; empty where there is none.
@@ -87,6 +89,8 @@ class Datasheet:
     parameters: Mapping[str, float] = field(default_factory=dict)
     lumped: Mapping[str, float] = field(default_factory=dict)
     sample_rate_hz: float | None = None
+    output_unit: str = ""
+    input_unit: str = ""
     effects: tuple[tuple[str, Mapping[str, float]], ...] = ()
     baseline: Mapping[str, float] = field(default_factory=dict)
     loop: Mapping[str, float] = field(default_factory=dict)
@@ -105,7 +109,8 @@ class Datasheet:
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to another process as plain dictionaries."""
         effects = tuple((name, dict(values)) for name, values in self.effects)
-        plain = dict(self.parameters), dict(self.lumped), self.sample_rate_hz, effects, dict(self.baseline)
+        comes_with = self.sample_rate_hz, self.output_unit, self.input_unit
+        plain = dict(self.parameters), dict(self.lumped), *comes_with, effects, dict(self.baseline)
         told = self.verdict, dict(self.intervals)
         return type(self), (*plain, dict(self.loop), self.loop_kind, self.loop_sensor, *told, self.name)
 
@@ -189,7 +194,7 @@ def datasheet_of(document: Mapping[str, Any], path: str | os.PathLike[str] = "da
     sheet = Datasheet(
         parameters=_section(document, "parameters", TABLE_1, path),
         lumped=_section(document, "lumped", LUMPED, path),
-        sample_rate_hz=_section(document, "recording", ["sample_rate_hz"], path).get("sample_rate_hz"),
+        **_recording(document.get("recording", {}), path),
         effects=tuple(_effect(entry, path) for entry in _entries(document, path)),
         baseline=_numbers(document.get("baseline", {}), f"{path}: [baseline]"),
         **_loop(document.get("loop", {}), f"{path}: [loop]"),
@@ -234,6 +239,17 @@ def _section(document: Mapping[str, Any], section: str, known: Iterable[str], pa
     for key, x in numbers.items():
         refuse_impossible(key, x, where)
     return numbers
+
+
+def _recording(table: object, path: Path) -> dict[str, Any]:
+    """The rate and the units of the recordings that a file comes with."""
+    where, known = f"{path}: [recording]", ("sample_rate_hz", "output_unit", "input_unit")
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} is {_kind(table)}, a table was expected")
+    _refuse_unknown(table, known, "key", where)
+    units = told_units(table, where)
+    rest = {key: x for key, x in table.items() if key not in units}
+    return units | _section({"recording": rest}, "recording", known, path)
 
 
 def refuse_impossible(key: str, x: float, where: str) -> None:
@@ -353,9 +369,9 @@ def write_model(path: str | os.PathLike[str], datasheet: Datasheet) -> None:
     Raises:
         InputError: the path cannot be written.
     """
-    rate = {} if datasheet.sample_rate_hz is None else {"sample_rate_hz": datasheet.sample_rate_hz}
-    sections = {"parameters": datasheet.parameters, "lumped": datasheet.lumped, "recording": rate}
+    sections = {"parameters": datasheet.parameters, "lumped": datasheet.lumped}
     lines = [line for title, table in sections.items() if table for line in _lines(f"[{title}]", table)]
+    lines += _comes_with(datasheet)
     lines += _lines("[baseline]", datasheet.baseline)
     if datasheet.loop:
         title = f'[loop]\nkind = "{datasheet.loop_kind}"\nsensor = "{datasheet.loop_sensor}"'
@@ -368,6 +384,15 @@ def write_model(path: str | os.PathLike[str], datasheet: Datasheet) -> None:
         ends = (f"{_key(key)} = [{low!r}, {high!r}]" for key, (low, high) in datasheet.intervals.items())
         lines += ["[diagnosis.ci95]", *ends, ""]
     write_whole(Path(path), "\n".join(lines))
+
+
+def _comes_with(datasheet: Datasheet) -> list[str]:
+    """The section of the recordings; no line where nothing is told of them."""
+    units = {"output_unit": datasheet.output_unit, "input_unit": datasheet.input_unit}
+    told = [f"{key} = {_quoted(unit)}" for key, unit in units.items() if unit]
+    if datasheet.sample_rate_hz is not None:
+        told.insert(0, f"sample_rate_hz = {float(datasheet.sample_rate_hz)!r}")
+    return ["[recording]", *told, ""] if told else []
 
 
 def _lines(title: str, table: Mapping[str, float]) -> list[str]:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +25,7 @@ from ers_mj.plants.reduced import Motion, ReducedModel, lumped
 from ers_mj.servo.datasheet import Datasheet
 
 PER_INERTIA = {"torque": "", "damping": " s/{y}", "stiffness": "/{y}", "drag": " s^2/{y}^2", "cubic": "/{y}^3"}
+Ends = Mapping[str, tuple[float, float]]  # of parameters, by name
 LUMPED_UNIT = {"torque": "{y}/s^2", "damping": "1/s", "stiffness": "1/s^2", "drag": "1/{y}", "cubic": "1/({y}^2 s^2)"}
 PLAIN_UNIT = {
     "position": "{y}",
@@ -65,8 +68,15 @@ def inertia_of(datasheet: Datasheet) -> float:
     return float(datasheet.parameters.get("J", 1.0))
 
 
-def kernel_effects(effects: EffectSettings, inertia: float = 1.0) -> tuple[tuple[str, np.ndarray], ...]:
+def kernel_effects(
+    effects: EffectSettings, inertia: float = 1.0, wider: Ends = MappingProxyType({})
+) -> tuple[tuple[str, np.ndarray], ...]:
     """Effects as the reduced model takes them: every parameter in its place (k,), torques per inertia.
+
+    Args:
+        effects: names, each with its values.
+        inertia: J [kg m^2], by which torques are divided.
+        wider: the ends of parameters, by name, that may go further than the effect itself says.
 
     Raises:
         InputError: an effect, a key or a value that does not exist or cannot be.
@@ -74,7 +84,7 @@ def kernel_effects(effects: EffectSettings, inertia: float = 1.0) -> tuple[tuple
     twice = [name for name, _ in effects if [other for other, _ in effects].count(name) > 1]
     if twice:
         raise InputError(f"the effect {twice[0]} is given twice, once was expected")
-    return tuple((name, _vector(_effect(name), values, inertia)) for name, values in effects)
+    return tuple((name, _vector(_effect(name), values, inertia, wider)) for name, values in effects)
 
 
 def build_plant(
@@ -226,7 +236,7 @@ def parse_effect(text: str) -> tuple[str, dict[str, float]]:
         if key in values:
             raise InputError(f"--effect {text}: {key} is given twice")
         values[key] = _number(value, f"--effect {text}: {key}")
-    _vector(effect, values, 1.0)
+    _vector(effect, values, 1.0, {})
     if recorded := [p.name for p in effect.parameters if p.recorded and p.name in values]:
         raise InputError(
             f"--effect {text}: {recorded[0]} acts through what a recording measured, of which a simulation has none"
@@ -267,13 +277,14 @@ def _effect(name: str) -> Effect:
     return BY_NAME[name]
 
 
-def _vector(effect: Effect, values: Mapping[str, float], inertia: float) -> np.ndarray:
+def _vector(effect: Effect, values: Mapping[str, float], inertia: float, wider: Ends) -> np.ndarray:
     """The parameters (k,) of one effect, what is not given at its declared default."""
     known = {parameter.name: parameter for parameter in effect.parameters}
     _refuse_strangers(effect, values, known)
     _refuse_lacking(effect, values)
     _refuse_halves(effect, values)
-    given = [_checked(effect, p, float(values[p.name])) if p.name in values else p.absent for p in effect.parameters]
+    bounded = [_widened(p, *wider.get(p.name, (p.lower, p.upper))) for p in effect.parameters]
+    given = [_checked(effect, p, float(values[p.name])) if p.name in values else p.absent for p in bounded]
     ends = dict(zip(known, given, strict=True))
     if ends.get("lower", -math.inf) >= ends.get("upper", math.inf):
         raise InputError(f"{effect.name}: lower = {ends['lower']:g} is not below upper = {ends['upper']:g}")
@@ -312,6 +323,10 @@ def _refuse_halves(effect: Effect, values: Mapping[str, float]) -> None:
                 f"{effect.name}: {', '.join(key for key in group if key in values)} given without"
                 f" {' and '.join(lacking)}, expected {', '.join(group)} together"
             )
+
+
+def _widened(p: Parameter, lower: float, upper: float) -> Parameter:
+    return replace(p, lower=min(p.lower, lower), upper=max(p.upper, upper))
 
 
 def _checked(effect: Effect, parameter: Parameter, x: float) -> float:

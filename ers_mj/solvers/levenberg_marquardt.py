@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from scipy.linalg.blas import dger
 
 
 class Point(Protocol):
@@ -111,7 +110,9 @@ class Descent(Generic[P]):
         step = Step(before.cost - there.cost, promised, self.fresh)
         if step.gain > self.rule.keeps * promised and moved @ moved > 0:
             missed = there.e - before.e - slopes @ moved
-            dger(1.0 / float(moved @ moved), missed, moved, a=slopes, overwrite_a=1)  # in place: slopes lie by columns
+            missed /= float(moved @ moved)
+            for column, along in zip(slopes.T, moved, strict=True):
+                column += along * missed
             self.fresh = False
         else:
             self.slopes = None

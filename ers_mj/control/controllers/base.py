@@ -121,6 +121,11 @@ class Controller:
         self._new = 1.0 - math.exp(-self.h / filter_s) if filter_s > 0 else 1.0
         self.reset(servo.theta_0)
 
+    @classmethod
+    def told_gains(cls, servo: Servo) -> dict[str, float]:
+        """Gains that no option sets, by name, as they are for a servo."""
+        return {}
+
     def reset(self, theta: float) -> None:
         """Begin anew, at rest at theta."""
         self._x1, self._before, self._omega = 0.0, theta, 0.0

@@ -23,6 +23,11 @@ class HInf(Controller):
     sentence = "H-infinity law of (39)"
     error, rate, speed, alpha = 14.0, 0.6, 0.5, 0.15
 
+    @classmethod
+    def told_gains(cls, servo) -> dict[str, float]:
+        told = {"error": cls.error, "rate": cls.rate, "speed": cls.speed, "alpha": cls.alpha}
+        return told | {"all times": servo.printed_gain / math.degrees(1.0)}
+
     def law(self, s: State) -> float:
         feedback = self.error * s.x2 + self.rate * s.x3
         return self.servo.printed_gain * (

@@ -53,7 +53,8 @@ class Firmware:
     limited: float = 0.3  # share of the references with a limit of their speed
     gravity: float = 0.5  # share of the servos that lift an arm
     loaded: float = 0.3  # share of the servos with two loads
-    two_gains: float = 0.4  # share of the servos recorded at two gains
+    two_gains: float = 0.4  # share of the servos recorded at two gains,
+    whole: float = 0.5  # and of these the share whose register multiplies the damping and the integral as well
 
 
 FIRMWARE = Firmware()
@@ -68,6 +69,7 @@ def draw(rng: np.random.Generator, labels: tuple[str, ...]) -> Servo:
     gains = _gains(rng, own, 1.0 / firmware)
     inherent = _inherent(rng, own, units, labels)
     registers = [1.0, between(rng, 2.0, 4.0)] if rng.random() < FIRMWARE.two_gains else [1.0]
+    scaled = ("KP", "KI", "KD") if len(registers) > 1 and rng.random() < FIRMWARE.whole else ("KP",)
     loads = [1.0, between(rng, 1.5, 2.5)] if rng.random() < FIRMWARE.loaded else [1.0]
     carried, mass, arm = float(rng.uniform(0.3, 0.7)), between(rng, 0.1, 0.5), between(rng, 0.05, 0.2)
     records = []
@@ -76,7 +78,7 @@ def draw(rng: np.random.Generator, labels: tuple[str, ...]) -> Servo:
         known = {"kp": register} if len(registers) > 1 else {}
         known |= {"load_kg": mass * load, "arm_m": arm} if len(loads) > 1 else {}
         params = own | {"J": own["J"] * (1.0 + carried * (load - 1.0))}
-        record = Record(kind, t, told, t, params, _at(gains, register), _under(inherent, load), known)
+        record = Record(kind, t, told, t, params, _at(gains, scaled, register), _under(inherent, load), known)
         records.append(_in_firmware(rng, record, firmware, sensor))
     names = ("input_delay", "voltage_saturation", *(effect["label"] for effect in inherent))
     pulled = ("pull", "tilt") if "gravity_imbalance" in names else ()
@@ -119,9 +121,9 @@ def _inherent(rng: np.random.Generator, own: dict, units: Units, labels: tuple[s
     return out
 
 
-def _at(gains: dict, register: float) -> dict:
-    """Gains at this register of the firmware over the first one; the limit is the motor's."""
-    return gains | {name: gains[name] * register for name in ("KP", "KI", "KD")}
+def _at(gains: dict, scaled: tuple[str, ...], register: float) -> dict:
+    """Gains, of which some are so many times the first ones at this register; the limit is the motor's."""
+    return gains | {name: gains[name] * register for name in scaled}
 
 
 def _under(inherent: list[dict], load: float) -> list[dict]:
