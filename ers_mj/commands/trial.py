@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ers_mj.commands.keeping import DEFAULT_OUT, Kept, Place, keep, results_folder
+from ers_mj.commands.keeping import DEFAULT_OUT, Place, keep, results_folder
 from ers_mj.commands.loop import add_laws, add_plant, chosen_controllers, conditions_of, plant_and_design
 from ers_mj.commands.options import (
     add_cluster,
@@ -27,7 +27,8 @@ from ers_mj.commands.options import (
     swing_deg,
     whole,
 )
-from ers_mj.commands.output import Progress, bold, tell, written
+from ers_mj.commands.output import Progress, tell
+from ers_mj.commands.trial_lines import trial_lines
 from ers_mj.door.saving import as_json, plain, report_writers, versions, write_results
 from ers_mj.errors import InputError
 from ers_mj.processes import stopping
@@ -40,17 +41,6 @@ if TYPE_CHECKING:
     from ers_mj.control.trial import Conditions, Trial
     from ers_mj.servo.datasheet import Datasheet
     from ers_mj.workers.base import Crew
-
-COLUMNS = (
-    ("settles [ms]", "settling_time_s", 1e3, ".1f"),
-    ("overshoot [%]", "overshoot_pct", 1.0, ".2f"),
-    ("steady [°]", "steady_state_error_rad", math.degrees(1), ".4f"),
-    ("RMSE [°]", "rmse_rad", math.degrees(1), ".4f"),
-    ("peak [V]", "peak_u_V", 1.0, ".1f"),
-    ("RMS [V]", "rms_u_V", 1.0, ".2f"),
-    ("chatter [V]", "chatter_V", 1.0, ".3f"),
-    ("energy [J]", "energy_J", 1.0, ".2f"),
-)
 
 RESULTS = ("trials.json", "report.html")
 KEPT = ".trial"  # in the folder of the results: the scattered servos that are finished
@@ -246,7 +236,7 @@ def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished 
         kept = keep(place, lambda folder: _write(folder, document, trials, spreads, progress, traces))
     if finished is not None and not kept.code:
         remove(finished.folder)
-    print(as_json(document) if arguments.json else "\n".join(_told(document, kept)))
+    print(as_json(document) if arguments.json else "\n".join(trial_lines(document, kept)))
     return kept.code
 
 
@@ -357,58 +347,3 @@ def _write_trace(trial: Trial, file: Path) -> None:
     run, ran = trial.run, np.isfinite(trial.run.u)
     columns = {"t_s": run.reference.t, "theta_ref_rad": run.reference.theta, "u_V": run.u, "theta_rad": run.measured}
     write_recording(file, {name: x[ran] for name, x in columns.items()})
-
-
-# -- the trials in lines --------------------------------------------------------------------------------------------
-
-
-def _told(document: dict, kept: Kept) -> list[str]:
-    """What a terminal shows when all is done."""
-    lines = ["", bold(document["sentence"])]
-    keys = list(dict.fromkeys((t["case"], t["plant"]) for t in document["trials"]))
-    for case, plant in keys:
-        lines += ["", bold(f"{f'{case}, {plant} plant':26}" + "".join(f"{head:>15}" for head, *_ in COLUMNS))]
-        for t in document["trials"]:
-            if (t["case"], t["plant"]) == (case, plant):
-                cells = (
-                    "".join(f"{cell(t, *column):>15}" for column in COLUMNS)
-                    if t["stable"]
-                    else f"{'unstable: it was given up':>30}"
-                )
-                lines.append(f"  {t['controller']:24}{cells}")
-    lines += _spread_lines(document)
-    lines += ["", *document["notes"]] if document["notes"] else []
-    return lines + written(kept)
-
-
-def _spread_lines(document: dict) -> list[str]:
-    """RMS error and settling of the scattered servos: 5 %, median, 95 %."""
-    lines, degree = [], math.degrees(1.0)
-    for case, plant in dict.fromkeys((s["case"], s["plant"]) for s in document["robustness"]):
-        group = [s for s in document["robustness"] if (s["case"], s["plant"]) == (case, plant)]
-        head = f"{case}, {plant}, {group[0]['plants']} servos"
-        lines += [
-            "",
-            bold(
-                f"{head:26}{'RMSE [°] 5 / 50 / 95 %':>30}{'settles [ms] 5 / 50 / 95 %':>30}{'never':>8}{'unstable':>10}"
-            ),
-        ]
-        for s in group:
-            shown = (("rmse_rad", degree, ".4f"), ("settling_time_s", 1e3, ".1f"))
-            cells = "".join(f"{_three(s['measures'][key], factor, form):>30}" for key, factor, form in shown)
-            lines.append(f"  {s['controller']:24}{cells}{s['never_settled']:>8}{s['unstable']:>10}")
-    return lines
-
-
-def _three(quantiles: dict | None, factor: float, form: str) -> str:
-    return (
-        "-"
-        if quantiles is None
-        else " / ".join(f"{factor * quantiles[key]:{form}}" for key in ("q05", "median", "q95"))
-    )
-
-
-def cell(trial: dict, head: str, key: str, factor: float, form: str) -> str:
-    """One measure as a reader sees it."""
-    x = trial[key]
-    return ("never" if key == "settling_time_s" else "-") if x is None else f"{factor * x:{form}}"

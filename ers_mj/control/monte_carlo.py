@@ -10,12 +10,14 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ers_mj.control.controllers import Servo
 from ers_mj.control.metrics import Measures
+from ers_mj.control.own_law import is_own
 from ers_mj.control.references import Reference
 from ers_mj.control.trial import Conditions, references, try_out
 from ers_mj.effects import BY_NAME
@@ -180,7 +182,8 @@ def _spread(servos: Sequence[Found]) -> Spread:
 def _asked(fleet: Fleet, wanted: Wanted, conditions: Conditions) -> str:
     """Hash of all that the trials of a fleet depend on."""
     controllers, plants, aims = wanted
-    digest = sha256(repr((fleet, controllers, plants, conditions, code())).encode())
+    own = [Path(name).read_bytes() for name in controllers if is_own(name)]
+    digest = sha256(repr((fleet, controllers, own, plants, conditions, code())).encode())
     for aim in aims:
         digest.update(repr((aim.name, aim.jumps)).encode())
         for x in (aim.t, aim.theta, aim.omega, aim.alpha):

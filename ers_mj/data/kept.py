@@ -10,18 +10,18 @@ import numpy as np
 
 
 class Kept:
-    """Pairs of arrays by what they were computed from; those not asked for longest go first. A copy in another process
+    """Arrays by what they were computed from; those not asked for longest go first. A copy in another process
     begins empty.
     """
 
     def __init__(self, most_bytes: int = 16_000_000):
         self._lock, self._most, self._bytes = threading.Lock(), most_bytes, 0
-        self._found: OrderedDict[Hashable, tuple[np.ndarray, np.ndarray]] = OrderedDict()
+        self._found: OrderedDict[Hashable, tuple[np.ndarray, ...]] = OrderedDict()
 
     def __reduce__(self):
         return Kept, (self._most,)
 
-    def get(self, key: Hashable) -> tuple[np.ndarray, np.ndarray] | None:
+    def get(self, key: Hashable) -> tuple[np.ndarray, ...] | None:
         """What was kept under a key."""
         with self._lock:
             if key not in self._found:
@@ -29,8 +29,8 @@ class Kept:
             self._found.move_to_end(key)
             return self._found[key]
 
-    def keep(self, key: Hashable, arrays: tuple[np.ndarray, np.ndarray]) -> None:
-        """Keep a pair under a key that holds none yet, as long as there is room."""
+    def keep(self, key: Hashable, arrays: tuple[np.ndarray, ...]) -> None:
+        """Keep arrays under a key that holds none yet, as long as there is room."""
         size = sum(a.nbytes for a in arrays)
         with self._lock:
             if key in self._found or size > self._most:

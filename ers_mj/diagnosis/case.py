@@ -59,6 +59,12 @@ class Case:
         return self.selection.chosen.model
 
     @property
+    def cut_short(self) -> bool:
+        """Whether a budget of simulation ended the rounds or a refit."""
+        effort = self.model.effort
+        return self.selection.cut_short or effort is not None and effort.is_cut
+
+    @property
     def output_unit(self) -> str:
         return self.recordings[0].output_unit
 

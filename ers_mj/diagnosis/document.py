@@ -86,7 +86,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
     }
     if verdict == "unexplained" or case.suspects:
         document["suspects"] = _suspects(case)
-    if left_out := case.search.left_out(case.selection.cut_short):
+    if left_out := case.search.left_out(case.cut_short):
         document["left_out"] = [{"part": part, "sentence": sentence} for part, sentence in left_out]
     evidence = Evidence(
         tuple(views(case, samples)),

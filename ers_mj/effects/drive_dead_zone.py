@@ -36,8 +36,8 @@ class DriveDeadZone(Drive):
         ),
     )
     tries = 3
-    in_loop = ("band",)
-    loop_sentence = "the servo's own loop ignores errors up to {value}"
+    in_loop = ("band", "idle")
+    loop_sentence = "the servo's own loop ignores what is smaller than {value}"
 
     def starts(self, scales):
         widths = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32]) * scales.input

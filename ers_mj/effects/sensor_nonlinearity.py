@@ -43,7 +43,9 @@ class SensorNonlinearity(Sensor):
     def measure(self, p, t, y):
         bend, twist, amplitude, period, phase = p
         wave = amplitude * np.sin(2 * np.pi / period * y + phase) if np.isfinite(period) else 0.0
-        return y + wave + (bend * y**2 if np.isfinite(bend) else 0.0) + (twist * y**3 if np.isfinite(twist) else 0.0)
+        return (
+            y + wave + (bend * y**2 if np.isfinite(bend) else 0.0) + (twist * y * y * y if np.isfinite(twist) else 0.0)
+        )
 
     def is_within(self, p, y, step):
         error = self.measure(p, None, y) - y

@@ -23,6 +23,7 @@ from ers_mj.solvers.levenberg_marquardt import Damping, Descent, Step
 LONGEST = 1.0  # step in any of the transformed numbers
 TRIES, TRIES_ON_UPDATES = 6, 2  # dampings along fresh slopes, and along updated ones
 DENSE = 3e-3  # [s] between the samples that tell C's curvature: its slope is told by all of them
+MOST = 15e6  # [us] of simulation that a search may take for each minute of recordings, or one that has less
 RUNAWAY = 1e6  # [sigma] that a run leaves which ran away, so that one descent may find a motion
 
 
@@ -140,13 +141,17 @@ def descended(
     by_tangents: bool = True,
 ) -> tuple[Fit, Run]:
     """The fit where a step along fresh slopes gains less than the ``tolerance``, or after so many ``steps``, and its
-    run; ``slopes`` are left as they are there.
+    run; ``slopes`` are left as they are there. It ends at what a search may simulate as well, which is said there.
     """
+    above = run.model.effort
+    run = replace(run, model=in_a_search(run.model, traces))
     objective = Objective(run.model, traces, rate, tau)
     descent = Descent(objective, objective.begun(run), Damping(), slopes.last)
     renewal = _Renewal(run, traces, rate, slopes, by_tangents)
     for _ in range(steps):
         if descent.slopes is None and not renewal.renew(descent):
+            break
+        if is_spent(run.model):
             break
         step = descent.advance(TRIES if descent.fresh else TRIES_ON_UPDATES)
         if step is not None and step.gain >= tolerance:
@@ -155,4 +160,19 @@ def descended(
             break
         renewal.rest(step, descent)
     slopes.last, end = descent.slopes, descent.point
-    return Fit(end.run.model, end.cost, end.misfit, descent.curvature), end.run
+    there = replace(end.run, model=replace(end.run.model, effort=above))
+    return Fit(there.model, end.cost, end.misfit, descent.curvature), there
+
+
+def in_a_search(model: Model, traces: Sequence[Trace]) -> Model:
+    """The model with what one search on these recordings may simulate of it."""
+    minutes = sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / 60.0
+    return model.with_effort(MOST * max(1.0, minutes))
+
+
+def is_spent(model: Model) -> bool:
+    """Whether a search with this model has simulated what it may, which is said where it is told."""
+    if model.effort is None or not model.effort.is_spent:
+        return False
+    model.effort.cut()
+    return True

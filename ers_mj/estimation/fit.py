@@ -15,11 +15,12 @@ import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.decisions import explained
-from ers_mj.estimation.descent import Slopes, descended
+from ers_mj.estimation.descent import Slopes, descended, in_a_search, is_spent
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.jacobian import jacobian_of
 from ers_mj.estimation.objective import Fit, begun, residuals
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
+from ers_mj.solvers.successive_halving import Stage, halved
 
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
 LEAST_STEP = 0.01  # gain in C of one step below which a fit ends
@@ -59,7 +60,7 @@ def fit(
     lowers it to the one that was asked for. (Their plain mean asks more of a search that begins near the data: one bad
     block would send it back to the sum of squares.) The cost is that at ``tau``, wherever the search ends.
     """
-    run = begun(model, traces, rate)
+    run = begun(in_a_search(model, traces), traces, rate)
     slopes = Slopes(along.renewals, jacobian_of(run, traces, rate, along.known) if along.known is not None else None)
     now, blocks = math.inf, Blocks.of(traces)
     while True:
@@ -70,10 +71,10 @@ def fit(
         last = now <= 1.5 * tau
         at, least = (tau, tolerance) if last else (now, 0.3)
         found, run = descended(run, traces, rate, at, steps, least, slopes, along.by_tangents)
-        if last:
-            return found
-        if ceiling is not None and explained.cost(found.misfit, now) > _hopeless(ceiling, now):
-            return replace(found, cost=explained.cost(found.misfit, tau))
+        is_hopeless = ceiling is not None and explained.cost(found.misfit, now) > _hopeless(ceiling, now)
+        if last or is_hopeless or is_spent(found.model):
+            there = replace(found.model, effort=model.effort)
+            return replace(found, model=there, cost=found.cost if last else explained.cost(found.misfit, tau))
 
 
 def _hopeless(ceiling: np.ndarray, tau: float) -> float:
@@ -101,14 +102,18 @@ def converged(found: Fit, rival: Fit, traces: Sequence[Trace], tau: float) -> Fi
 @dataclass(frozen=True)
 class Hops:
     """How a fit hops: ``most`` times, along its ``soft`` directions of least curvature, as far as its own curvature
-    prices at ``price`` of C, and no further than ``far`` in the transformed parameters; again where one has won
-    ``gain`` of C; not where it leaves less than ``quiet`` of C per block.
+    prices at ``price`` of C, and no further than ``far`` in the transformed parameters; after ``glance`` steps along
+    ``renewals`` Jacobians the best ``kept`` go on; again where one has won ``gain`` of C; not where it leaves less than
+    ``quiet`` of C per block.
     """
 
     most: int = 3
     soft: int = 3
     price: float = 30.0
     far: float = 0.3
+    glance: int = 5
+    renewals: int = 2
+    kept: int = 2
     gain: float = 0.3
     quiet: float = 0.02
 
@@ -123,15 +128,21 @@ def hopped(
     from its floor: beyond it the model itself is wrong, and where it is quiet nothing is left to win.
     """
 
-    def land(start):
-        there = with_starts(start, traces) if restart else traces
-        return descend(start, there, OBSERVER_RATE, tau, 12, 0.03), there
+    def land(start: Model) -> tuple[Fit, Sequence[Trace]]:
+        there, slopes = with_starts(start, traces) if restart else traces, Slopes(hops.renewals)
+        run = begun(start, there, OBSERVER_RATE)
+        return descended(run, there, OBSERVER_RATE, tau, hops.glance, 0.03, slopes)[0], there
 
+    def go_on(landed: tuple[Fit, Sequence[Trace]]) -> tuple[Fit, Sequence[Trace]]:
+        found, there = landed
+        return descend(found.model, there, OBSERVER_RATE, tau, 12, 0.03), there
+
+    stages = [Stage(land, lambda ends: sorted(ends, key=lambda end: end[0].cost)[: hops.kept]), Stage(go_on)]
     for _ in range(hops.most):
         if not explained.is_near_noise(found.misfit) or _per_block(found, tau) < hops.quiet:
             break
         with ThreadPoolExecutor(jobs) as pool:
-            ends = list(pool.map(land, _landings(found, hops)))
+            ends = halved(_landings(found, hops), stages, lambda *work: list(pool.map(*work)))
         best, there = min(ends, key=lambda end: end[0].cost)
         if not best.cost < found.cost - hops.gain:
             break
@@ -158,13 +169,16 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
     """The fit carried on in free run by plain least squares, where model error and not noise decides.
 
     The free run has more than one valley, so it is reached directly and by way of slower observers; the lower one
-    counts.
+    counts. All of it together may simulate as much as one search.
     """
     if not explained.is_model_error(found.misfit):
         return found
-    ends = []
+    ends: list[tuple[float, Model]] = []
+    begun = in_a_search(found.model, traces)
     for rates in ((0.0,), (1.0, 0.0), (2.0, 0.5, 0.0)):
-        model = found.model
+        model = begun
+        if ends and is_spent(model):
+            break
         for rate in rates:
             level = float(np.mean(Blocks.of(traces).misfit(residuals(model, traces, rate))))
             if np.isfinite(level):
@@ -172,4 +186,5 @@ def polished(found: Fit, traces: Sequence[Trace]) -> Fit:
                 model = best.model
         ends.append((float(np.sum(residuals(model, traces, 0.0) ** 2)), model))
     ends = [e for e in ends if np.isfinite(e[0])]
-    return replace(found, model=min(ends, key=lambda e: e[0])[1]) if ends else found
+    lowest = min(ends, key=lambda e: e[0], default=None)
+    return replace(found, model=replace(lowest[1], effort=found.model.effort)) if lowest else found

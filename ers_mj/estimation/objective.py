@@ -67,9 +67,9 @@ def _run_in(model: Model, trace: Trace, record: int, rate: float) -> tuple[np.nd
     key = (*plant.told, rate, model.offset(record), model.values.get("ampere"), model.dead_time)
     kept = trace.runs.get(key)
     if kept is not None:
-        plant.count_outputs(trace.t, rate > 0)
-        return kept
-    (theta, *others), motion = model.observed(trace, record, rate)
+        plant.count_outputs(trace.t, rate > 0, int(kept[2][0]))
+        return kept[0], kept[1]
+    (theta, *others), motion, beyond = model.observed(trace, record, rate)
     left = np.empty((1 + len(others), trace.t.size))
     left[0] = trace.weighed(theta)
     for channel, seen, row in zip(trace.channels, others, left[1:]):
@@ -81,7 +81,7 @@ def _run_in(model: Model, trace: Trace, record: int, rate: float) -> tuple[np.nd
     flat = left.ravel()
     flat[trace.unseen] = 0.0
     flat.flags.writeable = False
-    trace.runs.keep(key, (flat, motion))
+    trace.runs.keep(key, (flat, motion, np.array([beyond])))
     return flat, motion
 
 

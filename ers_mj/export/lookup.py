@@ -64,8 +64,8 @@ class Curves:
     def carried(self) -> Portable:
         """The model without what no curve carries."""
         q = {
-            "I": 0.0, "lag": 0.0, "band": 0.0, "lost": 0.0, "least": 0.0, "most": math.inf, "dead_time": 0.0,
-            "R": math.inf,
+            "I": 0.0, "lag": 0.0, "band": 0.0, "lost": 0.0, "idle": 0.0, "least": 0.0, "most": math.inf,
+            "dead_time": 0.0, "R": math.inf,
         }  # fmt: skip
         one = {"parted": 0.0, "rho": 0.0, "beta": 0.0, "phi": 0.0, "gap": 0.0, "k_bristle": 0.0, "at_motor": 0.0}
         off = {

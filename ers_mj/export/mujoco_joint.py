@@ -102,7 +102,7 @@ class OwnJoint:
             "c_1": 0.0, "fall": 0.0, "k_bristle": 0.0, "parted": 0.0, "rho": 0.0, "beta": 0.0, "phi": 0.0, "gap": 0.0,
             "c_2_plus": level, "c_2_minus": level, "a_mech_plus": damping, "a_mech_minus": damping,
             "bias": pushed(c) if c.a_1 > 0 else 0.0, "tau_e": c.tau_e if self.lines.kind == "dcmotor" else 0.0,
-            "I": 0.0, "lag": 0.0, "R": math.inf, "band": 0.0, "lost": 0.0, "least": 0.0, "most": math.inf,
+            "I": 0.0, "lag": 0.0, "R": math.inf, "band": 0.0, "lost": 0.0, "idle": 0.0, "least": 0.0, "most": math.inf,
             "dead_time": 0.0,
             "at_motor": 0.0, "log_at_motor": 0.0, "buried": 1.0,
         }  # fmt: skip

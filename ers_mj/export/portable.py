@@ -29,7 +29,8 @@ STATE = (
     "t", "theta", "w", "j", "theta_m", "w_m", "z", "xi", "slow", "r", "drive", "carried", "sensed", "before", "count",
 )  # fmt: skip
 WITHIN = (  # a step, not from one to the next
-    "asked", "e", "ahead", "fresh", "late", "force", "brake", "push", "damp", "wall", "d_wall", "touch", "d_touch",
+    "asked", "e", "ahead", "whole", "fresh", "late", "force", "brake", "push", "damp", "wall", "d_wall", "touch",
+    "d_touch",
 )  # fmt: skip
 ARGUMENTS = {
     "torque": "theta, w, j, t",

@@ -104,7 +104,7 @@ def _linear_losses(servo: Servo) -> list[str]:
     c, q = servo.lowered, servo.loop
     dry = c.c_2_plus + c.c_2_minus > 0 or c.c_1 > 0
     late = c.delay > 0 or q is not None and q.tau + q.dead_time > 0
-    limits = q is not None and bool(np.isfinite([q.L, q.R, q.most]).any() or q.band > 0 or q.least > 0)
+    limits = q is not None and bool(np.isfinite([q.L, q.R, q.most]).any() or q.band > 0 or q.least > 0 or q.idle > 0)
     found = {
         "dry friction and preload, constant while it slips, are not in it": dry,
         f"a dead time is Pade's approximation of order {PADE}": late,

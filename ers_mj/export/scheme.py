@@ -182,6 +182,7 @@ def command_loop(c, x):
     if c.lag > 0.0:
         lag_behind(c, x)
         x.ahead -= c.D * x.slow
+    x.whole = x.ahead
     back = c.dead_time / c.h
     x.fresh = max(1.0 - back, 0.0)
     x.late = 0.0
@@ -213,6 +214,11 @@ def ask(c, x, v):
 def asked_of(c, x, w_before, w):
     """What the firmware asks for at the mean of two speeds."""
     return x.ahead - 0.5 * own_damping(c) * (w_before + w)
+
+
+def bridge(c, x, w_before, w):
+    """Take off what the firmware asks for what the bridge loses of it, at the mean of two speeds."""
+    x.ahead = x.whole - limited(x.whole - 0.5 * own_damping(c) * (w_before + w), c.idle)
 
 
 def integrate(c, x, v):
@@ -250,8 +256,15 @@ def turn_one(c, x):
 
 def settle_one(c, x):
     """One body: within the limits of its firmware, and not pulled by a stop."""
+    if c.looped > 0.0 and c.idle > 0.0:
+        bridge(c, x, x.w, x.w)
+        x.force = x.fresh * x.ahead + x.late
     w = turn_one(c, x)
     v = 0.0
+    if c.looped > 0.0 and c.idle > 0.0:
+        bridge(c, x, x.w, w)
+        x.force = x.fresh * x.ahead + x.late
+        w = turn_one(c, x)
     if c.looped > 0.0:
         v = asked_of(c, x, x.w, w)
         if abs(v) > c.L:
@@ -313,11 +326,15 @@ def settle_two(c, x):
     push = x.push + x.wall + x.touch
     level = 0.0 if c.k_bristle > 0.0 else (1.0 - c.phi) * friction(c, x, x.theta, x.w, push)
     damp = (1.0 - c.beta) * x.damp + x.d_wall if c.k_bristle <= 0.0 else x.damp + x.d_wall
+    if c.looped > 0.0:
+        seen = x.w_m if c.at_motor > 0.0 else x.w
+        bridge(c, x, seen, seen)
     k = 0
     while k < 3:
         drag = 0.5 * x.d_touch * (x.w_m + w_m)
         w = cornered(c, 1.0 - c.rho, push + drag, damp + x.d_touch, level, x.w, x.theta - c.theta_0)
         if c.looped > 0.0 and c.at_motor <= 0.0:
+            bridge(c, x, x.w, w)
             v = asked_of(c, x, x.w, w)
             ask(c, x, v)
         elif c.looped > 0.0:
@@ -325,6 +342,7 @@ def settle_two(c, x):
             x.brake = x.fresh * own_damping(c) + c.a_emf
         w_m = turn_motor(c, x, w, level_m)
         if c.looped > 0.0 and c.at_motor > 0.0:
+            bridge(c, x, x.w_m, w_m)
             v = asked_of(c, x, x.w_m, w_m)
             if abs(v) > c.L:
                 ask(c, x, v)

@@ -331,12 +331,14 @@ def _calm(t, u, enable, load, c, cuts, e, k, last, x, m, slips, out):
     return slips_on(t, u, enable, load, c, cuts, e, k, last, x, m, slips, out)
 
 
-@unit(types.void(READ, READ, READ_BOOL, READ, READ, F, N, C, N, VECTOR, CUTS, OF_A_SAMPLE, L, TABLE))
+@unit(N(READ, READ, READ_BOOL, READ, READ, F, N, C, N, VECTOR, CUTS, OF_A_SAMPLE, L, TABLE))
 def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps, out):
-    """See ``simulate``: through the samples, by maps over segments or, if it ``leaps``, over a whole sample."""
+    """See ``simulate``: through the samples, by maps over segments or, if it ``leaps``, over a whole sample; how many
+    events there were.
+    """
     n, plain, slips = t.size, is_plain(c, cuts), never_sticks(c)
     h_max, corner = longest_step(c, cuts, refine), corner_speed(c, cuts, refine)
-    budget = _event_budget(c, n, cuts)
+    most = budget = _event_budget(c, n, cuts)
     resting = -1  # the sample that begins in a rest which was checked already
     extra = np.nan  # what the laws add where a segment ended that holds no event
     x = start_state(c, x0[0], x0[1], x0[2], 0.5 * (c.c_2_plus + c.c_2_minus))
@@ -361,14 +363,16 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
             budget -= events
             if not is_bounded(x) or budget < 0:
                 out[k + 1 :, :] = np.nan
-                return
+                return most - budget
         k += 1
         written(out, k, c, x)
+    return most - budget
 
 
-@kernel(types.void(READ, READ, READ_BOOL, READ, READ, F, N, VECTOR, N, VECTOR, TABLE))
+@kernel(N(READ, READ, READ_BOOL, READ, READ, F, N, VECTOR, N, VECTOR, TABLE))
 def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
-    """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts.
+    """Fill out (N, 4) with (theta, w, j, theta_m) at the sample times, taken just before u[k] acts; how many events
+    there were.
 
     ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free
     run. ``y`` may hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an
@@ -383,4 +387,4 @@ def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
     leaps = leaps and cuts.ends.size > 1 and cuts.fresh[0] == 1
     leaps = leaps and (c.lawful == 0 or refine * h0 <= law_step(c, c.a_emf))
     whole = no_maps() if leaps else late
-    _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, Maps(late, early, whole), leaps, out)
+    return _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, Maps(late, early, whole), leaps, out)

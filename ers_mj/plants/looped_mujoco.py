@@ -21,7 +21,7 @@ def firmware_alone(q: LoopNumbers) -> tuple[str, ...]:
         "integral action": q.I > 0.0,
         "the lag of the speed that the firmware damps": q.lag > 0.0,
         "the limit of the reference's speed": math.isfinite(q.R),
-        "the dead band": q.band > 0.0 or q.least > 0.0,
+        "the dead band": q.band > 0.0 or q.least > 0.0 or q.idle > 0.0,
         "the limit of the motor's torque": math.isfinite(q.most),
     }
     return tuple(name for name, is_so in found.items() if is_so)
@@ -130,6 +130,7 @@ class _Firmware:
             size = max(size, q.least / q.K)
         self.slow = w + (self.slow - w) * math.exp(-h / q.lag) if q.lag > 0.0 else w
         v = q.K * math.copysign(size, e) + self.xi - q.D * self.slow
+        v -= min(max(v, -q.idle), q.idle)
         if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
             self.xi = min(max(self.xi + h * q.I * e, -q.L), q.L)
         return min(max(v, -q.L), q.L)

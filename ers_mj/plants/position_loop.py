@@ -2,7 +2,7 @@
 
     r_R   the reference tau late, its speed within +-R
     v     = K e + xi - D s,  e = r_R - theta (of the body that the loop's sensor sees),  xi' = I e,  lag s' = w - s
-    drive = v within +-L, ``dead_time`` late, its current within +-most
+    drive = v less what of it lies within +-idle, within +-L, ``dead_time`` late, its current within +-most
     theta'' = drive - a_emf w + Eq. (6)'s forces and the laws of effects, friction set-valued
 
 Fixed steps of second order (leapfrog, dampers by the trapezium), friction and limits solved for with the speed at the
@@ -18,9 +18,23 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from ers_mj.plants.bristle import bent, bristle_damping
 from ers_mj.plants.compiled import inline, kernel, record_in, unit
 from ers_mj.plants.laws import friction_level, remember, total_torque
-from ers_mj.plants.state import READ, READ_BOOL, RUNAWAY, TABLE, VECTOR, C, F, N, plant_in, types
+from ers_mj.plants.state import (
+    READ,
+    READ_BOOL,
+    RUNAWAY,
+    TABLE,
+    VECTOR,
+    C,
+    F,
+    N,
+    has_bristle,
+    is_parted,
+    plant_in,
+    types,
+)
 
 LONGEST = 1e-3  # [s] of a step
 STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
@@ -33,7 +47,8 @@ class LoopNumbers(NamedTuple):
     K [1/s^2], D [1/s] and I [1/s^3] of the loop, ``lag`` [s] of the speed that D multiplies, the loop's limit L
     [output unit/s^2], latency tau [s] of the reference, dead time [s] of the drive, R the limit of the reference's
     speed; ``band`` the error [output unit] within which the drive sleeps and ``lost`` what is still missing outside
-    it; ``least`` the smallest drive outside the band; ``most`` the largest motor torque; ``creep`` [1/s] the speed's
+    it; ``idle`` [output unit/s^2] the drive that the bridge ignores, and loses of more; ``least`` the smallest drive
+    outside the band; ``most`` the largest motor torque; ``creep`` [1/s] the speed's
     factor below breakaway (infinite: friction holds) and ``heavy`` how much slower the body answers there (MuJoCo's
     constraint: 10), as ``buried`` within a stop (20); ``share`` the motor's of the inertia, behind which a gear rubs;
     ``grease`` [1/s] what drags the load along within a play; ``at_motor`` 1 where the loop's sensor sits on the
@@ -50,6 +65,7 @@ class LoopNumbers(NamedTuple):
     R: float = np.inf
     band: float = 0.0
     lost: float = 0.0
+    idle: float = 0.0
     least: float = 0.0
     most: float = np.inf
     creep: float = np.inf
@@ -68,7 +84,7 @@ Q = numba.from_dtype(LOOP)
 
 class Moving(NamedTuple):
     """Angle and speed of the load and of the motor's side, the loop's integral, the speed that it has, the limited
-    reference, the drive, the torque that the gear carried last.
+    reference, the drive, the torque that the gear carried last, the bend of a bristle that carries friction.
     """
 
     theta: float
@@ -80,9 +96,10 @@ class Moving(NamedTuple):
     r: float
     drive: float
     carried: float
+    z: float
 
 
-M9 = types.NamedUniTuple(F, 9, Moving)
+M10 = types.NamedUniTuple(F, 10, Moving)
 PAIR = types.UniTuple(F, 2)
 
 
@@ -173,7 +190,13 @@ def _damped(q, slow, w, h):
     return q.D, w
 
 
-@unit(M9(C, Q, F, M9, F, F, F, F))
+@inline
+def _ignored(q, v):
+    """What the bridge loses of a drive v."""
+    return min(max(v, -q.idle), q.idle)
+
+
+@unit(M10(C, Q, F, M10, F, F, F, F))
 def _one_body(c, q, t, x, r, fresh, late, h):
     """The state h later under the mean reference r, where of the drive the share ``fresh`` is the present one and the
     rest ``late``.
@@ -186,10 +209,17 @@ def _one_body(c, q, t, x, r, fresh, late, h):
     wall, d_wall = _wall(c, theta)
     a = (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     level = _level(c, theta, x.w, x.carried)
+    firm, z = max(level, 0.1 * (c.c_2_plus + c.c_2_minus)), x.z
     D, slow = _damped(q, x.slow, x.w, h)
-    push, ahead = hold + wall, q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
+    push, asked = hold + wall, q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
+    ahead = asked - _ignored(q, asked - D * x.w)
     mass = q.buried if wall != 0.0 else 1.0
+    if has_bristle(c):
+        push, a, level = push - c.k_bristle * z, a + bristle_damping(c, x.w, z, firm), 0.0
     w = _slipped(mass, push + fresh * ahead + late, a + fresh * D + c.a_emf, level, q.creep, q.heavy, x.w, h)
+    if q.idle > 0.0:
+        ahead = asked - _ignored(q, asked - 0.5 * D * (x.w + w))
+        w = _slipped(mass, push + fresh * ahead + late, a + fresh * D + c.a_emf, level, q.creep, q.heavy, x.w, h)
     v = ahead - 0.5 * D * (x.w + w)
     if abs(v) > q.L:
         drive = fresh * math.copysign(q.L, v) + late
@@ -207,10 +237,11 @@ def _one_body(c, q, t, x, r, fresh, late, h):
         xi = _limited(q, xi + h * q.I * e)
     carried = (1.0 - q.share) * (w - x.w) / h - push
     theta += 0.5 * h * w
-    return Moving(theta, w, theta, w, xi, _damped(q, slow, w, h)[1], x.r, _limited(q, v), carried)
+    z = bent(c, z, w, firm, h) if has_bristle(c) else z
+    return Moving(theta, w, theta, w, xi, _damped(q, slow, w, h)[1], x.r, _limited(q, v), carried, z)
 
 
-@unit(M9(C, Q, F, M9, F, F, F, F))
+@unit(M10(C, Q, F, M10, F, F, F, F))
 def _two_bodies(c, q, t, x, r, fresh, late, h):
     """As ``_one_body``, of a motor and a load with a play or a shaft between them."""
     theta, theta_m = x.theta + 0.5 * h * x.w, x.theta_m + 0.5 * h * x.w_m
@@ -230,9 +261,10 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
     a_m = c.beta * (c.a_mech_plus if x.w_m > 0.0 else c.a_mech_minus) + c.a_emf
     level, level_m = _level(c, theta, x.w, x.drive), _level(c, theta, x.w_m, x.drive)
     D, slow = _damped(q, x.slow, seen, h)
-    ahead = q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
+    asked = q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
     w, w_m = x.w, x.w_m
-    v = ahead - D * seen
+    v = asked - D * seen
+    ahead = asked - _ignored(q, v)
     for _ in range(3):
         w = _slipped(
             1.0 - c.rho,
@@ -256,9 +288,11 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
                 x.w_m,
                 h,
             )
-            v = ahead - 0.5 * D * (x.w_m + w_m)
+            v = asked - 0.5 * D * (x.w_m + w_m)
         else:
-            v = ahead - 0.5 * D * (x.w + w)
+            v = asked - 0.5 * D * (x.w + w)
+        lost = _ignored(q, v)
+        ahead, v = asked - lost, v - lost
         if q.at_motor == 0.0 or abs(v) > q.L:
             w_m = _slipped(
                 c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, q.heavy, x.w_m, h
@@ -268,13 +302,13 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
         xi = _limited(q, xi + h * q.I * e)
     slow = _damped(q, slow, w_m if q.at_motor > 0.0 else w, h)[1]
     theta, theta_m = theta + 0.5 * h * w, theta_m + 0.5 * h * w_m
-    return Moving(theta, w, theta_m, w_m, xi, slow, x.r, _limited(q, v), touch)
+    return Moving(theta, w, theta_m, w_m, xi, slow, x.r, _limited(q, v), touch, x.z)
 
 
 @inline
 def _step_length(c):
     """[s] of a step at most."""
-    stiffest = max(c.k_stop, c.k_twist / max(min(c.rho, 1.0 - c.rho), 1e-3) if c.two_body > 0 else 0.0)
+    stiffest = max(c.k_stop, c.k_twist / max(min(c.rho, 1.0 - c.rho), 1e-3) if is_parted(c) else c.k_bristle)
     return min(LONGEST, STIFF / math.sqrt(stiffest)) if stiffest > 0.0 else LONGEST
 
 
@@ -300,7 +334,7 @@ def _started(c, q, theta, w, r):
         hold += total_torque(c, theta, 0.0, 0.0, 0.0)
     v = q.K * (r - theta)
     xi = _limited(q, -hold) - v if q.I > 0.0 else 0.0
-    return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0)
+    return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0, 0.0)
 
 
 @kernel(types.void(READ, READ, READ_BOOL, VECTOR, VECTOR, F, F, F, N, TABLE))
@@ -328,8 +362,8 @@ def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
             now = x.r + min(max(asked - x.r, -q.R * h), q.R * h)
             mean = 0.5 * (x.r + now) if q.R < np.inf else asked
             fresh, late = _late_drive(q, past, step, h) if enable[i] else (0.0, 0.0)
-            x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, x.slow, now, x.drive, x.carried)
-            if c.two_body > 0:
+            x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, x.slow, now, x.drive, x.carried, x.z)
+            if is_parted(c):
                 x = _two_bodies(c, q, at, x, mean, fresh, late, h)
             else:
                 x = _one_body(c, q, at, x, mean, fresh, late, h)

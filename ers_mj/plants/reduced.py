@@ -17,6 +17,7 @@ from ers_mj.plants.laws import Acting, acting, laid_out
 from ers_mj.plants.state import N_CONSTANTS
 from ers_mj.plants.tangents import NUDGE, prepare, tangent
 
+EVENT = 1.1  # [us] that an event takes
 PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = (
     150,
     400,
@@ -168,16 +169,19 @@ class ReducedModel:
             u = BY_NAME[name].command(values, u)
         return np.ascontiguousarray(u, float)
 
-    def _run(self, t: np.ndarray, u: np.ndarray, start, held: Held, refine: int) -> np.ndarray:
+    def _run(self, t: np.ndarray, u: np.ndarray, start, held: Held, refine: int) -> tuple[np.ndarray, int]:
+        """The motion (N, 4), and what its events take beyond what a run of this plant usually does [us]."""
         out = np.empty((t.size, 4))
         enable, load, y = held.beside(t)
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
-        self._count(t, self._price)
         x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
-        run = fixed_steps.simulate if self.bends and self.has_motor_side else event_integrator.simulate
+        by_steps = self.bends and self.has_motor_side
+        run = fixed_steps.simulate if by_steps else event_integrator.simulate
         plant = self._laid_out.copy()
-        run(t, self.terminal(u), enable, load, y, held.gain, held.every, plant, refine, x0, out)
-        return out
+        events = run(t, self.terminal(u), enable, load, y, held.gain, held.every, plant, refine, x0, out)
+        beyond = 0 if by_steps else max(0, int(EVENT * events - self._price * (t[-1] - t[0])))
+        self._count(t, self._price, beyond)
+        return out, beyond
 
     def theta(self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1) -> np.ndarray:
         """What the sensor reads (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see
@@ -193,14 +197,20 @@ class ReducedModel:
         self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1
     ) -> tuple[np.ndarray, np.ndarray]:
         """As ``theta``, with the motion (N, 4) beside it: theta, omega, drive acceleration and motor side's angle."""
+        return self.priced(t, u, start, enable=enable, load=load, y=y, gain=gain, every=every)[:2]
+
+    def priced(
+        self, t, u, start, *, enable=None, load=None, y=None, gain=0.0, every=1
+    ) -> tuple[np.ndarray, np.ndarray, int]:
+        """As ``outputs``, and what the events took beyond the usual [us]."""
         followed = self.behind(y) if gain > 0 and self._is_instant else y
-        motion = self._run(t, u, start, Held(enable, load, followed, gain, every), 1)
+        motion, beyond = self._run(t, u, start, Held(enable, load, followed, gain, every), 1)
         read = self.read(t, motion[:, 0])
         if gain > 0 and not self._is_instant:
             followed = y - (read - motion[:, 0])
-            motion = self._run(t, u, start, Held(enable, load, followed, gain, every), 1)
-            read = self.read(t, motion[:, 0])
-        return read, motion
+            motion, more = self._run(t, u, start, Held(enable, load, followed, gain, every), 1)
+            read, beyond = self.read(t, motion[:, 0]), beyond + more
+        return read, motion, beyond
 
     def current(self, t: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """n K_t i / J (N,) of the winding's current along a motion (N, 4): what effects take from the drive
@@ -296,14 +306,15 @@ class ReducedModel:
             return FIXED_STEPS
         return TWO_BODIES if self.coupled else LAW if self._lowered[1].pushes else PLAIN
 
-    def count_outputs(self, t: np.ndarray, followed: bool) -> None:
-        """Count what ``outputs`` along t (N,) would have simulated, as an observer where ``followed``."""
-        for _ in range(2 if followed and not self._is_instant else 1):
+    def count_outputs(self, t: np.ndarray, followed: bool, beyond: int) -> None:
+        """Count what ``priced`` along t (N,) would have simulated, as an observer where ``followed``."""
+        self._count(t, self._price, beyond)
+        if followed and not self._is_instant:
             self._count(t, self._price)
 
-    def _count(self, t: np.ndarray, per_second: int) -> None:
+    def _count(self, t: np.ndarray, per_second: int, beyond: int = 0) -> None:
         if self.effort is not None:
-            self.effort.add(t, per_second)
+            self.effort.add(t, per_second, beyond)
 
     def _moved_input(
         self, t: np.ndarray, u: np.ndarray, arriving: np.ndarray, other: ReducedModel, scale: float
@@ -347,5 +358,5 @@ class ReducedModel:
     def simulate(self, t, u, start=None, *, enable=None, load=None, refine=1) -> Motion:
         """Free run from ``start`` (at rest at theta_0 by default) under u (N,), held between samples."""
         t, start = np.ascontiguousarray(t, float), (self.coefficients.theta_0, 0.0) if start is None else start
-        out = self._run(t, u, start, Held(enable, load), refine)
+        out, _ = self._run(t, u, start, Held(enable, load), refine)
         return Motion(t, out[:, 0], out[:, 1], out[:, 2], out[:, 3], self.read(t, out[:, 0]))

@@ -27,6 +27,7 @@ class Search:
     bouncing: float = 5e-3  # and that of two bodies that bounce
     enough: float = 1e-4  # share of the cost that a step must win,
     last: float = 1e-7  # and where a fit is brought to its minimum
+    untold: float = 1.0  # noise variances that a step of one must change, else no data tell where to go
     soft: float = 0.03  # of the travel: errors beyond grow the cost by their size, not its square
 
 
@@ -130,7 +131,7 @@ class _Problem:
         return slopes.T @ slopes, slopes.T @ point.e
 
     def step(self, point: _Point, curvature: np.ndarray, slope: np.ndarray, damping: float) -> np.ndarray | None:
-        raised = curvature + damping * np.diag(np.maximum(np.diag(curvature), 1e-9 * curvature.max() + 1e-12))
+        raised = curvature + damping * np.diag(np.diag(curvature)) + SEARCH.untold * np.eye(slope.size)
         way = np.linalg.lstsq(raised, -slope, rcond=None)[0]
         way *= min(1.0, SEARCH.longest / max(float(np.max(np.abs(way))), 1e-12))
         promised = -(slope @ way + 0.5 * way @ curvature @ way)

@@ -41,6 +41,7 @@ LETTERS: Mapping[str, Letter] = {
     "dead_time_s": Letter("s", positive=False, upper=0.2, size=0.01),
     "R": Letter("{y}/s", math.inf, lower=1e-6),
     "band": Letter("{y}", lower=1e-9),
+    "idle": Letter("{y}/s^2", lower=1e-9),
     "least": Letter("{y}/s^2", lower=1e-9),
     "most": Letter("{y}/s^2", math.inf, lower=1e-6),
     "creep": Letter("1/s", math.inf, lower=5.0, upper=1e5),
@@ -55,7 +56,7 @@ LETTERS: Mapping[str, Letter] = {
     "hold": Letter("{y}/s^2", positive=False, lower=-math.inf, size=5.0),
     "offset": Letter("{y}", positive=False, lower=-math.inf, size=0.01),  # of the log's sensor alone
 }
-SCALED = ("K", "I", "D", "L", "least", "most", "grease", "a_1", "a_2", "c_2", "hold")  # by one over the inertia
+SCALED = ("K", "I", "D", "L", "idle", "least", "most", "grease", "a_1", "a_2", "c_2", "hold")  # by one over the inertia
 WIDER = {
     "rho": (0.05, 0.95),
     "phi": (0.0, 1.0),
@@ -210,6 +211,7 @@ class LoopModel:
             R=v["R"],
             band=v["band"],
             lost=v["band"],
+            idle=v["idle"],
             least=v["least"],
             most=v["most"],
             creep=v["creep"],

@@ -6,7 +6,8 @@ A limit or an effect is begun from a start of its own; where one changes what th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.input_delay import InputDelay
 from ers_mj.effects.load_dependent_friction import LoadDependentFriction
+from ers_mj.effects.position_dependent_friction import PositionDependentFriction
 from ers_mj.effects.presliding import Presliding
 from ers_mj.effects.quadratic_drag import QuadraticDrag
 from ers_mj.effects.rate_limit import RateLimit
@@ -33,7 +35,10 @@ from ers_mj.position_loop.runs import Run, speed_of
 INTEGRAL, DERIVATIVE, WITHIN = "integral action", "derivative action", "dead time within the loop"
 STARTING = "starting force"  # of the firmware: the least that its motor is driven with
 SPRING, CONSTANT = "spring", "constant load"  # the second may as well be an offset of the sensor: it has no name
-LAWS = (GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, EndStop, Cogging)
+LAWS = (
+    GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, PositionDependentFriction,
+    EndStop, Cogging,
+)  # fmt: skip
 
 
 OWN = {
@@ -71,7 +76,7 @@ class Sizes:
         (150.0, 1.0),
     )  # [1/s], and how heavy
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
-    bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K
+    bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K, or of c_2
     lags: tuple[float, ...] = (0.003, 0.008)  # [s] of the speed that the firmware damps
     pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
@@ -79,6 +84,8 @@ class Sizes:
     gaps: tuple[float, ...] = (0.4, 1.5)  # of the error that is left
     shares: tuple[float, ...] = (0.3,)  # of the inertia that the motor's side bears
     parted: float = 1.3  # noise levels of error from which a second body is tried
+    least: float = 0.02  # of a law's start, and
+    most: float = 3.0  # of it, to which a secant may scale it
     periods: tuple[int, ...] = (2, 4, 8, 16)  # of cogging within the travel
 
 
@@ -137,7 +144,7 @@ def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
     """
     found = [
         *_of_the_loop(model, runs),
-        Term(Presliding.name, tuple(model.fixed(heavy=y).having(creep=x) for x, y in SIZES.creeps)),
+        Term(Presliding.name, tuple(_giving(model))),
         Term(CONSTANT, (model.having(hold=0.0),)),
         Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
         *_transmissions(model, error),
@@ -156,13 +163,30 @@ def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
         Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds)),
         Term(InputDelay.name, (model.having(tau_s=0.01),)),
         Term(WITHIN, delayed_within(model)),
-        Term(DriveDeadZone.name, tuple(model.having(band=x * model["c_2"] / model["K"]) for x in SIZES.bands)),
+        Term(DriveDeadZone.name, tuple(_asleep(model))),
         Term(STARTING, tuple(model.having(least=x * model["c_2"]) for x in SIZES.pushes if model["c_2"] > 0.0)),
         Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
     ]
     if "L" in model.free:
         found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
     return found
+
+
+def _giving(model: LoopModel) -> Iterator[LoopModel]:
+    """Friction that creeps, as MuJoCo's does, and of one body one that a bristle carries."""
+    for creep, heavy in SIZES.creeps:
+        yield model.fixed(heavy=heavy).having(creep=creep)
+    if not any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+        for start in BY_NAME[Presliding.name].starts(model.scales):
+            if np.isfinite(start[0]) and not np.isfinite(start[2]):
+                yield model.with_effect(Presliding.name, start)
+
+
+def _asleep(model: LoopModel) -> Iterator[LoopModel]:
+    """The firmware that ignores small errors, and the bridge that ignores small drives."""
+    for size in SIZES.bands:
+        yield model.having(band=size * model["c_2"] / model["K"])
+        yield model.having(idle=size * model["c_2"])
 
 
 def lagging(model: LoopModel) -> tuple[LoopModel, ...]:
@@ -204,6 +228,20 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
     return [model.with_effect(name, start) for start in starts]
 
 
+def form_of(model: LoopModel, name: str) -> tuple[bool, ...]:
+    """Which of an effect's numbers a model has."""
+    return tuple(bool(x) for x in np.isfinite(dict(model.effects)[name]))
+
+
+def sized(model: LoopModel, name: str, size: float) -> LoopModel:
+    """A model with an effect of a law so many times as large, where its law has a size and that sense is its own."""
+    effect, values = BY_NAME[name], dict(model.effects)[name].copy()
+    for k in range(effect.sized):
+        if size > 0.0 or not effect.parameters[k].positive:
+            values[k] *= math.copysign(min(max(abs(size), SIZES.least), SIZES.most), size)
+    return model.with_effect(name, values)
+
+
 def stops(model: LoopModel, low: float, high: float) -> list[LoopModel]:
     """A model with stops there: springs, and MuJoCo's constraint."""
     spring = np.array([low, high, 40.0, 0.3])
@@ -215,7 +253,7 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
     """A play or a shaft, with the loop's sensor and the log's on either side; of a loop on the motor's side friction is
     partly the load's.
     """
-    if any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+    if any(BY_NAME[name].subsystem == "transmission" or name == Presliding.name for name in model.names):
         return []
     contact = min(60.0, 0.35 / model.scales.sample_time)
     play = [np.array([x * error, rho, 0.8, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]

@@ -119,7 +119,7 @@ class Search:
             (
                 "budget",
                 is_cut_short and self.last >= SEARCH.last,
-                "the search ended at its budget of simulation: this is the answer so far",
+                "a search ended at its budget of simulation: this is the answer so far",
             ),
             ("MuJoCo", not self.in_mujoco, "the held-out recordings were not run in MuJoCo"),
             ("next recording", not self.advised, "the next recording was not designed"),

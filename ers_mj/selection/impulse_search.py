@@ -24,7 +24,8 @@ class Nearing:
     It is tried from ``lead`` [s] before it begins until ``tail`` after; in ``simulations`` at most it is brought
     nearer, until all that were tried last are ``within`` so much of C. A block hides what it does to the others where
     the mean misfit is ``outweighing`` times the geometric mean. A push is ``idle`` that changes so much of C, and so
-    often the way from it to the next, that throws the rudder, is halved (``halvings``).
+    often the way from it to the next, that throws the rudder, is halved (``halvings``). Brought nearer it gains
+    ``further`` times as much at most, about.
     """
 
     lead: float = 0.1
@@ -34,6 +35,7 @@ class Nearing:
     outweighing: float = 5.0
     idle: float = 0.1
     halvings: int = 6
+    further: float = 3.0
 
 
 NEARING = Nearing()
@@ -41,11 +43,18 @@ Gain = Callable[[np.ndarray], float]
 
 
 def impulses(
-    run: Run, effect: Effect, starts: Sequence[np.ndarray], power: float, traces: Sequence[Trace], tau: float
+    run: Run,
+    effect: Effect,
+    starts: Sequence[np.ndarray],
+    power: float,
+    traces: Sequence[Trace],
+    tau: float,
+    least: float = 0.0,
 ) -> list[tuple[float, Model]]:
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all
     for a small one, so that no secant may be scaled. The best starts of different side, length or recording, brought
-    nearer, with what they gain in C as a share of the residual's ``power``.
+    nearer where they may gain the ``least`` share that matters, with what they gain in C as a share of the residual's
+    ``power``.
 
     They are compared and brought nearer at a tau that the recording's part around them gives (see fit): at the last one
     C has a local minimum wherever one block is met. Where one block is so bad that it outweighs all others they are
@@ -54,7 +63,7 @@ def impulses(
     impulse bends to when one of them was passed.
     """
     place, near = run.model, Surroundings(run, traces, tau)
-    search = _Pushes(effect, near)
+    search = _Pushes(effect, near, 0.5 * least * power)
     tried: dict[tuple, list[tuple[list[float], np.ndarray]]] = {}
     for start in starts:
         tried.setdefault((start[0] > 0, *start[1:]), []).append((search.gains(start), start))
@@ -66,10 +75,10 @@ def impulses(
 
 
 class _Pushes:
-    """The pushes of an effect that acts once, and what they gain."""
+    """The pushes of an effect that acts once, and what they gain; ``least`` is the gain that matters."""
 
-    def __init__(self, effect: Effect, near: Surroundings):
-        self.effect, self.near, self.place = effect, near, near.run.model
+    def __init__(self, effect: Effect, near: Surroundings, least: float = 0.0):
+        self.effect, self.near, self.place, self.least = effect, near, near.run.model, least
         self.column = [p.name for p in effect.parameters].index("record")
 
     def gains(self, start: np.ndarray) -> list[float]:
@@ -80,6 +89,10 @@ class _Pushes:
         misfit = self.near.misfit(trace, residuals_in(model, trace, k, OBSERVER_RATE))
         won = [without - cost(misfit, level) for level, without in levels]
         return won if np.all(np.isfinite(won)) else [-math.inf] * len(won)
+
+    def may_matter(self, start: np.ndarray) -> bool:
+        """Whether a push may gain what matters when it is brought nearer."""
+        return NEARING.further * max(self.gains(start)[0], 0.0) >= self.least
 
     def is_outweighed(self, start: np.ndarray) -> bool:
         return self.near.is_outweighed(start[self.column], start[1])
@@ -96,10 +109,14 @@ class _Pushes:
                 best[kind] = max(best.get(kind, (0.0, start)), (won, start), key=lambda found: found[0])
         likely = [start for won, start in sorted(best.values(), key=lambda found: -found[0])[:most] if won > 0]
         out, scales = [], self.place.scales
-        for form in (f for start in likely for f in (start, *self.effect.grown(self.effect.name, start, scales))):
-            for level in levels:
-                form = brought_nearer(lambda p, level=level: self.gains(p)[level], self.effect, form)
-            out.append(form)
+        for start in likely:
+            if not self.may_matter(start):
+                out.append(start)
+                continue
+            for form in (start, *self.effect.grown(self.effect.name, start, scales)):
+                for level in levels:
+                    form = brought_nearer(lambda p, level=level: self.gains(p)[level], self.effect, form)
+                out.append(form)
         return out
 
 

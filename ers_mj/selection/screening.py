@@ -150,9 +150,9 @@ class _Screening:
 
     def _struck(self, view: View, effect: Effect) -> list[tuple[float, Model]]:
         """What impulses gain, where all that is left around a place is enough for one to be refitted."""
-        spans = hot_spans(view.run, self.bench, self.bench.search.promising * self._second())
-        starts = effect.starts(replace(view.place.scales, hot=spans))
-        found = impulses(view.run, effect, starts, view.targets[0].power, self.bench.traces, self.bench.tau)
+        least = self.bench.search.promising * self._second()
+        starts = effect.starts(replace(view.place.scales, hot=hot_spans(view.run, self.bench, least)))
+        found = impulses(view.run, effect, starts, view.targets[0].power, self.bench.traces, self.bench.tau, least)
         return sorted(found, key=lambda p: -p[0])
 
     def _found(

@@ -182,6 +182,10 @@ class Model:
         neutral = np.zeros(records) if state == "offset" else np.ones(records)
         return replace(self, states={**(self.states or {}), state: neutral})
 
+    def with_effort(self, most: float) -> Model:
+        """The model whose simulations are a part of this one's, which may take ``most`` [us]."""
+        return replace(self, effort=Effort(self.effort, most))
+
     @property
     def dead_time(self) -> float:
         """By how much the command reaches the motor late [s]."""
@@ -259,13 +263,13 @@ class Model:
         plant, run = self.staged(trace, record, rate, start)
         return plant.theta(trace.t, trace.u, **run) + self.offset(record)
 
-    def observed(self, trace: Trace, record: int, rate: float) -> tuple[list[np.ndarray], np.ndarray]:
+    def observed(self, trace: Trace, record: int, rate: float) -> tuple[list[np.ndarray], np.ndarray, int]:
         """What ``predict`` gives, and behind it what each further channel of the recording would show, (N,) each; the
-        motion (N, 4).
+        motion (N, 4); what its events took beyond the usual [us].
         """
         plant, run = self.staged(trace, record, rate, None)
-        theta, motion = plant.outputs(trace.t, trace.u, **run)
-        return [theta + self.offset(record), *self.shown(trace, plant, motion)], motion
+        theta, motion, beyond = plant.priced(trace.t, trace.u, **run)
+        return [theta + self.offset(record), *self.shown(trace, plant, motion)], motion, beyond
 
     def shown(self, trace: Trace, plant: ReducedModel, motion: np.ndarray) -> list[np.ndarray]:
         """What each further channel of a recording would show (N,) along a motion (N, 4)."""
