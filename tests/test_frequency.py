@@ -25,7 +25,8 @@ from ers_mj.control.frequency.linear import at, coefficients, linearised
 from ers_mj.control.frequency.loop import ask, close_loop, judged
 from ers_mj.control.trial import sampled
 from ers_mj.effects.quantities import Coefficients
-from ers_mj.servo.datasheet import read_datasheet, write_model
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.servo.model_file import write_model
 from ers_mj.servo.simulation import build_plant, parse_effect
 
 SHEET = read_datasheet("table1")

@@ -17,7 +17,8 @@ from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, runs_of
 from ers_mj.position_loop.saved import looped_plant, model_of, simulate_loop
 from ers_mj.position_loop.weak_form import rough_starts
-from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.model_file import write_model
 from ers_mj.servo.simulation import kernel_effects
 
 LIMITED = {"K": 900.0, "L": 150.0, "a_2": 20.0, "c_2": 8.0, "tau_s": 0.012}

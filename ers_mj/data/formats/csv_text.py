@@ -54,8 +54,8 @@ def load(file: File) -> Loaded:
 
 
 def _decoded(file: File) -> Text:
-    """Header and rows. Text is in UTF-8, in UTF-16 where it begins so (as spreadsheets save it), or, where it is neither
-    and holds no sign of a binary file, in Windows-1252, as many loggers write ° and µ.
+    """Header and rows. Text is in UTF-8, in UTF-16 where it begins so (as spreadsheets save it), or, where it is
+    neither and holds no sign of a binary file, in Windows-1252, as many loggers write ° and µ.
     """
     notes: tuple[str, ...] = ()
     try:
