@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from ers_mj.errors import InputError
-from ers_mj.servo.datasheet import TABLE_1, Datasheet, read_datasheet, write_model
+from ers_mj.servo.datasheet import TABLE_1, Datasheet, read_datasheet
+from ers_mj.servo.model_file import write_model
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 

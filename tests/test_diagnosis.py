@@ -12,7 +12,8 @@ from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.door.saving import plain
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.model_file import write_model
 
 T = np.arange(0.0, 3.0, 2e-3)
 INPUT = ("multisine", "steps")

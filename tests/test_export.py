@@ -22,7 +22,8 @@ from ers_mj.export.servo import servo_of
 from ers_mj.export.targets import TARGETS
 from ers_mj.export.translation import translated
 from ers_mj.export.trying import apart, excitation, response
-from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.model_file import write_model
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 exported = pytest.importorskip("exported", reason="analysis/ is not beside the tests")

@@ -18,7 +18,8 @@ from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, runs_of
 from ers_mj.position_loop.saved import looped_plant, model_of, simulate_loop
 from ers_mj.position_loop.weak_form import rough_starts
-from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.model_file import write_model
 from ers_mj.servo.simulation import kernel_effects
 
 PRESLIDING = ((Presliding.name, {"x_s": 0.03, "zeta": 0.4}),)

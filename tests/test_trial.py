@@ -18,7 +18,8 @@ from ers_mj.control.references import CASES, Reference, named, read_reference
 from ers_mj.control.trial import Conditions, needed, try_out
 from ers_mj.data.recording import read_recording
 from ers_mj.effects import BY_NAME
-from ers_mj.servo.datasheet import read_datasheet, write_model
+from ers_mj.servo.datasheet import read_datasheet
+from ers_mj.servo.model_file import write_model
 from ers_mj.servo.simulation import kernel_effects
 
 SHEET = read_datasheet("table1")

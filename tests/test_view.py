@@ -16,7 +16,8 @@ from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.errors import InputError
 from ers_mj.plants.mjcf import mjcf_folder
 from ers_mj.report.diagnosis_report import report_page
-from ers_mj.servo.datasheet import Datasheet, read_datasheet, write_model
+from ers_mj.servo.datasheet import Datasheet, read_datasheet
+from ers_mj.servo.model_file import write_model
 from ers_mj.view.frames import frames_of
 from ers_mj.view.model_file import read_plant, recorded_file
 from ers_mj.view.rendering import Painter

@@ -16,6 +16,7 @@ from ers_mj.data.recording import Recording
 from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.explained import is_consistent
 from ers_mj.decisions.thresholds import POLICY, Policy
+from ers_mj.diagnosis.errors_told import errors_told
 from ers_mj.diagnosis.mujoco_check import Rig, run_in_mujoco
 from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME
@@ -94,24 +95,18 @@ class Case:
     @cached_property
     def fits(self) -> dict:
         """The errors before and after, as diagnosis.json has them."""
-        c, base, model = self.confirmed, self.start.fit.model, self.model
+        c, traces = self.confirmed, list(enumerate(self.start.traces))
+
+        def left_in_training(model: Model) -> float:
+            return pooled([scored(model, t, k, measure=c.measure) for k, t in traces]).rmse
+
         ran = f"of what was held out the MuJoCo plant ran {self._run_in_mujoco if self.search.in_mujoco else 'nothing'}"
-        traces = list(enumerate(self.start.traces))
-        train = [pooled([scored(m, t, k, measure=c.measure) for k, t in traces]).rmse for m in (base, model)]
-        before, after = pooled(c.before), pooled(c.after)
+        train = left_in_training(self.start.fit.model), left_in_training(self.model)
+        again = self._again[0].rmse, self._again[1].rmse
         return {
             "measure": c.measure.name,
             "window_s": c.measure.window_s,
-            "train_rmse_before_rad": train[0],
-            "train_rmse_after_rad": train[1],
-            "heldout_rmse_before_rad": before.rmse,
-            "heldout_rmse_after_rad": after.rmse,
-            "heldout_mae_before_rad": before.mae,
-            "heldout_mae_after_rad": after.mae,
-            "recalibrated_rmse_before_rad": self._again[0].rmse,
-            "recalibrated_rmse_after_rad": self._again[1].rmse,
-            "mujoco_heldout_rmse_before_rad": self.multibody[0],
-            "mujoco_heldout_rmse_after_rad": self.multibody[1],
+            **errors_told(train, (pooled(c.before), pooled(c.after)), again, self.multibody),
             **self._free_run,
             "noise_floor_rad": self.noise,
             "heldout_from": c.sentence,
@@ -204,8 +199,7 @@ class Case:
         left = residuals(sheet, with_starts(sheet, self.start.traces), OBSERVER_RATE)
         return is_consistent(Blocks.of(self.start.traces).misfit(left), self.policy)
 
-    # -- what follows
-    # ------------------------------------------------------------------------------------------------------
+    # -- what follows --------------------------------------------------------------------------------------------------
 
     @cached_property
     def told_effects(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 from ers_mj.data.recording import Recording
 from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.thresholds import POLICY, Policy
+from ers_mj.diagnosis.errors_told import errors_told
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.position_loop import beside
@@ -153,21 +154,12 @@ class LoopCase:
     @cached_property
     def fits(self) -> dict:
         """The errors before and after, as diagnosis.json has them."""
-        c, train = self.confirmed, self.train
-        again = [recalibrated(models, c.folds) for models in (c.before_models, c.models)]
-        multibody = [self._in_mujoco(models) for models in (c.before_models, c.models)]
+        c = self.confirmed
+        again = recalibrated(c.before_models, c.folds), recalibrated(c.models, c.folds)
+        multibody = self._in_mujoco(c.before_models), self._in_mujoco(c.models)
         return {
             "measure": "free_run",
-            "train_rmse_before_rad": train[0],
-            "train_rmse_after_rad": train[1],
-            "heldout_rmse_before_rad": c.before.rmse,
-            "heldout_rmse_after_rad": c.after.rmse,
-            "heldout_mae_before_rad": c.before.mae,
-            "heldout_mae_after_rad": c.after.mae,
-            "recalibrated_rmse_before_rad": again[0],
-            "recalibrated_rmse_after_rad": again[1],
-            "mujoco_heldout_rmse_before_rad": multibody[0],
-            "mujoco_heldout_rmse_after_rad": multibody[1],
+            **errors_told(self.train, (c.before, c.after), again, multibody),
             "noise_floor_rad": self.noise,
             "heldout_from": c.sentence,
             **self._beside,

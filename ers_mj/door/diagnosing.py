@@ -17,7 +17,7 @@ from ers_mj.door.saving import report_writers, today, write_text
 from ers_mj.door.together import refuse_mixed_inputs, refuse_other_units, refuse_twice
 from ers_mj.errors import InputError
 from ers_mj.selection.budget import QUICK, SEARCH
-from ers_mj.servo.datasheet import write_model
+from ers_mj.servo.model_file import write_model
 
 if TYPE_CHECKING:
     from ers_mj.diagnosis.document import Diagnosis as Found

@@ -23,7 +23,7 @@ from ers_mj.identification.answer import Identified
 from ers_mj.identification.finding import BUDGET, Settings
 from ers_mj.position_loop.identified import Identified as LoopFound
 from ers_mj.position_loop.identified import identify_loop
-from ers_mj.servo.datasheet import write_model
+from ers_mj.servo.model_file import write_model
 
 
 class SearchOptions(TypedDict, total=False):

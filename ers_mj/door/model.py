@@ -19,7 +19,8 @@ from ers_mj.door.saving import make_room, plain
 from ers_mj.door.simulating import Simulation, Voltage, simulate
 from ers_mj.errors import InputError
 from ers_mj.position_loop.saved import looped_plant
-from ers_mj.servo.datasheet import Datasheet, write_model
+from ers_mj.servo.datasheet import Datasheet
+from ers_mj.servo.model_file import write_model
 from ers_mj.servo.simulation import build_plant, inertia_of
 from ers_mj.servo.units import Unit, input_unit_of, output_unit_of
 

@@ -1,4 +1,4 @@
-"""A model as plain numbers and text, which needs nothing of this package to run: what scheme.py steps.
+"""A model as plain numbers and text, which needs nothing of this package to run: what the scheme steps.
 
 coefficients, the firmware's loop, the constants of laws -> numbers of `c`; the laws' own text -> functions; static
 drives and sensors -> tables of points
@@ -6,7 +6,6 @@ drives and sensors -> tables of points
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -58,11 +57,11 @@ class Portable:
     """What any target that runs code needs.
 
     Attributes:
-        numbers: of the servo, by the names that scheme.py gives them.
+        numbers: of the servo, by the names that the scheme gives them.
         constants: those of each law, by the law's name.
         remembering: names of the laws whose constants change on the way.
         drive, sensor: static maps of the command and of the reading.
-        laws: text of the functions that scheme.py calls.
+        laws: text of the functions that the scheme calls.
         left_out: what is not in it, a sentence each.
         step: the longest h [s].
     """
@@ -79,8 +78,7 @@ class Portable:
     @property
     def text(self) -> str:
         """Scheme and laws, as Python."""
-        source = inspect.getsource(scheme)
-        return source[source.index("def sign") :].rstrip() + "\n\n\n" + self.laws
+        return scheme.text() + "\n\n\n" + self.laws
 
     @property
     def tables(self) -> dict[str, np.ndarray]:
@@ -274,7 +272,7 @@ def _thinned(at: np.ndarray, to: np.ndarray, near: float) -> Table:
 
 
 def _laws(acting: Sequence[Effect], parted: bool, drive: Table, sensor: Table) -> str:
-    """The functions that scheme.py calls, and the laws that they call."""
+    """The functions that the scheme calls, and the laws that they call."""
     owned, heavy = _owned(acting), [effect for effect in acting if effect.inertia]
     at_load = [e for e in acting if e.torque and not (parted and e.at_motor)]
     at_motor = [e for e in acting if e.torque and parted and e.at_motor]

@@ -1,4 +1,4 @@
-"""From the Python that scheme.py and the laws of effects are written in to C99: numbers are double, `c` and `x` point
+"""From the Python that the scheme and the laws of effects are written in to C99: numbers are double, `c` and `x` point
 to the servo and its state, what is subscripted is an array of double.
 """
 

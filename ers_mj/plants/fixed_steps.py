@@ -19,7 +19,7 @@ from ers_mj.plants.bristle import bent, bristle_damping
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import split_delay
 from ers_mj.plants.event_integrator import faster
-from ers_mj.plants.forces import LEAST_LEVEL, PAIR, motor_level
+from ers_mj.plants.forces import LEAST_LEVEL, PAIR, motor_level, stop_at
 from ers_mj.plants.laws import drive_torque, friction_level, remember, total_torque
 from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, C, F, L, N, is_bounded, plant_in, types
 
@@ -82,16 +82,6 @@ def _contact(c, twist):
 
 
 @inline
-def _stop(c, theta):
-    """(force of the spring of the stop that is touched, damping there)."""
-    if theta > c.upper:
-        return c.k_stop * (c.upper - theta), c.d_stop
-    if theta < c.lower:
-        return c.k_stop * (c.lower - theta), c.d_stop
-    return 0.0, 0.0
-
-
-@inline
 def _past_corner(a, push, ahead, corner):
     """(w, mean side of the corner over the step's way, 0 in it) of a w = push - corner sgn(ahead + w), sgn set-valued
     at 0.
@@ -151,7 +141,7 @@ def _solved(c, theta, theta_m, w, w_m, push, push_m, own, own_m, holds, h):
     and what contact and stop do: neither pulls back what it has pushed.
     """
     half = 0.5 * h
-    wall, d_wall = _stop(c, theta)
+    wall, d_wall = stop_at(c, theta)
     twist, d = _contact(c, theta_m - theta)
     w_1, w_m1 = w, w_m
     for _ in range(2):

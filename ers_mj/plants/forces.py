@@ -22,6 +22,16 @@ def stop_force(c, stop, theta, w):
 
 
 @inline
+def stop_at(c, theta):
+    """(force of the spring of the stop that is touched there, damping in it), of steps that know no modes."""
+    if theta > c.upper:
+        return c.k_stop * (c.upper - theta), c.d_stop
+    if theta < c.lower:
+        return c.k_stop * (c.lower - theta), c.d_stop
+    return 0.0, 0.0
+
+
+@inline
 def twist_force(c, twist, theta, w, theta_m, w_m):
     """Acceleration that the motor's side exerts on the rudder through the contact."""
     if twist == 0:

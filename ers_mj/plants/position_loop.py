@@ -20,6 +20,7 @@ import numpy as np
 
 from ers_mj.plants.bristle import bent, bristle_damping
 from ers_mj.plants.compiled import inline, kernel, record_in, unit
+from ers_mj.plants.forces import stop_at
 from ers_mj.plants.laws import friction_level, remember, total_torque
 from ers_mj.plants.state import (
     READ,
@@ -168,13 +169,25 @@ def _level(c, theta, w, carried):
 
 
 @inline
-def _wall(c, theta):
-    """(acceleration of the stop that is touched, damping there)."""
-    if theta > c.upper:
-        return c.k_stop * (c.upper - theta), c.d_stop
-    if theta < c.lower:
-        return c.k_stop * (c.lower - theta), c.d_stop
-    return 0.0, 0.0
+def _held(c, theta, w, drive, t):
+    """What springs and laws of effects make of a load there."""
+    hold = c.bias + c.a_1 * (c.theta_0 - theta)
+    if c.torques > 0:
+        hold += total_torque(c, theta, w, drive, t)
+    return hold
+
+
+@inline
+def _touched(c, q, twist, over):
+    """(force of the contact on the load at theta_m - theta, damping there) where the motor's side turns faster by
+    ``over``; within the play only grease drags, and a contact does not pull back.
+    """
+    if abs(twist) <= c.gap:
+        return 0.0, q.grease
+    touch, d = c.k_twist * (twist - math.copysign(c.gap, twist)), c.d_twist + q.grease
+    if (touch + d * over) * touch < 0.0:
+        d = -touch / over
+    return touch, d
 
 
 @inline
@@ -196,6 +209,14 @@ def _ignored(q, v):
     return min(max(v, -q.idle), q.idle)
 
 
+@inline
+def _integrated(q, xi, v, e, h):
+    """The loop's integral h later, of an error e at the drive v; at its limit it is not pushed on."""
+    if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
+        return _limited(q, xi + h * q.I * e)
+    return xi
+
+
 @unit(M10(C, Q, F, M10, F, F, F, F))
 def _one_body(c, q, t, x, r, fresh, late, h):
     """The state h later under the mean reference r, where of the drive the share ``fresh`` is the present one and the
@@ -203,10 +224,8 @@ def _one_body(c, q, t, x, r, fresh, late, h):
     """
     theta = x.theta + 0.5 * h * x.w
     e = r - theta
-    hold = c.bias + c.a_1 * (c.theta_0 - theta)
-    if c.torques > 0:
-        hold += total_torque(c, theta, x.w, x.drive, t)
-    wall, d_wall = _wall(c, theta)
+    hold = _held(c, theta, x.w, x.drive, t)
+    wall, d_wall = stop_at(c, theta)
     a = (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     level = _level(c, theta, x.w, x.carried)
     firm, z = max(level, 0.1 * (c.c_2_plus + c.c_2_minus)), x.z
@@ -231,10 +250,8 @@ def _one_body(c, q, t, x, r, fresh, late, h):
         w = _slipped(mass, push + math.copysign(q.most, current), a, level, q.creep, q.heavy, x.w, h)
     held = wall - 0.5 * d_wall * (x.w + w) - (mass - 1.0) * (w - x.w) / h
     if wall != 0.0 and held * wall < 0.0:
-        w = _slipped(1.0, hold + drive, a - d_wall + c.a_emf, level, q.creep, q.heavy, x.w, h)
-    xi = x.xi
-    if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
-        xi = _limited(q, xi + h * q.I * e)
+        w = _slipped(1.0, push - wall + drive, a - d_wall + c.a_emf, level, q.creep, q.heavy, x.w, h)
+    xi = _integrated(q, x.xi, v, e, h)
     carried = (1.0 - q.share) * (w - x.w) / h - push
     theta += 0.5 * h * w
     z = bent(c, z, w, firm, h) if has_bristle(c) else z
@@ -247,59 +264,33 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
     theta, theta_m = x.theta + 0.5 * h * x.w, x.theta_m + 0.5 * h * x.w_m
     e = r - (theta_m if q.at_motor > 0.0 else theta)
     seen = x.w_m if q.at_motor > 0.0 else x.w
-    push = c.bias + c.a_1 * (c.theta_0 - theta)
-    if c.torques > 0:
-        push += total_torque(c, theta, x.w, x.drive, t)
-    wall, d_wall = _wall(c, theta)
-    twist = theta_m - theta
-    touch, d = 0.0, q.grease
-    if abs(twist) > c.gap:
-        touch, d = c.k_twist * (twist - math.copysign(c.gap, twist)), c.d_twist + q.grease
-        if (touch + d * (x.w_m - x.w)) * touch < 0.0:
-            d = -touch / (x.w_m - x.w)
+    push = _held(c, theta, x.w, x.drive, t)
+    wall, d_wall = stop_at(c, theta)
+    touch, d = _touched(c, q, theta_m - theta, x.w_m - x.w)
     a = (1.0 - c.beta) * (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     a_m = c.beta * (c.a_mech_plus if x.w_m > 0.0 else c.a_mech_minus) + c.a_emf
-    level, level_m = _level(c, theta, x.w, x.drive), _level(c, theta, x.w_m, x.drive)
+    level, level_m = (1.0 - c.phi) * _level(c, theta, x.w, x.drive), c.phi * _level(c, theta, x.w_m, x.drive)
     D, slow = _damped(q, x.slow, seen, h)
     asked = q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
     w, w_m = x.w, x.w_m
     v = asked - D * seen
     ahead = asked - _ignored(q, v)
     for _ in range(3):
-        w = _slipped(
-            1.0 - c.rho,
-            push + wall + touch + 0.5 * d * (x.w_m + w_m),
-            a + d,
-            (1.0 - c.phi) * level,
-            q.creep,
-            q.heavy,
-            x.w,
-            h,
-        )
+        drag = 0.5 * d * (x.w_m + w_m)
+        w = _slipped(1.0 - c.rho, push + wall + touch + drag, a + d, level, q.creep, q.heavy, x.w, h)
         between = -touch + 0.5 * d * (x.w + w)
         if q.at_motor > 0.0:
-            w_m = _slipped(
-                c.rho,
-                fresh * ahead + late + between,
-                a_m + fresh * D + d,
-                c.phi * level_m,
-                q.creep,
-                q.heavy,
-                x.w_m,
-                h,
-            )
+            asks = fresh * ahead + late + between
+            w_m = _slipped(c.rho, asks, a_m + fresh * D + d, level_m, q.creep, q.heavy, x.w_m, h)
             v = asked - 0.5 * D * (x.w_m + w_m)
         else:
             v = asked - 0.5 * D * (x.w + w)
         lost = _ignored(q, v)
         ahead, v = asked - lost, v - lost
         if q.at_motor == 0.0 or abs(v) > q.L:
-            w_m = _slipped(
-                c.rho, fresh * _limited(q, v) + late + between, a_m + d, c.phi * level_m, q.creep, q.heavy, x.w_m, h
-            )
-    xi = x.xi
-    if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
-        xi = _limited(q, xi + h * q.I * e)
+            asks = fresh * _limited(q, v) + late + between
+            w_m = _slipped(c.rho, asks, a_m + d, level_m, q.creep, q.heavy, x.w_m, h)
+    xi = _integrated(q, x.xi, v, e, h)
     slow = _damped(q, slow, w_m if q.at_motor > 0.0 else w, h)[1]
     theta, theta_m = theta + 0.5 * h * w, theta_m + 0.5 * h * w_m
     return Moving(theta, w, theta_m, w_m, xi, slow, x.r, _limited(q, v), touch, x.z)
@@ -329,9 +320,7 @@ def _late_drive(q, past, k, h):
 @inline
 def _started(c, q, theta, w, r):
     """The state at the beginning: both bodies together, an integral that holds it there."""
-    hold = c.bias + c.a_1 * (c.theta_0 - theta)
-    if c.torques > 0:
-        hold += total_torque(c, theta, 0.0, 0.0, 0.0)
+    hold = _held(c, theta, 0.0, 0.0, 0.0)
     v = q.K * (r - theta)
     xi = _limited(q, -hold) - v if q.I > 0.0 else 0.0
     return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0, 0.0)

@@ -137,15 +137,21 @@ def advance(p, y, t, u, gain, h, work):
         hold_m = hold_m or (which == 3 and y[WM] == 0.0)
         heun(p, y, t, u, gain, left * share, rudder, motor, side, work, out)
         y[:] = out
-        if which == 1:
-            y[W] = 0.0
-        elif which == 2:
-            y[TH] = p.theta_0
-        else:
-            y[WM] = 0.0
+        put_there(p, y, which)
         t, left = t + left * share, left * (1.0 - share)
         if count > 5 and which != 3:
             settle(p, y, t)
+
+
+@njit(cache=True)
+def put_there(p, y, which):
+    """Put what passes zero at an event of `first_event` exactly there."""
+    if which == 1:
+        y[W] = 0.0
+    elif which == 2:
+        y[TH] = p.theta_0
+    else:
+        y[WM] = 0.0
 
 
 @njit(cache=True)

@@ -133,9 +133,12 @@ class _Screening:
                 self.promises.setdefault(name, shares[name])
                 continue
             self._keep(BY_NAME[name], self._found(view, BY_NAME[name], starts[name], told[name]), known, is_first)
-        for name in names if is_first else ():
-            if BY_NAME[name].once:
-                self._keep(BY_NAME[name], self._struck(view, BY_NAME[name]), known, is_first)
+        if is_first:
+            self._look_for_impulses(view, known, names)
+
+    def _look_for_impulses(self, view: View, known: Columns, names: Sequence[str]) -> None:
+        for effect in (BY_NAME[name] for name in names if BY_NAME[name].once):
+            self._keep(effect, self._struck(view, effect), known, True)
 
     def _second(self) -> float:
         """The second best promise: the best one's may be a fork."""

@@ -56,8 +56,7 @@ def on_one_clock(signals: Sequence[Signal], wanted: Mapping[str, str], name: str
     times, rows = times[keep], order[first][keep]
     columns = {"t_s": times - times[0]}
     for s in known:
-        at = times + MOST * _steps(times) if _is_command(s, wanted) else times
-        values = s.values[rows].astype(float) if s is base else _held(s, at)
+        values = s.values[rows].astype(float) if s is base else _at(s, times, wanted)
         columns["t_s of the file" if s.name == "t_s" else s.name] = values
     told = [*notes, *_told(base, others, base.t.size - first.size)]
     return Loaded(pa.table(columns), tuple(told), {s.name: s.unit for s in known if s.unit}, _no_numbers(signals))
@@ -115,6 +114,11 @@ def _steps(times: np.ndarray) -> np.ndarray:
         return np.zeros(times.size)
     dt = np.diff(times)
     return np.append(np.minimum(dt, np.median(dt)), np.median(dt))
+
+
+def _at(signal: Signal, times: np.ndarray, wanted: Mapping[str, str]) -> np.ndarray:
+    """What a signal holds at the times (N,), a command for most of the step that follows."""
+    return _held(signal, times + MOST * _steps(times) if _is_command(signal, wanted) else times)
 
 
 def _held(signal: Signal, times: np.ndarray) -> np.ndarray:
