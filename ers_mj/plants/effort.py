@@ -30,9 +30,12 @@ class Effort:
         return self._spent
 
     def add(self, t: np.ndarray, per_second: int, beyond: int = 0) -> None:
-        """Count a simulation of the samples at t (N,) [s] that takes so many microseconds a second, and some beyond."""
+        """Count a simulation of the samples at t (N,) [s] that takes so many microseconds a second; what its events
+        take ``beyond`` that counts where there is a most that may be taken.
+        """
         with self._lock:
-            self._spent += int((t[-1] - t[0]) * per_second) + t.size // OVERHEAD + beyond
+            more = beyond if self.most < math.inf else 0
+            self._spent += int((t[-1] - t[0]) * per_second) + t.size // OVERHEAD + more
         if self.within is not None:
             self.within.add(t, per_second, beyond)
 
