@@ -1,6 +1,6 @@
 """Whether exports do what the model does: run in MuJoCo, python-control, an FMU and from tables.
 
-    python analysis/exported.py [--only NAME]               eighteen models written by hand
+    python analysis/exported.py [--only NAME]               nineteen models written by hand
     python analysis/exported.py --diagnosed [FOLDER]        twelve, diagnosed from ../shared, kept in FOLDER
     python analysis/exported.py --answers FOLDER...         what `ers diagnose` has written already
 
@@ -72,6 +72,7 @@ MODELS = {
     ),
     "loop": hobby({}),
     "loop, late damping": hobby({"kind": "PD", "D": 25.0, "lag_s": 0.006}),
+    "loop, bristle": hobby({"D": 12.0}, presliding={"x_s": 0.03, "zeta": 0.4}),
     "loop, idle bridge": hobby({"D": 12.0, "idle": 3.0}),
     "loop, play": hobby({"R": 2.0, "idle": 2.0}, backlash={"gap": 0.01}),
     "loop, gravity": hobby(

@@ -9,6 +9,7 @@ from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.effects.backlash import Backlash
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.input_delay import InputDelay
+from ers_mj.effects.presliding import Presliding
 from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.effects.voltage_saturation import VoltageSaturation
 from ers_mj.errors import InputError
@@ -21,6 +22,7 @@ from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.model_file import write_model
 from ers_mj.servo.simulation import kernel_effects
 
+PRESLIDING = ((Presliding.name, {"x_s": 0.03, "zeta": 0.4}),)
 LIMITED = {"K": 900.0, "L": 150.0, "a_2": 20.0, "c_2": 8.0, "tau_s": 0.012}
 
 
@@ -103,6 +105,19 @@ def test_an_idle_bridge_takes_its_share_of_the_drive():
     twin = looped_plant(Datasheet(lumped={"a_2": 8.0}, loop={k: idle[k] for k in ("K", "D", "idle")}))
     there = twin.simulate(t, r, (0.0, 0.0), 0.0)
     assert np.max(np.abs(there - LoopModel(idle, ()).predicted(run_of(t, r)))) < 5e-3
+
+
+def test_a_bristle_gives_and_springs_back_within_its_level():
+    t = np.arange(0.0, 1.0, 0.01)
+    effects = ((Presliding.name, np.array([0.03, 0.4, *4 * [np.inf]])),)
+    model = LoopModel({"K": 400.0, "a_2": 8.0, "c_2": 10.0}, (), effects)
+    pulse = np.where((t > 0.1) & (t < 0.5), 0.008, 0.0)
+    theta = model.predicted(run_of(t, pulse))
+    held = 0.008 * 400.0 / (400.0 + 10.0 / 0.03)  # the loop's spring against the bristle's
+    assert theta[t < 0.5][-1] == pytest.approx(held, rel=0.25)
+    assert abs(theta[-1]) < 0.2 * held
+    twin = looped_plant(Datasheet(lumped={"a_2": 8.0, "c_2": 10.0}, loop={"K": 400.0}, effects=PRESLIDING))
+    assert np.max(np.abs(twin.simulate(t, pulse, (0.0, 0.0), 0.0) - theta)) < 0.2 * held
 
 
 def test_friction_holds_within_its_width():

@@ -76,7 +76,7 @@ def told(case: LoopCase) -> Diagnosis:
 def _effect(case: LoopCase, name: str) -> dict:
     effect, entries = BY_NAME[name], _effect_parameters(case, name)
     values = {k: shown(e["value"], e["unit"]) for k, e in entries.items()}
-    if effect.in_loop:
+    if effect.in_loop and name not in case.model.names:
         sentence = effect.loop_sentence.format(value=next(iter(values.values())))
     else:
         sentence = effect.describe(values)
@@ -99,7 +99,7 @@ def _effect(case: LoopCase, name: str) -> dict:
 
 def _effect_parameters(case: LoopCase, name: str) -> dict[str, dict]:
     effect, y = BY_NAME[name], case.output_unit
-    if effect.in_loop:
+    if effect.in_loop and name not in case.model.names:
         letter = next(x for x in effect.in_loop if x in case.model.free)
         own = letter if letter in ("L", "R", "creep") else effect.parameters[0].name
         entry = _entry(case.intervals.told("", letter), case.model[letter], LETTERS[letter].unit.format(y=y))
@@ -190,7 +190,7 @@ def _views(case: LoopCase, samples: Samples) -> list[RecordView]:
     for base, model, fold in zip(
         case.confirmed.before_models, case.confirmed.models, case.confirmed.folds, strict=True
     ):
-        for run in fold.held:
+        for run in (one for one in fold.held if one.name not in seen):
             out.append(_view(case, run, base, model, True, ()))
             seen.add(run.name)
     for k, run in enumerate(case.runs):

@@ -23,7 +23,7 @@ from ers_mj.solvers.levenberg_marquardt import Damping, Descent, Step
 LONGEST = 1.0  # step in any of the transformed numbers
 TRIES, TRIES_ON_UPDATES = 6, 2  # dampings along fresh slopes, and along updated ones
 DENSE = 3e-3  # [s] between the samples that tell C's curvature: its slope is told by all of them
-MOST = 30e6  # [us] of simulation that a search may take for each minute of recordings, or one that has less
+MOST = 15e6  # [us] of simulation that a search may take for each minute of recordings, or one that has less
 RUNAWAY = 1e6  # [sigma] that a run leaves which ran away, so that one descent may find a motion
 
 

@@ -20,6 +20,7 @@ from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.jacobian import jacobian_of
 from ers_mj.estimation.objective import Fit, begun, residuals
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
+from ers_mj.solvers.successive_halving import Stage, halved
 
 SQUARES = 1e4  # tau over the mean misfit at which C is a sum of squares
 LEAST_STEP = 0.01  # gain in C of one step below which a fit ends
@@ -101,14 +102,18 @@ def converged(found: Fit, rival: Fit, traces: Sequence[Trace], tau: float) -> Fi
 @dataclass(frozen=True)
 class Hops:
     """How a fit hops: ``most`` times, along its ``soft`` directions of least curvature, as far as its own curvature
-    prices at ``price`` of C, and no further than ``far`` in the transformed parameters; again where one has won
-    ``gain`` of C; not where it leaves less than ``quiet`` of C per block.
+    prices at ``price`` of C, and no further than ``far`` in the transformed parameters; after ``glance`` steps along
+    ``renewals`` Jacobians the best ``kept`` go on; again where one has won ``gain`` of C; not where it leaves less than
+    ``quiet`` of C per block.
     """
 
     most: int = 3
     soft: int = 3
     price: float = 30.0
     far: float = 0.3
+    glance: int = 5
+    renewals: int = 2
+    kept: int = 2
     gain: float = 0.3
     quiet: float = 0.02
 
@@ -123,15 +128,21 @@ def hopped(
     from its floor: beyond it the model itself is wrong, and where it is quiet nothing is left to win.
     """
 
-    def land(start):
-        there = with_starts(start, traces) if restart else traces
-        return descend(start, there, OBSERVER_RATE, tau, 12, 0.03), there
+    def land(start: Model) -> tuple[Fit, Sequence[Trace]]:
+        there, slopes = with_starts(start, traces) if restart else traces, Slopes(hops.renewals)
+        run = begun(start, there, OBSERVER_RATE)
+        return descended(run, there, OBSERVER_RATE, tau, hops.glance, 0.03, slopes)[0], there
 
+    def go_on(landed: tuple[Fit, Sequence[Trace]]) -> tuple[Fit, Sequence[Trace]]:
+        found, there = landed
+        return descend(found.model, there, OBSERVER_RATE, tau, 12, 0.03), there
+
+    stages = [Stage(land, lambda ends: sorted(ends, key=lambda end: end[0].cost)[: hops.kept]), Stage(go_on)]
     for _ in range(hops.most):
         if not explained.is_near_noise(found.misfit) or _per_block(found, tau) < hops.quiet:
             break
         with ThreadPoolExecutor(jobs) as pool:
-            ends = list(pool.map(land, _landings(found, hops)))
+            ends = halved(_landings(found, hops), stages, lambda *work: list(pool.map(*work)))
         best, there = min(ends, key=lambda end: end[0].cost)
         if not best.cost < found.cost - hops.gain:
             break

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ers_mj.plants.bristle import bent, bristle_damping
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import split_delay
 from ers_mj.plants.event_integrator import faster
@@ -50,30 +51,6 @@ def _step_length(c, refine):
     rest = 1.0 - c.rho
     stiffest = max(c.k_twist / c.rho, c.k_bristle * (1.0 - c.phi), c.k_stop) / rest
     return (min(LONGEST, SPRING_STEP / math.sqrt(stiffest)) if stiffest > 0.0 else LONGEST) / refine
-
-
-@inline
-def _unbent(c, left, way):
-    """What is left of a bristle's share of its level to bend, which was ``left``, after a way counted in the
-    displacement of its whole bend.
-    """
-    delta = c.dahl
-    if delta == 1.0:
-        return left * math.exp(-way)
-    size = abs(left)
-    if size <= 0.0:
-        return 0.0
-    after = size ** (1.0 - delta) + (delta - 1.0) * way
-    return math.copysign(after ** (1.0 / (1.0 - delta)), left) if after > 0.0 else 0.0
-
-
-@inline
-def _bent(c, z, w, level, h):
-    """The bend after h at the speed w under this level of friction."""
-    if w == 0.0:
-        return z
-    end = math.copysign(level / c.k_bristle, w)
-    return end * (1.0 - _unbent(c, 1.0 - z / end, abs(w) * h * c.k_bristle / level))
 
 
 @inline
@@ -158,15 +135,6 @@ def _charged(c, j, drive, w_m, h):
     return end + (j - end) * math.exp(-rate * h)
 
 
-@inline
-def _bristle_damping(c, w, z, level):
-    """Damping of a bristle that a motion bends on at the speed w."""
-    if c.d_bristle <= 0.0:
-        return 0.0
-    left = max(1.0 - math.copysign(1.0, w) * c.k_bristle * z / level, 0.0)
-    return c.d_bristle * (left if c.dahl == 1.0 else left**c.dahl) * math.exp(-((w / c.fade) ** 2))
-
-
 @unit(PAIR(C, F, F, F, F, F, F, F, F, F, F))
 def _solved(c, theta, theta_m, w, w_m, push, push_m, own, own_m, holds, h):
     """(w, w_m) at the end of a step, under forces in its middle that do not hang on them, dampings of each body's own,
@@ -205,12 +173,12 @@ def _step(c, t, x, drive, closed, load, h):
     if c.lawful > 0:
         push += total_torque(c, theta, w, j, t + half)
         push_m = drive_torque(c, theta_m, w_m, j, t + half)
-    own = share * _bristle_damping(c, w, z, level) + (1.0 - c.beta) * _damping(c, w)
+    own = share * bristle_damping(c, w, z, level) + (1.0 - c.beta) * _damping(c, w)
     own_m = c.beta * _damping(c, w_m)
     if closed and c.tau_e <= 0.0:  # the back-EMF damps at once
         own_m, j = own_m + c.a_emf, drive
     w_1, w_m1 = _solved(c, theta, theta_m, w, w_m, push, j + push_m, own, own_m, holds, h)
-    z = _bent(c, z, w_1, level, h)
+    z = bent(c, z, w_1, level, h)
     j = _charged(c, j, drive, w_m1, half) if closed else 0.0
     return Bent(theta + half * w_1, w_1, j, theta_m + half * w_m1, w_m1, z)
 

@@ -18,10 +18,24 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from ers_mj.plants.bristle import bent, bristle_damping
 from ers_mj.plants.compiled import inline, kernel, record_in, unit
 from ers_mj.plants.forces import stop_at
 from ers_mj.plants.laws import friction_level, remember, total_torque
-from ers_mj.plants.state import READ, READ_BOOL, RUNAWAY, TABLE, VECTOR, C, F, N, plant_in, types
+from ers_mj.plants.state import (
+    READ,
+    READ_BOOL,
+    RUNAWAY,
+    TABLE,
+    VECTOR,
+    C,
+    F,
+    N,
+    has_bristle,
+    is_parted,
+    plant_in,
+    types,
+)
 
 LONGEST = 1e-3  # [s] of a step
 STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
@@ -71,7 +85,7 @@ Q = numba.from_dtype(LOOP)
 
 class Moving(NamedTuple):
     """Angle and speed of the load and of the motor's side, the loop's integral, the speed that it has, the limited
-    reference, the drive, the torque that the gear carried last.
+    reference, the drive, the torque that the gear carried last, the bend of a bristle that carries friction.
     """
 
     theta: float
@@ -83,9 +97,10 @@ class Moving(NamedTuple):
     r: float
     drive: float
     carried: float
+    z: float
 
 
-M9 = types.NamedUniTuple(F, 9, Moving)
+M10 = types.NamedUniTuple(F, 10, Moving)
 PAIR = types.UniTuple(F, 2)
 
 
@@ -202,7 +217,7 @@ def _integrated(q, xi, v, e, h):
     return xi
 
 
-@unit(M9(C, Q, F, M9, F, F, F, F))
+@unit(M10(C, Q, F, M10, F, F, F, F))
 def _one_body(c, q, t, x, r, fresh, late, h):
     """The state h later under the mean reference r, where of the drive the share ``fresh`` is the present one and the
     rest ``late``.
@@ -213,10 +228,13 @@ def _one_body(c, q, t, x, r, fresh, late, h):
     wall, d_wall = stop_at(c, theta)
     a = (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     level = _level(c, theta, x.w, x.carried)
+    firm, z = max(level, 0.1 * (c.c_2_plus + c.c_2_minus)), x.z
     D, slow = _damped(q, x.slow, x.w, h)
     push, asked = hold + wall, q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
     ahead = asked - _ignored(q, asked - D * x.w)
     mass = q.buried if wall != 0.0 else 1.0
+    if has_bristle(c):
+        push, a, level = push - c.k_bristle * z, a + bristle_damping(c, x.w, z, firm), 0.0
     w = _slipped(mass, push + fresh * ahead + late, a + fresh * D + c.a_emf, level, q.creep, q.heavy, x.w, h)
     if q.idle > 0.0:
         ahead = asked - _ignored(q, asked - 0.5 * D * (x.w + w))
@@ -236,10 +254,11 @@ def _one_body(c, q, t, x, r, fresh, late, h):
     xi = _integrated(q, x.xi, v, e, h)
     carried = (1.0 - q.share) * (w - x.w) / h - push
     theta += 0.5 * h * w
-    return Moving(theta, w, theta, w, xi, _damped(q, slow, w, h)[1], x.r, _limited(q, v), carried)
+    z = bent(c, z, w, firm, h) if has_bristle(c) else z
+    return Moving(theta, w, theta, w, xi, _damped(q, slow, w, h)[1], x.r, _limited(q, v), carried, z)
 
 
-@unit(M9(C, Q, F, M9, F, F, F, F))
+@unit(M10(C, Q, F, M10, F, F, F, F))
 def _two_bodies(c, q, t, x, r, fresh, late, h):
     """As ``_one_body``, of a motor and a load with a play or a shaft between them."""
     theta, theta_m = x.theta + 0.5 * h * x.w, x.theta_m + 0.5 * h * x.w_m
@@ -274,13 +293,13 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
     xi = _integrated(q, x.xi, v, e, h)
     slow = _damped(q, slow, w_m if q.at_motor > 0.0 else w, h)[1]
     theta, theta_m = theta + 0.5 * h * w, theta_m + 0.5 * h * w_m
-    return Moving(theta, w, theta_m, w_m, xi, slow, x.r, _limited(q, v), touch)
+    return Moving(theta, w, theta_m, w_m, xi, slow, x.r, _limited(q, v), touch, x.z)
 
 
 @inline
 def _step_length(c):
     """[s] of a step at most."""
-    stiffest = max(c.k_stop, c.k_twist / max(min(c.rho, 1.0 - c.rho), 1e-3) if c.two_body > 0 else 0.0)
+    stiffest = max(c.k_stop, c.k_twist / max(min(c.rho, 1.0 - c.rho), 1e-3) if is_parted(c) else c.k_bristle)
     return min(LONGEST, STIFF / math.sqrt(stiffest)) if stiffest > 0.0 else LONGEST
 
 
@@ -304,7 +323,7 @@ def _started(c, q, theta, w, r):
     hold = _held(c, theta, 0.0, 0.0, 0.0)
     v = q.K * (r - theta)
     xi = _limited(q, -hold) - v if q.I > 0.0 else 0.0
-    return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0)
+    return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0, 0.0)
 
 
 @kernel(types.void(READ, READ, READ_BOOL, VECTOR, VECTOR, F, F, F, N, TABLE))
@@ -332,8 +351,8 @@ def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
             now = x.r + min(max(asked - x.r, -q.R * h), q.R * h)
             mean = 0.5 * (x.r + now) if q.R < np.inf else asked
             fresh, late = _late_drive(q, past, step, h) if enable[i] else (0.0, 0.0)
-            x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, x.slow, now, x.drive, x.carried)
-            if c.two_body > 0:
+            x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, x.slow, now, x.drive, x.carried, x.z)
+            if is_parted(c):
                 x = _two_bodies(c, q, at, x, mean, fresh, late, h)
             else:
                 x = _one_body(c, q, at, x, mean, fresh, late, h)

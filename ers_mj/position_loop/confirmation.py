@@ -5,7 +5,7 @@ without it, begun from the answer's own numbers with the same budget.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, without
 
 FIRST, LAST = 0.7, 0.3  # shares of the only recording that are fitted and held out; the last that is recalibrated on
 COARSER = 3  # blocks of a run that are judged as one
+PARTS = 3  # of every one of a few recordings, left out in turn
 MOST_FOLDS = 6  # of more recordings several are left out at once
 STEPS = 12  # of a refit to the rest
 
@@ -62,8 +63,8 @@ class Confirmed:
 
 
 def folds_of(runs: Sequence[Run], held: Sequence[Run]) -> tuple[list[Fold], str]:
-    """Recordings of their own, else each one left out in turn (of many every so manieth), else the end of the only
-    one.
+    """Recordings of their own; else each third of every recording left out in turn, since only one of them may reach
+    the limits of the servo (of many every so manieth recording); else the end of the only one.
     """
     if held:
         return [Fold(None, tuple(held))], "recordings that were opened after the selection had ended"
@@ -72,10 +73,17 @@ def folds_of(runs: Sequence[Run], held: Sequence[Run]) -> tuple[list[Fold], str]
         folds = [Fold(tuple(r for r in runs if r not in out), out) for out in groups]
         return folds, f"every {MOST_FOLDS}th recording left out in turn; the structure was chosen on all"
     if len(runs) > 1:
-        folds = [Fold(tuple(r for r in runs if r is not out), (out,)) for out in runs]
-        return folds, "each recording left out in turn; the structure was chosen on all"
+        spans = [(k / PARTS, (k + 1) / PARTS) for k in range(PARTS)]
+        folds = [Fold(_some(r.outside(*span) for r in runs), _some(r.only(*span) for r in runs)) for span in spans]
+        folds = [fold for fold in folds if fold.training and fold.held]
+        return folds, "each third of every recording left out in turn; the structure was chosen on all"
     only = runs[0]
     return [Fold((only.only(0.0, FIRST),), (only.only(FIRST, 1.0),))], "the last 30 % of the only recording"
+
+
+def _some(runs: Iterable[Run]) -> tuple[Run, ...]:
+    """The runs of which anything is scored."""
+    return tuple(run for run in runs if run.scored.any())
 
 
 def scored(models: Sequence[LoopModel], folds: Sequence[Fold]) -> Score:
@@ -163,11 +171,15 @@ def _holds(found: Confirmed, name: str, runs: Sequence[Run], policy: Policy) -> 
 
 def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
     """Pooled error [output unit] of the rest of each held-out run, once gain, offset and friction level are fitted to
-    its first 30 %.
+    its first 30 %; of all that is held out of a run that was fitted to, whose day is the same.
     """
     squares, count = 0.0, 0
     for model, fold in zip(models, folds, strict=True):
         for run in fold.held:
+            if any(run.name == other.name for other in fold.training or ()):
+                e = (run.y - model.predicted(run))[run.scored]
+                squares, count = squares + float(e @ e), count + e.size
+                continue
             seen = run.t[run.scored]
             share = (seen[0] + LAST * (seen[-1] - seen[0])) / run.t[-1]
             state = only_letters(model.having(hold=model["hold"]), ("K", "hold", "c_2"))

@@ -92,10 +92,19 @@ class Run:
 
     def only(self, begin: float, end: float) -> Run:
         """The run, of which only the samples between these shares of its time are scored."""
+        return self._scored(self._within(begin, end))
+
+    def outside(self, begin: float, end: float) -> Run:
+        """The run, of which the samples between these shares of its time are not scored."""
+        return self._scored(~self._within(begin, end))
+
+    def _within(self, begin: float, end: float) -> np.ndarray:
         share = (self.t - self.t[0]) / (self.t[-1] - self.t[0])
-        within = (share >= begin) & (share <= end)
-        beside = replace(self.beside, scored=self.beside.scored & within) if self.beside is not None else None
-        return replace(self, scored=self.scored & within, beside=beside)
+        return (share >= begin) & (share <= end)
+
+    def _scored(self, these: np.ndarray) -> Run:
+        beside = replace(self.beside, scored=self.beside.scored & these) if self.beside is not None else None
+        return replace(self, scored=self.scored & these, beside=beside)
 
 
 def runs_of(recordings: Sequence[Recording], first: Recording | None = None) -> list[Run]:

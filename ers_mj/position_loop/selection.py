@@ -28,10 +28,12 @@ from ers_mj.position_loop.terms import (
     STARTING,
     Term,
     delayed_within,
+    form_of,
     is_there,
     lagging,
     other_shares,
     present,
+    sized,
     stops,
     terms,
     top_speed,
@@ -55,7 +57,8 @@ class Effort:
     parted: Halving = Halving(looked=5, first=6, kept=2)  # starts of two bodies
     far: int = 25  # steps of their best ones
     tried: int = 10  # steps of a candidate's best starts
-    promise: float = 0.3  # of what is asked for, from which a law is refitted
+    promise: float = 0.3  # of what is asked for, from which a law is refitted,
+    begun: int = 3  # from so many of its starts
     finalists: int = 3  # candidates that are refitted to the end,
     near: float = 0.3  # those that gain this share of what the best one gains at first
     enough: float = 1.15  # noise levels of error that one body may leave before two are tried
@@ -256,20 +259,32 @@ class Selector:
 
     def _promising(self, current: Fit, candidates: Sequence[Term]) -> list[Term]:
         """The candidates without those laws of which no start, in any size and beside any other numbers of the model,
-        takes away what could be asked for.
+        takes away what could be asked for; the others' starts that promise most, in the size that does.
         """
         slopes = jacobian(current.model, self.data)
         basis = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((current.errors.size, 0))
         e = current.errors - basis @ (basis.T @ current.errors)
 
-        def promise(model: LoopModel) -> float:
+        def promise(model: LoopModel) -> tuple[float, float]:
             d = self.data.residuals(model) - current.errors
             d = d - basis @ (basis.T @ d)
-            took = float(e @ d) ** 2 / max(float(d @ d), 1e-300) if np.isfinite(d).all() else 0.0
-            return -0.5 * current.blocks * math.log(max(1.0 - took / float(e @ e), 1e-9))
+            if not np.isfinite(d).all():
+                return 0.0, 1.0
+            size = -float(e @ d) / max(float(d @ d), 1e-300)
+            return -0.5 * current.blocks * math.log(max(1.0 + size * float(e @ d) / float(e @ e), 1e-9)), size
 
-        least = EFFORT.promise * self.policy.loop_gain
-        return [term for term in candidates if not term.is_law or max(map(promise, term.starts)) > least]
+        least, found = EFFORT.promise * self.policy.loop_gain, []
+        for term in candidates:
+            if not term.is_law:
+                found.append(term)
+                continue
+            ranked = sorted(((*promise(start), k) for k, start in enumerate(term.starts)), reverse=True)
+            if ranked[0][0] > least:
+                forms = [form_of(term.starts[k], term.name) for *_, k in ranked]
+                order = sorted(range(len(ranked)), key=lambda n: forms.index(forms[n]) != n)  # each form's best first
+                first = [ranked[n] for n in order[: EFFORT.begun]]
+                found.append(replace(term, starts=tuple(sized(term.starts[k], term.name, x) for _, x, k in first)))
+        return found
 
     def _tried(self, current: Fit, term: Term) -> Compared:
         if term.is_bent:

@@ -6,6 +6,7 @@ A limit or an effect is begun from a start of its own; where one changes what th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -83,6 +84,8 @@ class Sizes:
     gaps: tuple[float, ...] = (0.4, 1.5)  # of the error that is left
     shares: tuple[float, ...] = (0.3,)  # of the inertia that the motor's side bears
     parted: float = 1.3  # noise levels of error from which a second body is tried
+    least: float = 0.02  # of a law's start, and
+    most: float = 3.0  # of it, to which a secant may scale it
     periods: tuple[int, ...] = (2, 4, 8, 16)  # of cogging within the travel
 
 
@@ -141,7 +144,7 @@ def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
     """
     found = [
         *_of_the_loop(model, runs),
-        Term(Presliding.name, tuple(model.fixed(heavy=y).having(creep=x) for x, y in SIZES.creeps)),
+        Term(Presliding.name, tuple(_giving(model))),
         Term(CONSTANT, (model.having(hold=0.0),)),
         Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
         *_transmissions(model, error),
@@ -167,6 +170,16 @@ def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
     if "L" in model.free:
         found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
     return found
+
+
+def _giving(model: LoopModel) -> Iterator[LoopModel]:
+    """Friction that creeps, as MuJoCo's does, and of one body one that a bristle carries."""
+    for creep, heavy in SIZES.creeps:
+        yield model.fixed(heavy=heavy).having(creep=creep)
+    if not any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+        for start in BY_NAME[Presliding.name].starts(model.scales):
+            if np.isfinite(start[0]) and not np.isfinite(start[2]):
+                yield model.with_effect(Presliding.name, start)
 
 
 def _asleep(model: LoopModel) -> Iterator[LoopModel]:
@@ -215,6 +228,20 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
     return [model.with_effect(name, start) for start in starts]
 
 
+def form_of(model: LoopModel, name: str) -> tuple[bool, ...]:
+    """Which of an effect's numbers a model has."""
+    return tuple(bool(x) for x in np.isfinite(dict(model.effects)[name]))
+
+
+def sized(model: LoopModel, name: str, size: float) -> LoopModel:
+    """A model with an effect of a law so many times as large, where its law has a size and that sense is its own."""
+    effect, values = BY_NAME[name], dict(model.effects)[name].copy()
+    for k in range(effect.sized):
+        if size > 0.0 or not effect.parameters[k].positive:
+            values[k] *= math.copysign(min(max(abs(size), SIZES.least), SIZES.most), size)
+    return model.with_effect(name, values)
+
+
 def stops(model: LoopModel, low: float, high: float) -> list[LoopModel]:
     """A model with stops there: springs, and MuJoCo's constraint."""
     spring = np.array([low, high, 40.0, 0.3])
@@ -226,7 +253,7 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
     """A play or a shaft, with the loop's sensor and the log's on either side; of a loop on the motor's side friction is
     partly the load's.
     """
-    if any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+    if any(BY_NAME[name].subsystem == "transmission" or name == Presliding.name for name in model.names):
         return []
     contact = min(60.0, 0.35 / model.scales.sample_time)
     play = [np.array([x * error, rho, 0.8, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]
