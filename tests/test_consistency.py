@@ -245,6 +245,14 @@ def test_a_reference_of_the_other_sign_or_zero_is_mended(followed, put):
     np.testing.assert_allclose(moved.u, followed["theta_ref_rad"], atol=0.02)
 
 
+def test_a_wave_that_is_upside_down_half_a_period_later_keeps_its_sign(put):
+    t = np.arange(0.0, 8.0, 0.01)
+    late = 0.4 - np.pi / 9.0  # so that 0.4 s, which is tried, is later by half a period
+    record = read_recording(put({"t_s": t, "theta_ref_rad": np.sin(9.0 * t), "theta_rad": np.sin(9.0 * (t - late))}))
+    assert kinds(record) == []
+    np.testing.assert_allclose(record.u, np.sin(9.0 * t), atol=1e-4)
+
+
 def test_a_reference_in_another_unit_is_refused(followed, put):
     with pytest.raises(InputError, match=r"theta_ref_rad moves 57.3 times as far as theta_rad, which looks like deg"):
         read_recording(put(followed | {"theta_ref_rad": np.degrees(followed["theta_ref_rad"])}))

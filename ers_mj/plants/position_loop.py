@@ -250,7 +250,7 @@ def _one_body(c, q, t, x, r, fresh, late, h):
         w = _slipped(mass, push + math.copysign(q.most, current), a, level, q.creep, q.heavy, x.w, h)
     held = wall - 0.5 * d_wall * (x.w + w) - (mass - 1.0) * (w - x.w) / h
     if wall != 0.0 and held * wall < 0.0:
-        w = _slipped(1.0, hold + drive, a - d_wall + c.a_emf, level, q.creep, q.heavy, x.w, h)
+        w = _slipped(1.0, push - wall + drive, a - d_wall + c.a_emf, level, q.creep, q.heavy, x.w, h)
     xi = _integrated(q, x.xi, v, e, h)
     carried = (1.0 - q.share) * (w - x.w) / h - push
     theta += 0.5 * h * w

@@ -11,6 +11,7 @@ import numpy as np
 from ers_mj.data.prepared import BLOCK, Blocks
 from ers_mj.decisions.explained import attainable, score
 from ers_mj.effects import BY_NAME, Effect
+from ers_mj.effects.quantities import Scales
 from ers_mj.estimation.objective import Run, run_of
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.budget import SEARCH, Search
@@ -120,13 +121,9 @@ class _Screening:
         sparse = some.sparse()
         if is_first and self.bent:
             scales = replace(scales, waves=waves_of(view.run, self.bench.traces))
-        starts = {
-            name: self.foremost.get(name) or BY_NAME[name].starts(scales) for name in names if not BY_NAME[name].once
-        }
-        told = {
-            name: first_order(some if BY_NAME[name].follows_current else sparse, BY_NAME[name], begun)
-            for name, begun in starts.items()
-        }
+        lasting = [BY_NAME[name] for name in names if not BY_NAME[name].once]
+        starts = {effect.name: self._starts(effect, scales) for effect in lasting}
+        told = {name: self._told(BY_NAME[name], begun, some, sparse) for name, begun in starts.items()}
         shares = {name: max((share for share, _ in each), default=math.inf) for name, each in told.items()}
         for name in sorted(starts, key=lambda name: -shares[name]):
             if shares[name] < self._likely(is_first) and not view.place.plant().bends:
@@ -136,9 +133,19 @@ class _Screening:
         if is_first:
             self._look_for_impulses(view, known, names)
 
+    def _starts(self, effect: Effect, scales: Scales) -> Sequence[np.ndarray]:
+        """Where an effect is begun: at a further place from what was foremost at the first."""
+        return self.foremost.get(effect.name) or effect.starts(scales)
+
     def _look_for_impulses(self, view: View, known: Columns, names: Sequence[str]) -> None:
         for effect in (BY_NAME[name] for name in names if BY_NAME[name].once):
             self._keep(effect, self._struck(view, effect), known, True)
+
+    def _told(
+        self, effect: Effect, starts: Sequence[np.ndarray], some: View, sparse: View
+    ) -> list[tuple[float, float]]:
+        """What the first order tells of the starts, of a friction that follows the current at all samples."""
+        return first_order(some if effect.follows_current else sparse, effect, starts)
 
     def _second(self) -> float:
         """The second best promise: the best one's may be a fork."""

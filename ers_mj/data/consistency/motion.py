@@ -29,11 +29,17 @@ def likeness(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
 
 def lagged(x: np.ndarray, y: np.ndarray, lags: np.ndarray) -> tuple[float, float]:
-    """Slope and correlation of y over x (N,), of those lags of y (samples) at which they are most alike."""
+    """Slope and correlation of y over x (N,) at the lag of y (samples) at which they are most alike; of lags at which
+    they are as good as most alike the first, since a wave is alike again, upside down, half a period later.
+    """
     found = [likeness(x[: x.size - k], y[k:]) for k in lags]
-    return max(found, key=lambda pair: abs(pair[1]))
+    most = max(abs(alike) for _, alike in found)
+    first = next(k for k, (_, alike) in enumerate(found) if abs(alike) > most - ALIKE)
+    run = [pair for pair in found[first:] if pair[1] * found[first][1] >= 0.0]
+    return max(run, key=lambda pair: abs(pair[1]))
 
 
+ALIKE = 0.05  # of a correlation, by which two lags are as good as alike
 LATEST, TRIED = 0.5, 12  # [s] by which a servo may follow late, and how many lags are tried
 
 
