@@ -45,6 +45,8 @@ def truth_of(case: str) -> dict:
 def ask(case: str, sheet: str) -> dict:
     """What a diagnosis answers; raises FileNotFoundError where the case has no such datasheet."""
     folder = SHARED / ("menagerie" if case.startswith("m") else "foreign") / case
+    if SHEETS[sheet] and not (folder / SHEETS[sheet]).exists():
+        raise FileNotFoundError(folder / SHEETS[sheet])
     known = SHEETS[sheet] and read_datasheet(folder / SHEETS[sheet])
     names = TORQUE if case.startswith("f2") else None
     recordings = [read_recording(path, names) for path in sorted(folder.glob("rec*.csv"))]
@@ -53,10 +55,12 @@ def ask(case: str, sheet: str) -> dict:
     return {**document, "cpu_s": time.process_time() - begun}
 
 
-def row(case: str, answer: dict) -> dict:
-    """What counts of an answer."""
+def row(case: str, answer: dict, sheet: str) -> dict:
+    """What counts of an answer; without a datasheet, which would tell it, a winding may be named."""
     truth = truth_of(case)
     inherent = set(truth.get("inherent") or ()) - {truth["effect"]}
+    if sheet == "none" and kind_of(truth["effect"] or "") != kind_of("inductance"):
+        inherent.add("inductance")
     names = [m["effect"] for m in answer["missing"]]
     beside = [name for name in names if name not in inherent]
     right = kind_of(truth["effect"]) if truth["effect"] else ""
@@ -91,7 +95,7 @@ def main() -> None:
             continue
         kept.parent.mkdir(parents=True, exist_ok=True)
         kept.write_text(json.dumps(answer))
-        rows.append(one := row(case, answer))
+        rows.append(one := row(case, answer, arguments.sheet))
         print(
             f"{case:16}{one['kind']:9}{one['truth']:30}{', '.join(one['names']) or 'none':60}"
             f"first {one['first']!s:6}exact {one['exact']!s:6}missed {', '.join(one['missed']) or '-':18}"
