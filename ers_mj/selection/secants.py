@@ -14,7 +14,7 @@ import numpy as np
 
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME, Effect
-from ers_mj.estimation.jacobian import jacobian_of
+from ers_mj.estimation.jacobian import central_jacobian
 from ers_mj.estimation.objective import Run, residuals
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
@@ -123,7 +123,7 @@ def view_of(run: Run, traces: Sequence[Trace], tau: float, search: Search = SEAR
     place, e = run.model, run.left
     blocks, layout = Blocks.of(traces), place.layout()
     m = blocks.misfit(e)
-    jacobian = jacobian_of(run, traces, OBSERVER_RATE, by_tangents=False)
+    jacobian = central_jacobian(place, layout, place.vector(layout), traces, OBSERVER_RATE)  # refits borrow it
     free, targets = np.array([not place.at_bound(f) for f in layout], bool), []
     for level in (tau, max(tau, float(np.mean(m)))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
