@@ -57,6 +57,17 @@ def spoken() -> list[list[str]]:
     return [shlex.split(span)[1:] for span in spans if "..." not in span and "NAME" not in span]
 
 
+def test_each_argument_of_the_door_is_documented_by_its_own_name():
+    """As the site's builder wants it, which reads one name a line."""
+    files = sorted((ROOT / "ers_mj" / "door").rglob("*.py"))
+    several = [
+        f"{named(f)}: {line.strip()}"
+        for f in files
+        for line in re.findall(r"^ +(?!self)\w+, \w+: .*", f.read_text(), re.M)
+    ]
+    assert files and not several
+
+
 PARSED = calls(exempt=True) + spoken()
 PYTHON = [page for page in DOCS if blocks(page, "python") and named(page) not in ELSEWHERE]
 

@@ -67,7 +67,11 @@ def test_any_moment_ends_with_130(job, tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_other_signals_stop_as_well(number, tmp_path):
-    assert stopped(["-c", PROGRAM.format(part=str(tmp_path / "part"), job="time.sleep(100)")], number)[0] == 130
+    program = PROGRAM.format(part=str(tmp_path / "part"), job="time.sleep(100)")
+    heeding = (
+        f"import signal; signal.signal({int(number)}, signal.SIG_DFL)\n{program}"  # whatever the tests were begun by
+    )
+    assert stopped(["-c", heeding], number)[0] == 130
 
 
 def test_what_is_ignored_from_outside_stays_ignored(tmp_path):

@@ -387,7 +387,8 @@ def load_model(path: Known, output_unit: Unit = None, input_unit: Unit = None) -
 
     Args:
         path: the file; "table1" is the paper's servo.
-        output_unit, input_unit: as `Model` takes them.
+        output_unit: as `Model` takes it.
+        input_unit: as `Model` takes it.
 
     Raises:
         InputError: the file cannot be meant, in one sentence.
