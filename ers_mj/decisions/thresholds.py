@@ -353,6 +353,10 @@ class Policy:
         20.0, "half blocks times ln of squared errors' ratio, less Schwarz's price", "a name on a clean servo",
         "the best rival on 15 clean servos gained 17; at 5 seven of 15 are false",
     )  # fmt: skip
+    loop_place: float = _threshold(
+        10.0, "half blocks times ln of squared errors' ratio", "a latency within the loop where the command's would do",
+        "half of a name's, since neither place has more numbers; 24 clean servos are within 1 but for one of 21",
+    )  # fmt: skip
     loop_integral: float = _threshold(
         0.05, "1/s, I over K", "integral action that is not there", "of 16 PD loops all refitted below 0.005"
     )

@@ -194,6 +194,6 @@ class LoopCase:
                     break
                 left -= float(run.t[n - 1])
                 y = self.plant(model, run).simulate(run.t[:n], run.r[:n], run.start, run.before)
-                squares.append(((run.y[:n] - y) ** 2)[np.isfinite(run.y[:n]) & run.scored[:n]])
+                squares.append(((run.y[:n] - y) ** 2)[np.isfinite(run.y[:n]) & run.enable[:n]])
         error = math.sqrt(float(np.mean(np.concatenate(squares))))
         return error if math.isfinite(error) else None

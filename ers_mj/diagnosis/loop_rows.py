@@ -10,7 +10,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME
 from ers_mj.position_loop.fit import Data
-from ers_mj.position_loop.intervals import CLOCK, COMBINED, Intervals, Told
+from ers_mj.position_loop.intervals import COMBINED, DOUBT, Intervals, Told
 from ers_mj.position_loop.model import LETTERS, LoopModel
 from ers_mj.servo.datasheet import LOOP, Datasheet
 
@@ -47,7 +47,7 @@ def _letter(found: Intervals, letter: str) -> Told | None:
     if letter in model.free:
         return found.told("", letter)
     if letter in ("tau_s", "dead_time_s"):  # less than the firmware's own steps is not seen
-        return Told(0.0, (0.0, 2.0 * CLOCK), True)
+        return Told(0.0, (0.0, 2.0 * DOUBT.clock), True)
     return None if letter in ("L", "R") else NOTHING
 
 

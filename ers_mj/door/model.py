@@ -45,8 +45,7 @@ class Model:
         datasheet: a path (a datasheet or model.toml), "table1", a mapping laid out as the TOML, a datasheet, a model.
         output_unit: rad, m or V, which Eq. (6)'s letters are in. None: as the file tells, rad where it does not.
         input_unit: V, % of duty, N m or A. None: as the file tells, V where it does not.
-        inductance: whether the winding's time constant acts; by default where a diagnosis has found one, and not that
-            of a bare datasheet.
+        inductance: whether the winding's time constant acts; by default one that a diagnosis found, no datasheet's.
 
     Raises:
         InputError: the datasheet cannot be meant, there is no such unit, or the file tells another one.

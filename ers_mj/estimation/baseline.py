@@ -22,10 +22,20 @@ from ers_mj.estimation.search import HOLDING, SPRINGS, Kinds, simplest
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import OBSERVER_RATE, SIGNED, Model
 
-SHARE_PRIOR = 0.03  # standard deviation of ln(emf_share) about the datasheet's: B of a servo scatters by half of itself
-# first share of the back-EMF in the damping where nothing tells it, how near to none or all it begins, and standard
-# deviations of its logarithm: where the letters of a datasheet tell the back-EMF, each within some 15 %, and where not
-SHARE, LEAST_SHARE, TOLD_PRIOR, UNTOLD_PRIOR = 0.5, 0.05, 0.3, 0.7
+
+@dataclass(frozen=True)
+class BackEMF:
+    """The back-EMF's share in the damping, and how surely it is known: standard deviations of its logarithm."""
+
+    share_prior: float = 0.03  # about the datasheet's: B of a servo scatters by half of itself
+    share: float = 0.5  # at first where nothing tells it
+    least_share: float = 0.05  # how near to none or all it begins
+    told_prior: float = 0.3  # where the letters of a datasheet tell it, each within some 15 %,
+    untold_prior: float = 0.7  # and where not
+
+
+BACK_EMF = BackEMF()
+
 OVER_INERTIA, INERTIAS = (
     ("a_1", "a_2", "b", "c_1", "c_2", "ampere"),
     (0.6, 0.7, 0.8, 1.2, 1.4, 1.8),
@@ -98,8 +108,9 @@ def _with_back_emf(model: Model, traces: Sequence[Trace], damping: float | None)
     """
     if model.values["emf_share"] > 0 or traces[0].input_kind in ("torque", "current"):
         return model
-    share = min(max(damping / model.values["a_2"], LEAST_SHARE), 1.0 - LEAST_SHARE) if damping else SHARE
-    prior = math.log(share), TOLD_PRIOR if damping else UNTOLD_PRIOR
+    least = BACK_EMF.least_share
+    share = min(max(damping / model.values["a_2"], least), 1.0 - least) if damping else BACK_EMF.share
+    prior = math.log(share), BACK_EMF.told_prior if damping else BACK_EMF.untold_prior
     values = {**model.values, "emf_share": share}
     return replace(model, values=values, priors={**(model.priors or {}), "emf_share": prior})
 
@@ -203,7 +214,7 @@ def _of_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angle:
 
 def _priors(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     return (
-        {"emf_share": (math.log(values["emf_share"]), SHARE_PRIOR)}
+        {"emf_share": (math.log(values["emf_share"]), BACK_EMF.share_prior)}
         if values["tau_e"] > 0 and values["emf_share"] > 0
         else {}
     )

@@ -20,11 +20,20 @@ from ers_mj.estimation.objective import Fit, Run, add_prior, prior_cost, run_of
 from ers_mj.servo.model import Model
 from ers_mj.solvers.levenberg_marquardt import Damping, Descent, Step
 
-LONGEST = 1.0  # step in any of the transformed numbers
-TRIES, TRIES_ON_UPDATES = 6, 2  # dampings along fresh slopes, and along updated ones
-DENSE = 3e-3  # [s] between the samples that tell C's curvature: its slope is told by all of them
-MOST = 15e6  # [us] of simulation that a search may take for each minute of recordings, or one that has less
-RUNAWAY = 1e6  # [sigma] that a run leaves which ran away, so that one descent may find a motion
+
+@dataclass(frozen=True)
+class Effort:
+    """How far a descent goes, and what it leaves where a run fails."""
+
+    longest: float = 1.0  # step in any of the transformed numbers
+    tries: int = 6  # dampings along fresh slopes,
+    tries_on_updates: int = 2  # and along updated ones
+    dense: float = 3e-3  # [s] between the samples that tell C's curvature: its slope is told by all of them
+    most: float = 15e6  # [us] of simulation that a search may take for each minute of recordings, or one that has less
+    runaway: float = 1e6  # [sigma] that a run leaves which ran away, so that one descent may find a motion
+
+
+EFFORT = Effort()
 
 
 @dataclass(frozen=True)
@@ -47,12 +56,12 @@ class Objective:
     def __init__(self, model: Model, traces: Sequence[Trace], rate: float, tau: float):
         self.model, self.traces, self.rate, self.tau = model, traces, rate, tau
         self.layout, self.blocks = model.layout(), Blocks.of(traces)
-        self.stride = max(1, round(DENSE / max(trace.sample_time for trace in traces)))
+        self.stride = max(1, round(EFFORT.dense / max(trace.sample_time for trace in traces)))
 
     def looked_at(self, run: Run, z: np.ndarray) -> Reached:
         """A run as a place on the way; of infinite cost where it ran away."""
         if not np.all(np.isfinite(run.left)):
-            return Reached(z, run, np.full(self.blocks.counts.size, RUNAWAY**2), math.inf)
+            return Reached(z, run, np.full(self.blocks.counts.size, EFFORT.runaway**2), math.inf)
         misfit = self.blocks.misfit(run.left)
         return Reached(z, run, misfit, explained.cost(misfit, self.tau) + prior_cost(self.layout, z))
 
@@ -61,7 +70,7 @@ class Objective:
         here = self.looked_at(run, self.model.vector(self.layout))
         if math.isfinite(here.cost):
             return here
-        return replace(here, run=replace(run, left=np.full(self.blocks.index.size, RUNAWAY)))
+        return replace(here, run=replace(run, left=np.full(self.blocks.index.size, EFFORT.runaway)))
 
     def reach(self, z: np.ndarray) -> Reached:
         there = self.model.at(self.layout, z)
@@ -76,7 +85,7 @@ class Objective:
 
     def step(self, point: Reached, curvature: np.ndarray, slope: np.ndarray, damping: float) -> np.ndarray:
         scale = np.diag(curvature) + 1e-9 * np.trace(curvature) / slope.size + 1e-12
-        return np.clip(-np.linalg.solve(curvature + damping * np.diag(scale), slope), -LONGEST, LONGEST)
+        return np.clip(-np.linalg.solve(curvature + damping * np.diag(scale), slope), -EFFORT.longest, EFFORT.longest)
 
 
 @dataclass
@@ -153,7 +162,7 @@ def descended(
             break
         if is_spent(run.model):
             break
-        step = descent.advance(TRIES if descent.fresh else TRIES_ON_UPDATES)
+        step = descent.advance(EFFORT.tries if descent.fresh else EFFORT.tries_on_updates)
         if step is not None and step.gain >= tolerance:
             continue
         if renewal.is_the_end(step, descent):
@@ -167,7 +176,7 @@ def descended(
 def in_a_search(model: Model, traces: Sequence[Trace]) -> Model:
     """The model with what one search on these recordings may simulate of it."""
     minutes = sum(float(trace.t[-1] - trace.t[0]) for trace in traces) / 60.0
-    return model.with_effort(MOST * max(1.0, minutes))
+    return model.with_effort(EFFORT.most * max(1.0, minutes))
 
 
 def is_spent(model: Model) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,28 +13,32 @@ from ers_mj.data.sensor_faults import excursions, held_spans
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
 SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
-SPIKE_SAMPLES, SPIKE_TIME = 3, 0.005  # length of a spike at most, and [s]
-HELD_SIGMAS, HELD_STEPS, HELD_LEAP = (
-    6.0,
-    2.0,
-    (0.6, 1.6),
-)  # noise levels and converter steps of a model's motion during a hold; share of it in the leap after
-MOVED, WITHIN = (
-    0.25,
-    17,
-    # [s] from the first threshold of a coarse converter, up to which it tells a start; how many places within its step
-    # are tried
-)
-FEWEST_SPIKES = 3  # that the recordings must show by themselves before the model's error is searched
+
+
+@dataclass(frozen=True)
+class Signs:
+    """What tells a spike, a hold and a start."""
+
+    spike_samples: int = 3  # of the longest spike
+    spike_time: float = 0.005  # [s] of it
+    fewest_spikes: int = 3  # that the recordings must show by themselves before the model's error is searched
+    held_sigmas: float = 6.0  # noise levels of a model's motion during a hold,
+    held_steps: float = 2.0  # converter steps of it,
+    held_leap: tuple[float, float] = (0.6, 1.6)  # and share of it in the leap after
+    moved: float = 0.25  # [s] from the first threshold of a coarse converter, up to which it tells a start
+    within: int = 17  # places within its step that are tried
+
+
+SIGNS = Signs()
 
 
 def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
     """The traces without the spikes and holds that only a model's motion betrays, where the recordings themselves show
     that their sensor has some.
 
-    Within SPIKE_TIME a rudder's own error is smooth, but for the blows of a play or a stop, which look like a spike.
+    Within the longest spike a rudder's own error is smooth, but for the blows of a play or a stop, which look like one.
     """
-    if sum(len(trace.lost) for trace in traces) < FEWEST_SPIKES:
+    if sum(len(trace.lost) for trace in traces) < SIGNS.fewest_spikes:
         return list(traces)
     out = []
     for k, trace in enumerate(traces):
@@ -42,7 +46,7 @@ def without_spikes(model: Model, traces: Sequence[Trace]) -> list[Trace]:
         if np.isfinite(simulated).all():
             trace = trace.without(_held(trace, simulated))
             e = np.where(trace.valid, (trace.y - simulated) / trace.sigma, np.nan)
-            longest = min(SPIKE_SAMPLES, int(SPIKE_TIME / trace.sample_time + 1e-6))
+            longest = min(SIGNS.spike_samples, int(SIGNS.spike_time / trace.sample_time + 1e-6))
             trace = trace.without(excursions(e, 1.0, *SPIKE, longest)) if longest else trace
         out.append(trace)
     return out
@@ -52,14 +56,13 @@ def _held(trace: Trace, simulated: np.ndarray) -> list[slice]:
     """Repeats of the output while the model moves, after which it leaps to where the model is: a rudder that sticks has
     no such leap.
     """
-    y, out = trace.y, []
+    y, out, (least, most) = trace.y, [], SIGNS.held_leap
     for s in held_spans(y, 2):
         if s.stop < y.size and trace.valid[s.start : s.stop + 1].all():
             moved, leap = simulated[s.stop - 1] - simulated[s.start], y[s.stop] - y[s.start]
             way = simulated[s.stop] - simulated[s.start]
-            if abs(moved) > max(HELD_SIGMAS * trace.sigma, HELD_STEPS * trace.quantum) and HELD_LEAP[0] * abs(
-                way
-            ) < leap * np.sign(way) < HELD_LEAP[1] * abs(way):
+            moves = abs(moved) > max(SIGNS.held_sigmas * trace.sigma, SIGNS.held_steps * trace.quantum)
+            if moves and least * abs(way) < leap * np.sign(way) < most * abs(way):
                 out.append(slice(s.start + 1, s.stop))
     return out
 
@@ -112,7 +115,11 @@ def _start_within(model: Model, trace: Trace, record: int) -> tuple[float, float
     """
     passed = thresholds(trace.y)
     head = trace.part(
-        0, max(start_samples(trace.t), int(np.searchsorted(trace.t, trace.t[passed[0]] + MOVED)) if passed.size else 0)
+        0,
+        max(
+            start_samples(trace.t),
+            int(np.searchsorted(trace.t, trace.t[passed[0]] + SIGNS.moved)) if passed.size else 0,
+        ),
     )
     theta, omega = trace.y[np.argmax(trace.valid)], trace.start[1]
 
@@ -121,4 +128,4 @@ def _start_within(model: Model, trace: Trace, record: int) -> tuple[float, float
         return float(np.sum(np.log1p(e**2))) if np.all(np.isfinite(e)) else np.inf
 
     half = 0.5 * trace.converter.step
-    return float(min(np.linspace(theta - half, theta + half, WITHIN), key=missed)), omega
+    return float(min(np.linspace(theta - half, theta + half, SIGNS.within), key=missed)), omega

@@ -11,6 +11,7 @@ nothing; the sandwich only sees the scatter within them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import stdtrit
@@ -21,11 +22,20 @@ from ers_mj.estimation.jacobian import central_jacobian
 from ers_mj.estimation.objective import residuals, residuals_in
 from ers_mj.servo.model import OBSERVER_RATE, STATES, Model
 
-UNSEEN_GAIN = 2.0  # of C that an effect would gain which is not found (decisions.policy.least_gain is what it must)
-UNSEEN = 1.0  # effects of that size that act, on average
-FEWEST_RECORDS = 3
-LOST = 1e6  # sigmas that a run leaves where it ran away
-RUN = 4  # neighbouring blocks that are resampled together
+
+@dataclass(frozen=True)
+class Doubt:
+    """What widens an interval beyond the noise, and of what it is told."""
+
+    # of C that an effect would gain which is not found (decisions.policy.least_gain is what it must)
+    unseen_gain: float = 2.0
+    unseen: float = 1.0  # effects of that size that act, on average
+    fewest_records: int = 3  # left out in turn, from which a jackknife counts
+    lost: float = 1e6  # [sigma] that a run leaves where it ran away
+    run: int = 4  # neighbouring blocks that are resampled together
+
+
+DOUBT = Doubt()
 
 
 def slopes_of(model: Model, traces: Sequence[Trace]) -> np.ndarray:
@@ -45,7 +55,7 @@ def half_widths(
     """
     layout = model.layout()
     widths = _sandwich(model, traces, tau, slopes_of(model, traces) if jacobian is None else jacobian)
-    if len(left_out) >= FEWEST_RECORDS and not any(f.local or f.owner in STATES for f in layout):
+    if len(left_out) >= DOUBT.fewest_records and not any(f.local or f.owner in STATES for f in layout):
         z = np.array([m.vector(layout) for m in left_out])
         n = len(left_out)
         widths = np.hypot(
@@ -60,7 +70,7 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.nd
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     weighted = jacobian * weight[:, None]
     hessian = weighted.T @ jacobian
-    run = blocks.index // RUN
+    run = blocks.index // DOUBT.run
     slopes = np.array([np.bincount(run, weighted[:, k] * e, run.max() + 1) for k in range(len(layout))]).T
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
     n = slopes.shape[0]
@@ -70,7 +80,7 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.nd
 
 def _left(model: Model, traces: Sequence[Trace]) -> np.ndarray:
     """What the run leaves (N,); where it ran away so much that the blocks weigh nothing."""
-    return np.nan_to_num(residuals(model, traces, OBSERVER_RATE), nan=LOST)
+    return np.nan_to_num(residuals(model, traces, OBSERVER_RATE), nan=DOUBT.lost)
 
 
 def _is_in(effect: Effect, model: Model) -> bool:
@@ -82,9 +92,9 @@ def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: n
     """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move
     to make up for them.
 
-    Each effect's secant, at a size that would gain UNSEEN_GAIN beside the model and never larger than its start, shifts
-    the numbers by what a fit makes of it; any effect is as likely as the next, UNSEEN of them act. Of several
-    recordings every second one tells that. The ``jacobian`` is as in ``half_widths``.
+    Each effect's secant, at a size that would gain DOUBT.unseen_gain beside the model and never larger than its start,
+    shifts the numbers by what a fit makes of it; any effect is as likely as the next, DOUBT.unseen of them act. Of
+    several recordings every second one tells that. The ``jacobian`` is as in ``half_widths``.
     """
     layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
     jacobian = slopes_of(model, traces) if jacobian is None else jacobian
@@ -103,7 +113,7 @@ def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: n
             if np.all(np.isfinite(secant)):
                 pull = jacobian.T @ (weight * secant)
                 apart = float(secant @ (weight * secant) - pull @ inverse @ pull)
-                found.append(inverse @ pull * min(1.0, np.sqrt(2.0 * UNSEEN_GAIN / max(apart, 1e-12))))
+                found.append(inverse @ pull * min(1.0, np.sqrt(2.0 * DOUBT.unseen_gain / max(apart, 1e-12))))
         if found:
             shifts.append(np.mean(np.square(found), axis=0))
-    return 1.96 * np.sqrt(UNSEEN * np.mean(shifts, axis=0)) if shifts else np.zeros(len(layout))
+    return 1.96 * np.sqrt(DOUBT.unseen * np.mean(shifts, axis=0)) if shifts else np.zeros(len(layout))

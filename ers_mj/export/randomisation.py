@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +15,18 @@ from ers_mj.export.mujoco_joint import OwnJoint
 from ers_mj.export.servo import Servo, servo_of
 from ers_mj.servo.datasheet import Datasheet
 
-MEMBERS, SEED = 64, 0  # servos of the ensemble, and of their draw
-SIGMAS = 1.959964  # of half a 95 % interval
+
+@dataclass(frozen=True)
+class Ensemble:
+    """How many servos are drawn, and from what."""
+
+    members: int = 64  # servos, the model itself among them
+    seed: int = 0  # of their draw
+    sigmas: float = 1.959964  # standard deviations in half a 95 % interval
+    tries: int = 20  # draws of a servo that can be, before the model's own number stands
+
+
+ENSEMBLE = Ensemble()
 INDEPENDENT = (
     "every number is drawn by itself: what recordings tell only together (a gain and a friction that rise as one) is"
     " drawn apart, so the ensemble is wider than the servo's own uncertainty"
@@ -27,7 +37,6 @@ NO_INTERVALS = (
     " the model itself; diagnose its recordings again for them"
 )
 IMPOSSIBLE = "draws that no servo can be are taken again; after {tries} the model's own number stands"
-TRIES = 20
 
 
 class Randomisation(Target):
@@ -39,7 +48,9 @@ class Randomisation(Target):
         document = document_of(servo)
         content = json.dumps(document, indent=1, allow_nan=False) + "\n"
         lost = (
-            (INDEPENDENT, IMPOSSIBLE.format(tries=TRIES), ONE_UNIT) if document["ranges"] else (NO_INTERVALS, ONE_UNIT)
+            (INDEPENDENT, IMPOSSIBLE.format(tries=ENSEMBLE.tries), ONE_UNIT)
+            if document["ranges"]
+            else (NO_INTERVALS, ONE_UNIT)
         )
         return Written(content.encode(), lost)
 
@@ -48,7 +59,7 @@ def document_of(servo: Servo) -> dict:
     """{"ranges": {name: {"value", "low", "high"}}, "ensemble": [{"parameters", "joint", "actuator"}]} and what they are
     of; the first member is the model itself.
     """
-    sheet, random = servo.sheet, np.random.default_rng(SEED)
+    sheet, random = servo.sheet, np.random.default_rng(ENSEMBLE.seed)
     values = identified(sheet)
     ranges = {
         name: {"value": values[name], "low": low, "high": high}
@@ -56,7 +67,7 @@ def document_of(servo: Servo) -> dict:
         if name in values
     }
     members = [_member(servo, {})]
-    members += [_drawn(servo, ranges, random) for _ in range(MEMBERS - 1 if ranges else 0)]
+    members += [_drawn(servo, ranges, random) for _ in range(ENSEMBLE.members - 1 if ranges else 0)]
     return {
         "version": 1,
         "model": servo.name,
@@ -65,7 +76,7 @@ def document_of(servo: Servo) -> dict:
         "output": servo.signals[1],
         "inertia": servo.inertia,
         "units": "joint and actuator as in MuJoCo, SI; per inertia (J = 1) where inertia is null",
-        "seed": SEED,
+        "seed": ENSEMBLE.seed,
         "ranges": ranges,
         "ensemble": members,
     }
@@ -100,7 +111,7 @@ def with_values(sheet: Datasheet, values: Mapping[str, float]) -> Datasheet:
 
 
 def _drawn(servo: Servo, ranges: Mapping[str, Mapping[str, float]], random: np.random.Generator) -> dict:
-    for _ in range(TRIES):
+    for _ in range(ENSEMBLE.tries):
         values = {name: _draw(row["value"], row["low"], row["high"], random) for name, row in ranges.items()}
         try:
             return _member(servo, values)
@@ -111,7 +122,7 @@ def _drawn(servo: Servo, ranges: Mapping[str, Mapping[str, float]], random: np.r
 
 def _draw(value: float, low: float, high: float, random: np.random.Generator) -> float:
     """Within the interval, as near to the value as its two halves say; of a positive number by its logarithm."""
-    z = float(np.clip(random.standard_normal(), -SIGMAS, SIGMAS)) / SIGMAS
+    z = float(np.clip(random.standard_normal(), -ENSEMBLE.sigmas, ENSEMBLE.sigmas)) / ENSEMBLE.sigmas
     end = high if z > 0 else low
     if low > 0 and value > 0:
         return value * math.exp(abs(z) * math.log(end / value))

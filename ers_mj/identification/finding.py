@@ -13,7 +13,7 @@ from ers_mj.data.prepared import Trace
 from ers_mj.errors import InputError
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.identification.minimisers import LS, MINIMISERS, Minimum
-from ers_mj.identification.minimisers.ls import ATTEMPTS
+from ers_mj.identification.minimisers.ls import MULTISTART
 from ers_mj.identification.misfit import Misfit, Search, Simulator, structure_at
 from ers_mj.identification.structure import Structure
 from ers_mj.identification.unknowns import FACTORS, Unknowns
@@ -122,7 +122,10 @@ def _minimum(search: Search, settings: Settings, simulate: Simulator | None, att
     objective = Misfit(search, jobs=settings.jobs, simulate=None if by_squares else simulate)
     lower, upper = search.bounds
     method = (
-        LS(gain=GAINS.search, attempts=attempts or (TRIALS.after_opening if search.unknowns.guessed else ATTEMPTS))
+        LS(
+            gain=GAINS.search,
+            attempts=attempts or (TRIALS.after_opening if search.unknowns.guessed else MULTISTART.attempts),
+        )
         if by_squares
         else MINIMISERS[settings.method]
     )

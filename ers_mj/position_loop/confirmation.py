@@ -19,11 +19,20 @@ from ers_mj.position_loop.runs import Run
 from ers_mj.position_loop.selection import Left, Selection, Selector
 from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, without
 
-FIRST, LAST = 0.7, 0.3  # shares of the only recording that are fitted and held out; the last that is recalibrated on
-COARSER = 3  # blocks of a run that are judged as one
-PARTS = 3  # of every one of a few recordings, left out in turn
-MOST_FOLDS = 6  # of more recordings several are left out at once
-STEPS = 12  # of a refit to the rest
+
+@dataclass(frozen=True)
+class Split:
+    """What of the recordings is held out, and how far a refit to the rest goes."""
+
+    first: float = 0.7  # share of the only recording that is fitted, the rest being held out
+    last: float = 0.3  # share of a held-out run, its beginning, that is recalibrated on
+    coarser: int = 3  # blocks of a run that are judged as one
+    parts: int = 3  # of every one of a few recordings, left out in turn
+    most_folds: int = 6  # of more recordings several are left out at once
+    steps: int = 12  # of a refit to the rest
+
+
+SPLIT = Split()
 
 
 @dataclass(frozen=True)
@@ -68,17 +77,17 @@ def folds_of(runs: Sequence[Run], held: Sequence[Run]) -> tuple[list[Fold], str]
     """
     if held:
         return [Fold(None, tuple(held))], "recordings that were opened after the selection had ended"
-    if len(runs) > MOST_FOLDS:
-        groups = [tuple(runs[k::MOST_FOLDS]) for k in range(MOST_FOLDS)]
+    if len(runs) > SPLIT.most_folds:
+        groups = [tuple(runs[k :: SPLIT.most_folds]) for k in range(SPLIT.most_folds)]
         folds = [Fold(tuple(r for r in runs if r not in out), out) for out in groups]
-        return folds, f"every {MOST_FOLDS}th recording left out in turn; the structure was chosen on all"
+        return folds, f"every {SPLIT.most_folds}th recording left out in turn; the structure was chosen on all"
     if len(runs) > 1:
-        spans = [(k / PARTS, (k + 1) / PARTS) for k in range(PARTS)]
+        spans = [(k / SPLIT.parts, (k + 1) / SPLIT.parts) for k in range(SPLIT.parts)]
         folds = [Fold(_some(r.outside(*span) for r in runs), _some(r.only(*span) for r in runs)) for span in spans]
         folds = [fold for fold in folds if fold.training and fold.held]
         return folds, "each third of every recording left out in turn; the structure was chosen on all"
     only = runs[0]
-    return [Fold((only.only(0.0, FIRST),), (only.only(FIRST, 1.0),))], "the last 30 % of the only recording"
+    return [Fold((only.only(0.0, SPLIT.first),), (only.only(SPLIT.first, 1.0),))], "the last 30 % of the only recording"
 
 
 def _some(runs: Iterable[Run]) -> tuple[Run, ...]:
@@ -92,7 +101,7 @@ def scored(models: Sequence[LoopModel], folds: Sequence[Fold]) -> Score:
     for model, fold in zip(models, folds, strict=True):
         for run in fold.held:
             e = (run.y - model.predicted(run))[run.scored]
-            block = run.block[run.scored] // COARSER
+            block = run.block[run.scored] // SPLIT.coarser
             counts = np.bincount(block - block[0])
             sums = np.bincount(block - block[0], (e / run.sigma) ** 2)
             errors.append(e)
@@ -112,7 +121,7 @@ def bare_fit(selector: Selector, selection: Selection) -> Fit:
         for other in selection.named:
             model = without(model, other.name)
         starts.append(replace(model, free=bare.free) if set(model.free) == set(bare.free) else bare)
-    tried = [fitted(model, selector.data, STEPS) for model in starts]
+    tried = [fitted(model, selector.data, SPLIT.steps) for model in starts]
     return fitted(min(tried, key=lambda fit: fit.cost).model, selector.data)
 
 
@@ -150,7 +159,7 @@ def _judged(
 
 
 def _refitted(model: LoopModel, folds: Sequence[Fold]) -> list[LoopModel]:
-    return [model if f.training is None else fitted(model, Data.of(f.training), STEPS).model for f in folds]
+    return [model if f.training is None else fitted(model, Data.of(f.training), SPLIT.steps).model for f in folds]
 
 
 def _p_value(after: Score, less: Score, policy: Policy) -> float:
@@ -181,7 +190,7 @@ def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
                 squares, count = squares + float(e @ e), count + e.size
                 continue
             seen = run.t[run.scored]
-            share = (seen[0] + LAST * (seen[-1] - seen[0])) / run.t[-1]
+            share = (seen[0] + SPLIT.last * (seen[-1] - seen[0])) / run.t[-1]
             state = only_letters(model.having(hold=model["hold"]), ("K", "hold", "c_2"))
             again = fitted(state, Data.of([run.only(0.0, share)]), 8).model
             rest = run.only(share, 1.0)

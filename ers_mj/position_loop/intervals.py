@@ -13,10 +13,20 @@ from ers_mj.position_loop import beside
 from ers_mj.position_loop.fit import Data, Fit, fitted, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
 
-RUN = 5  # neighbouring blocks that are taken as one
-FEWEST = 3  # left-out refits from which they count
-TOLD = 0.7  # half width of a logarithm up to which a number is told
-INEXACT, CLOCK = 0.0025, 0.00075  # standard deviations of what firmware and simulation do in steps: relative, and [s]
+
+@dataclass(frozen=True)
+class Doubt:
+    """What widens an interval, and how wide a number that is told may have one."""
+
+    run: int = 5  # neighbouring blocks that are taken as one
+    fewest: int = 3  # left-out refits from which they count
+    told: float = 0.7  # half width of a logarithm up to which a number is told
+    inexact: float = 0.0025  # standard deviation of what firmware and simulation do in steps: relative,
+    clock: float = 0.00075  # [s] and in time
+
+
+DOUBT = Doubt()
+
 RATES = ("K", "I", "a_2", "c_2")
 COMBINED = ("a_2+D", "c_2/K", "(a_2+D)/K", "L/K", "I/K")
 
@@ -50,7 +60,7 @@ class Intervals:
         layout, rate = model.layout(), max(model["a_2"] + model["D"], 0.0)
         j = jacobian(model, data)
         e = data.residuals(model)
-        groups = data.block // RUN
+        groups = data.block // DOUBT.run
         slopes = np.array([np.bincount(groups, j[:, k] * e) for k in range(len(layout))]).T
         hessian = j.T @ j
         size = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
@@ -58,7 +68,7 @@ class Intervals:
         n = slopes.shape[0]
         spread = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
         spread += inverse * float(np.mean(e * e))
-        if len(left_out) >= FEWEST and set(left_out[0].free) == set(fit.model.free):
+        if len(left_out) >= DOUBT.fewest and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
         steps = [_inexact(f, q, rate, model["K"]) for f, q in zip(layout, model.vector(layout), strict=True)]
         spread += np.diag(np.square(steps))
@@ -71,7 +81,7 @@ class Intervals:
             if (f.owner, f.name) == (owner, name):
                 half = self.factor * math.sqrt(max(self.covariance[k, k], 0.0))
                 low, high = f.ends(z[k], half)
-                known = half < TOLD if f.positive else True
+                known = half < DOUBT.told if f.positive else True
                 return Told(f.inside(z[k]), (low, high), known)
         return None
 
@@ -115,7 +125,7 @@ class Intervals:
             slope[k] = (ends[0] - ends[1]) / 2e-4
         half = self.factor * math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
         half = min(half, 50.0)
-        return Told(value, (value * math.exp(-half), value * math.exp(half)), half < TOLD)
+        return Told(value, (value * math.exp(-half), value * math.exp(half)), half < DOUBT.told)
 
 
 def _inexact(f: Free, z: float, rate: float, K: float) -> float:
@@ -123,10 +133,10 @@ def _inexact(f: Free, z: float, rate: float, K: float) -> float:
     [1/s] and goes on in steps of h has rates wrong by rate h / 2; a drive that is late by h acts as the damping -K h.
     """
     if f.name == "D":
-        return K * CLOCK / f.size
+        return K * DOUBT.clock / f.size
     if f.name in ("tau_s", "dead_time_s"):
-        return CLOCK / f.size
-    relative = math.hypot(INEXACT, 0.5 * rate * CLOCK) if f.name in RATES else INEXACT
+        return DOUBT.clock / f.size
+    relative = math.hypot(DOUBT.inexact, 0.5 * rate * DOUBT.clock) if f.name in RATES else DOUBT.inexact
     return relative * (1.0 if f.positive else abs(z))
 
 

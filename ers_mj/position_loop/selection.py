@@ -175,7 +175,7 @@ class Selector:
         found = self._whole(best(starts, self.screen, EFFORT.full, EFFORT.several))
         found = self._firmware(found)
         within = self._whole(best(delayed_within(found.model), self.screen, EFFORT.full))
-        return self.unburdened(within if gain(found, within) > self.policy.loop_gain else found)
+        return self.unburdened(within if gain(found, within) > self.policy.loop_place else found)
 
     def _firmware(self, fit: Fit) -> Fit:
         """The fit, or a better one of the same loop in another firmware: the speed that it damps lags behind; its gain

@@ -20,9 +20,19 @@ from ers_mj.selection.measure import FREE_RUN, Measure
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 TURNS = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # [rad] from which a phase is fitted in a new recording
-RECALIBRATED = 0.3  # first share of a held-out recording that its record state is fitted on
-REFIT_STEPS, REFIT_END = 12, 1e-3  # steps at most of a fold's refit, and gain in C of one at which it ends
-LAST_PART = 0.7  # where the only recording is cut into training and held out
+
+
+@dataclass(frozen=True)
+class Refit:
+    """What a fold is refitted on, and how far."""
+
+    recalibrated: float = 0.3  # first share of a held-out recording that its record state is fitted on
+    steps: int = 12  # at most of a fold's refit,
+    end: float = 1e-3  # and gain in C of one at which it ends
+    last_part: float = 0.7  # where the only recording is cut into training and held out
+
+
+REFIT = Refit()
 
 
 @dataclass(frozen=True)
@@ -90,7 +100,7 @@ def settled(model: Model, trace: Trace, tau: float) -> Model:
     are NaN stays away.
     """
     if all(BY_NAME[name].wave for name in model.local or {}):
-        trace = trace.part(0, int(RECALIBRATED * trace.t.size))
+        trace = trace.part(0, int(REFIT.recalibrated * trace.t.size))
     one = replace(model.of_records([0]), free=(), frozen=model.names)
     layout = one.layout()
     if not layout:
@@ -141,7 +151,7 @@ def folds(traces: Sequence[Trace], holdout: Sequence[Trace]) -> tuple[list[Fold]
                 " was chosen on all"
             ),
         )
-    cut = int(LAST_PART * traces[0].t.size)
+    cut = int(REFIT.last_part * traces[0].t.size)
     return (
         [Fold(traces[0].part(cut, traces[0].t.size), (traces[0].part(0, cut),), halved=True)],
         (
@@ -174,7 +184,7 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[M
 
     def along(begun: Model, fold: Fold, known: Columns) -> Model:
         slopes = Along(known=known, renewals=0)
-        return fit(begun, fold.training or (), tau=tau, steps=REFIT_STEPS, along=slopes, tolerance=REFIT_END).model
+        return fit(begun, fold.training or (), tau=tau, steps=REFIT.steps, along=slopes, tolerance=REFIT.end).model
 
     def one(fold: Fold) -> Model:
         if fold.training is None:
@@ -221,7 +231,7 @@ def recalibrated(model: Model, trace: Trace, measure: Measure = FREE_RUN) -> Rec
     """Gain, friction level and (where the plant feels position) offset fitted on the first 30 % of a recording; the
     score is taken on the rest. They stay neutral unless they buy their price there.
     """
-    cut = int(RECALIBRATED * trace.t.size)
+    cut = int(REFIT.recalibrated * trace.t.size)
     head = trace.part(0, cut)
     known = {name: rows[[0, 0]] for name, rows in (model.local or {}).items()}
     held = (*model.names, *(f"{name}, local" for name in known))

@@ -13,10 +13,20 @@ from ers_mj.effects import BY_NAME
 from ers_mj.estimation.initial_state import fitted_start
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
-UPRIGHT = 0.35  # [rad] from where gravity pulls the other way, within which no free run follows an arm
-WINDOW, FEWEST = 2.0, 100  # [s] length of a window, and samples that it holds at least
-# steps of the fit of a window's state, parts of a step that are tried, and noise levels by which a slope is told
-STEPS, PARTS, NUDGE = 4, (1.0, 0.3), 0.1
+
+@dataclass(frozen=True)
+class Windows:
+    """Where a run is measured in windows, how long they are, and how the state of one is fitted."""
+
+    upright: float = 0.35  # [rad] from where gravity pulls the other way, within which no free run follows an arm
+    length: float = 2.0  # [s] of a window,
+    fewest: int = 100  # and samples that it holds at least
+    steps: int = 4  # of the fit of a window's state,
+    parts: tuple[float, ...] = (1.0, 0.3)  # of a step that are tried,
+    nudge: float = 0.1  # and noise levels by which a slope is told
+
+
+WINDOWS = Windows()
 
 
 @dataclass(frozen=True)
@@ -48,7 +58,7 @@ def measure_of(model: Model, traces: Sequence[Trace]) -> Measure:
     """What such a plant can hold: a free run where a spring, a preload or gravity that hangs brings it back."""
     if model.values["a_1"] > 0 or model.values["c_1"] > 0 or _hangs(model, traces):
         return FREE_RUN
-    return Measure(max(WINDOW, FEWEST * float(max(trace.sample_time for trace in traces))))
+    return Measure(max(WINDOWS.length, WINDOWS.fewest * float(max(trace.sample_time for trace in traces))))
 
 
 def _hangs(model: Model, traces: Sequence[Trace]) -> bool:
@@ -59,7 +69,7 @@ def _hangs(model: Model, traces: Sequence[Trace]) -> bool:
     if not holding:
         return False
     y = np.concatenate([trace.y[trace.valid] for trace in traces])
-    ends = np.linspace(float(y.min()) - UPRIGHT, float(y.max()) + UPRIGHT, 181)
+    ends = np.linspace(float(y.min()) - WINDOWS.upright, float(y.max()) + WINDOWS.upright, 181)
     torque = sum(effect.columns(ends) @ p for effect, p in holding)
     turns = np.flatnonzero(np.diff(np.sign(torque)) > 0)  # where it drives away: upright
     return turns.size == 0
@@ -69,7 +79,7 @@ def _in_window(model: Model, trace: Trace, record: int, begun: np.ndarray) -> np
     """Simulated output (N,) from the output and speed that fit the whole of it best, looked for from those (2,) of an
     observer.
     """
-    scale = np.array([NUDGE * trace.sigma, NUDGE * trace.sigma / (trace.t[-1] - trace.t[0])])
+    scale = np.array([WINDOWS.nudge * trace.sigma, WINDOWS.nudge * trace.sigma / (trace.t[-1] - trace.t[0])])
 
     def misses(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         run = model.predict(trace, record, start=(x[0], x[1]))
@@ -77,10 +87,10 @@ def _in_window(model: Model, trace: Trace, record: int, begun: np.ndarray) -> np
 
     x = np.where(np.isfinite(begun), begun, (trace.start[0], 0.0))
     run, e = misses(x)
-    for _ in range(STEPS):
+    for _ in range(WINDOWS.steps):
         slopes = np.column_stack([(misses(x + step)[1] - e) / size for step, size in zip(np.diag(scale), scale)])
         way = -np.linalg.lstsq(slopes, e, rcond=1e-9)[0]
-        tries = [(x + part * way, *misses(x + part * way)) for part in PARTS]
+        tries = [(x + part * way, *misses(x + part * way)) for part in WINDOWS.parts]
         trial, there, left = min(tries, key=lambda one: float(one[2] @ one[2]))
         if not left @ left < e @ e * (1.0 - 1e-4):
             break

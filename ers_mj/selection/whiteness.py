@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,9 +23,18 @@ from ers_mj.estimation.objective import is_rough, residuals_in
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
 LAGS = (1, 2, 3)  # samples
-FEWEST = 20  # samples in a block; at low sample rates several blocks are one
-FEWEST_PAIRS = 12  # a lag, in a block that is judged
-LEAST = -0.9  # power of a block, in those of the noise, that chance does not go below
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Which blocks are judged, and from what power on."""
+
+    samples: int = 20  # in a block at least; at low sample rates several blocks are one
+    pairs: int = 12  # a lag at least, in a block that is judged
+    least: float = -0.9  # power of a block, in those of the noise, that chance does not go below
+
+
+JUDGED = Judged()
 
 
 def left_by_sensor(model: Model, traces: Sequence[Trace]) -> dict[str, float]:
@@ -65,7 +75,7 @@ def is_beyond_rounding(model: Model, traces: Sequence[Trace], policy: Policy = P
 def _told(model: Model, trace: Trace, record: int) -> dict[str, np.ndarray]:
     """ln(1 + power) in each block of a recording, by sensor; NaN in a block of too few known samples."""
     parts = trace.plain(residuals_in(model, trace, record, OBSERVER_RATE)).reshape(-1, trace.t.size)
-    block = trace.block // math.ceil(FEWEST * trace.sample_time / BLOCK)
+    block = trace.block // math.ceil(JUDGED.samples * trace.sample_time / BLOCK)
     sensors = [("output", trace.y, trace.sigma, trace.quantum, trace.valid)]
     sensors += [(c.kind, c.values, c.sigma, converter_step(c.values), np.isfinite(c.values)) for c in trace.channels]
     told = {}
@@ -73,7 +83,7 @@ def _told(model: Model, trace: Trace, record: int) -> dict[str, np.ndarray]:
         power = remembered(e, known, block)
         if step > 0:
             power = power - _converted(values - e * sigma, values, sigma, step, known, block)
-        told[kind] = np.log1p(np.maximum(power, LEAST))
+        told[kind] = np.log1p(np.maximum(power, JUDGED.least))
     return told
 
 
@@ -90,7 +100,7 @@ def remembered(e: np.ndarray, known: np.ndarray, block: np.ndarray) -> np.ndarra
         where = block[:-lag][both]
         total += np.bincount(where, (e[:-lag] * e[lag:])[both], size)
         pairs += np.bincount(where, minlength=size)
-    return np.where(pairs >= FEWEST_PAIRS * len(LAGS), total / np.maximum(pairs, 1.0), np.nan)
+    return np.where(pairs >= JUDGED.pairs * len(LAGS), total / np.maximum(pairs, 1.0), np.nan)
 
 
 def _converted(

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ers_mj.data.consistency.sheet import Sheet
 
-OVER = 0.02  # [s] over which a speed is taken
+
+@dataclass(frozen=True)
+class Following:
+    """Over what a speed is taken, and how late a servo may follow."""
+
+    over: float = 0.02  # [s] over which a speed is taken
+    alike: float = 0.05  # of a correlation, by which two lags are as good as alike
+    latest: float = 0.5  # [s] by which a servo may follow late,
+    tried: int = 12  # and how many lags are tried
+
+
+FOLLOWING = Following()
 
 
 def speed(sheet: Sheet) -> np.ndarray:
-    """The output's (N,) [output unit / s], by differences over about OVER; 0 where nothing is known."""
+    """The output's (N,) [output unit / s], by differences over about FOLLOWING.over; 0 where nothing is known."""
     known = np.isfinite(sheet.y)
     y = np.interp(sheet.t, sheet.t[known], sheet.y[known])
-    k = min(max(1, round(0.5 * OVER / float(np.median(np.diff(sheet.t))))), y.size // 4)
+    k = min(max(1, round(0.5 * FOLLOWING.over / float(np.median(np.diff(sheet.t))))), y.size // 4)
     late, early = np.minimum(np.arange(y.size) + k, y.size - 1), np.maximum(np.arange(y.size) - k, 0)
     return (y[late] - y[early]) / (sheet.t[late] - sheet.t[early])
 
@@ -34,17 +47,13 @@ def lagged(x: np.ndarray, y: np.ndarray, lags: np.ndarray) -> tuple[float, float
     """
     found = [likeness(x[: x.size - k], y[k:]) for k in lags]
     most = max(abs(alike) for _, alike in found)
-    first = next(k for k, (_, alike) in enumerate(found) if abs(alike) > most - ALIKE)
+    first = next(k for k, (_, alike) in enumerate(found) if abs(alike) > most - FOLLOWING.alike)
     run = [pair for pair in found[first:] if pair[1] * found[first][1] >= 0.0]
     return max(run, key=lambda pair: abs(pair[1]))
-
-
-ALIKE = 0.05  # of a correlation, by which two lags are as good as alike
-LATEST, TRIED = 0.5, 12  # [s] by which a servo may follow late, and how many lags are tried
 
 
 def lags_of(sheet: Sheet) -> np.ndarray:
     """Samples by which an output may follow late."""
     step = float(np.median(np.diff(sheet.t)))
-    most = min(round(LATEST / step), sheet.t.size // 4)
-    return np.unique(np.linspace(0, most, TRIED).astype(int))
+    most = min(round(FOLLOWING.latest / step), sheet.t.size // 4)
+    return np.unique(np.linspace(0, most, FOLLOWING.tried).astype(int))

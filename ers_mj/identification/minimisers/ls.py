@@ -14,20 +14,29 @@ import numpy as np
 from ers_mj.identification.minimisers.base import Meter, Minimiser, Objective
 from ers_mj.solvers.levenberg_marquardt import Damping, Descent
 
-DIFFERENCE = 1e-5  # of the coordinates, or of the box's width where that is less
-LONGEST, DAMPED = 2.0, 20  # step in any coordinate, and how often the damping may be raised for it
-PROMISING = 0.3  # of that share, which a step along fresh slopes must promise to be tried
+
+@dataclass(frozen=True)
+class Multistart:
+    """How a search steps, when its attempts end, and how many there are."""
+
+    difference: float = 1e-5  # of the coordinates, or of the box's width where that is less
+    longest: float = 2.0  # step in any coordinate,
+    damped: int = 20  # and how often the damping may be raised for it
+    promising: float = 0.3  # of the least gain, which a step along fresh slopes must promise to be tried
+    stage_gain: float = 0.01  # share of the value below which a step ends a stage,
+    end_gain: float = 1e-9  # and the search
+    stage_left: float = 1e-5  # share of the first value of an attempt that is enough for a stage,
+    exact: float = 1e-22  # and all that rounding leaves of it
+    below_target: float = 1e-14  # share of the target that is as good as nothing
+    wide: float = 100.0  # differences: slopes that see over a kink, tried once where others lead no further
+    attempts: int = 6  # starts at most
+    alike: float = 0.01  # of the value, within which attempts have ended in one place,
+    often: int = 2  # and how many make it the bottom
+
+
+MULTISTART = Multistart()
+
 DAMPING = Damping(first=1e-2, raised=6.0, from_=1e-7, lowered=6.0, least=1e-12)
-STAGE_GAIN = 0.01  # share of the value below which a step ends a stage
-END_GAIN = 1e-9  # and the search
-STAGE_LEFT, EXACT = (
-    1e-5,
-    1e-22,
-)  # shares of the first value of an attempt: enough for a stage, and all that rounding leaves
-BELOW_TARGET = 1e-14  # share of the target that is as good as nothing
-WIDE = 100.0  # times DIFFERENCE: slopes that see over a kink, tried once where others lead no further
-ATTEMPTS = 6
-ALIKE, OFTEN = 0.01, 2  # of the value, within which attempts have ended in one place, and how many make it the bottom
 
 
 class LS(Minimiser):
@@ -44,7 +53,7 @@ class LS(Minimiser):
     sentence = "multi-start trust-region least squares"
     needs_residuals = True
 
-    def __init__(self, attempts: int = ATTEMPTS, staged: bool = True, gain: float = END_GAIN):
+    def __init__(self, attempts: int = MULTISTART.attempts, staged: bool = True, gain: float = MULTISTART.end_gain):
         self.attempts, self.staged, self.gain = attempts, staged, gain
 
     def _search(self, meter: Meter, random: np.random.Generator, start: np.ndarray | None) -> None:
@@ -58,11 +67,11 @@ class LS(Minimiser):
             start = None
             first = None
             for stage in getattr(meter.objective, "stages", ()) if self.staged else ():
-                x, _, begun = _descend(meter, stage, x, STAGE_GAIN, STAGE_LEFT)
+                x, _, begun = _descend(meter, stage, x, MULTISTART.stage_gain, MULTISTART.stage_left)
                 first = first or begun
-            x, value, _ = _descend(meter, None, x, self.gain, EXACT, first)
+            x, value, _ = _descend(meter, None, x, self.gain, MULTISTART.exact, first)
             ends.append(value)
-            if value <= target or sum(end <= min(ends) * (1.0 + ALIKE) for end in ends) >= OFTEN:
+            if value <= target or sum(end <= min(ends) * (1.0 + MULTISTART.alike) for end in ends) >= MULTISTART.often:
                 return
 
 
@@ -100,7 +109,7 @@ class _Squares:
         self.asks = True
         if self.given:
             return np.array(self.given(point.z, point.e), order="F")
-        return _slopes(self.meter, self.stage, point.z, point.e, wide * DIFFERENCE)
+        return _slopes(self.meter, self.stage, point.z, point.e, wide * MULTISTART.difference)
 
     def normal(self, point: _Place, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return 2.0 * (slopes.T @ slopes), 2.0 * (slopes.T @ point.e)
@@ -110,7 +119,7 @@ class _Squares:
         move = np.clip(point.z + _step(curvature, slope, damping, held), self.lower, self.upper) - point.z
         if self.asks:
             promised = -(slope @ move + 0.5 * move @ curvature @ move)
-            self.hopeless = bool(promised < PROMISING * self.least_gain * point.cost)
+            self.hopeless = bool(promised < MULTISTART.promising * self.least_gain * point.cost)
             self.asks = bool(self.given)
         return None if self.hopeless else move
 
@@ -125,7 +134,7 @@ def _descend(
     e = meter.residuals(x, stage)
     descent, wide = Descent(problem, _Place(x, e, _squares(e)), DAMPING), 1.0
     first = descent.point.cost if first is None else first
-    exact = max(enough * first, BELOW_TARGET * getattr(meter.objective, "target", 0.0))
+    exact = max(enough * first, MULTISTART.below_target * getattr(meter.objective, "target", 0.0))
     while np.isfinite(descent.point.cost) and descent.point.cost > exact:
         if descent.slopes is None:
             descent.renew(problem.slopes(descent.point, wide))
@@ -136,7 +145,7 @@ def _descend(
             if problem.hopeless or descent.fresh and (wide > 1.0 or not problem.may_look_wider):
                 break
             if descent.fresh:
-                wide, descent.damping = WIDE, DAMPING.first
+                wide, descent.damping = MULTISTART.wide, DAMPING.first
             descent.slopes = None
         elif step.gain < least_gain * before:
             if step.fresh or descent.slopes is None:
@@ -162,7 +171,7 @@ def _slopes(meter: Meter, stage: Objective | None, x: np.ndarray, e: np.ndarray,
 
 
 def _step(hessian: np.ndarray, slope: np.ndarray, damping: float, held: np.ndarray) -> np.ndarray:
-    """Marquardt's step (k,), none in what a bound holds, damped further until it is no longer than LONGEST.
+    """Marquardt's step (k,), none in what a bound holds, damped further until it is no longer than MULTISTART.longest.
 
     (Scaled to that length it would crawl in all directions where one is soft.)
     """
@@ -170,9 +179,9 @@ def _step(hessian: np.ndarray, slope: np.ndarray, damping: float, held: np.ndarr
     if free.size:
         part = hessian[np.ix_(free, free)]
         scale = np.diag(part) + 1e-9 * np.trace(part) / free.size + 1e-300
-        for _ in range(DAMPED):
+        for _ in range(MULTISTART.damped):
             step[free] = -np.linalg.lstsq(part + damping * np.diag(scale), slope[free], rcond=1e-14)[0]
-            if np.abs(step).max() <= LONGEST:
+            if np.abs(step).max() <= MULTISTART.longest:
                 break
             damping *= 4.0
-    return step / max(1.0, float(np.abs(step).max()) / LONGEST)
+    return step / max(1.0, float(np.abs(step).max()) / MULTISTART.longest)
