@@ -25,7 +25,7 @@ def test_a_search_ends_at_what_it_may_simulate_and_says_so(pushed, monkeypatch):
     )
     whole = fit(far, pushed.traces)
     assert not effort.is_cut and whole.model.effort is effort
-    monkeypatch.setattr(descent, "MOST", 0.4 * effort.spent)
+    monkeypatch.setattr(descent, "EFFORT", replace(descent.EFFORT, most=0.4 * effort.spent))
     before = effort.spent
     part = fit(far, pushed.traces)
     assert effort.is_cut and part.model.effort is effort and part.cost >= whole.cost
