@@ -355,7 +355,7 @@ class Policy:
     )  # fmt: skip
     loop_place: float = _threshold(
         10.0, "half blocks times ln of squared errors' ratio", "a latency within the loop where the command's would do",
-        "half of a name's, since neither place has more numbers; 24 clean servos are within 1 but for one of 21",
+        "half of a name's: neither place has more numbers; set in view of pdloop_delay, which gains 17",
     )  # fmt: skip
     loop_integral: float = _threshold(
         0.05, "1/s, I over K", "integral action that is not there", "of 16 PD loops all refitted below 0.005"

@@ -186,11 +186,12 @@ def _places(case: LoopCase, samples: Samples) -> list[Place]:
 
 
 def _views(case: LoopCase, samples: Samples) -> list[RecordView]:
+    """Held out is only what no part of was fitted; the rest is drawn as the answer has it."""
     out, seen = [], set()
     for base, model, fold in zip(
         case.confirmed.before_models, case.confirmed.models, case.confirmed.folds, strict=True
     ):
-        for run in (one for one in fold.held if one.name not in seen):
+        for run in (one for one in fold.held if not fold.fits(one)):
             out.append(_view(case, run, base, model, True, ()))
             seen.add(run.name)
     for k, run in enumerate(case.runs):

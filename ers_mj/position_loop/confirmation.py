@@ -42,6 +42,10 @@ class Fold:
     training: tuple[Run, ...] | None
     held: tuple[Run, ...]
 
+    def fits(self, run: Run) -> bool:
+        """Whether other parts of a run that is held out are fitted."""
+        return any(run.name == other.name for other in self.training or ())
+
 
 @dataclass(frozen=True)
 class Score:
@@ -185,7 +189,7 @@ def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
     squares, count = 0.0, 0
     for model, fold in zip(models, folds, strict=True):
         for run in fold.held:
-            if any(run.name == other.name for other in fold.training or ()):
+            if fold.fits(run):
                 e = (run.y - model.predicted(run))[run.scored]
                 squares, count = squares + float(e @ e), count + e.size
                 continue

@@ -201,3 +201,18 @@ class Chart {
   rest() { this.read.textContent = this.hint || ""; }
   leave() { this.marks?.replaceChildren(); this.rest(); }
 }
+
+// Levels over frequencies f, of which the k-th is read.
+class OverFrequency extends Chart {
+  get hint() { return "Point, or move with the arrow keys, to read a frequency."; }
+
+  entries() { return this.data.levels.map(({ kind, name }) => [kind, name]); }
+
+  key({ key }) {
+    const way = { ArrowLeft: -1, ArrowRight: 1 }[key];
+    if (!way) return false;
+    this.k = Math.min(Math.max(this.k + way, 0), this.f.length - 1);
+    this.point();
+    return true;
+  }
+}

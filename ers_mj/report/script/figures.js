@@ -73,9 +73,7 @@ class HeatMap extends Chart {
 
 // -- the error over frequency --------------------------------------------------------------------------------------
 
-class Spectrum extends Chart {
-  get hint() { return "Point, or move with the arrow keys, to read a frequency."; }
-
+class Spectrum extends OverFrequency {
   constructor(host, data) {
     super(host, data);
     this.f = unpacked(data.f);
@@ -84,8 +82,6 @@ class Spectrum extends Chart {
     this.phase = unpacked(data.phase);
     this.k = 0;
   }
-
-  entries() { return this.data.levels.map(({ kind, name }) => [kind, name]); }
 
   paint() {
     const { data, f } = this, beside = this.width >= WIDE, left = 58, all = [0, f.length], ends = [f[0], f.at(-1)];
@@ -130,14 +126,6 @@ class Spectrum extends Chart {
       y2: b.y + b.h }, this.marks));
     const levels = this.levels.map(({ name, y }) => `${name} ${told(y[this.k], 3)}`).join(" · ");
     this.read.textContent = `${told(f, 3)} Hz · ${levels} ${this.data.unit}${gap}`;
-  }
-
-  key({ key }) {
-    const way = { ArrowLeft: -1, ArrowRight: 1 }[key];
-    if (!way) return false;
-    this.k = Math.min(Math.max(this.k + way, 0), this.f.length - 1);
-    this.point();
-    return true;
   }
 }
 

@@ -63,17 +63,13 @@ class Coverage extends Chart {
 }
 
 // Power densities of output and input over their peaks.
-class Power extends Chart {
-  get hint() { return "Point, or move with the arrow keys, to read a frequency."; }
-
+class Power extends OverFrequency {
   constructor(host, data) {
     super(host, data);
     this.f = unpacked(data.f).map(v => 10 ** v);
     this.levels = data.levels.map(({ kind, name, y }) => ({ kind, name, y: unpacked(y) }));
     this.k = 0;
   }
-
-  entries() { return this.data.levels.map(({ kind, name }) => [kind, name]); }
 
   paint() {
     const { f } = this, left = 58, all = [0, f.length];
@@ -96,13 +92,5 @@ class Power extends Chart {
     this.marks.replaceChildren();
     make("line", { class: "cursor", x1: h, x2: h, y1: y, y2: y + high }, this.marks);
     this.read.textContent = `${told(f, 3)} Hz · ${this.levels.map(level => `${level.name} ${told(level.y[this.k], 3)} dB`).join(" · ")}`;
-  }
-
-  key({ key }) {
-    const way = { ArrowLeft: -1, ArrowRight: 1 }[key];
-    if (!way) return false;
-    this.k = Math.min(Math.max(this.k + way, 0), this.f.length - 1);
-    this.point();
-    return true;
   }
 }
