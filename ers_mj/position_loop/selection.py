@@ -60,7 +60,8 @@ class Effort:
     promise: float = 0.3  # of what is asked for, from which a law is refitted,
     begun: int = 3  # from so many of its starts
     finalists: int = 3  # candidates that are refitted to the end,
-    near: float = 0.3  # those that gain this share of what the best one gains at first
+    near: float = 0.3  # those that gain this share of what the best one gains at first,
+    nearer: float = 0.6  # or this one, where a refit to the end takes in more recordings than are screened
     enough: float = 1.15  # noise levels of error that one body may leave before two are tried
     speeds: tuple[float, ...] = (0.9, 1.0, 1.15)  # of the largest seen, to which the reference is limited
     inset: float = 0.06  # of the travel, beyond which a stop may act
@@ -123,6 +124,7 @@ class Selector:
 
     def _take(self, runs: Sequence[Run]) -> None:
         self.data = Data.of(runs)
+        self._roughs: dict[tuple, list[Rough]] = {}
         some = spread_out(runs, EFFORT.screened)
         self.screen = self.data if len(some) == len(runs) else Data.of(some)
 
@@ -166,7 +168,7 @@ class Selector:
     def base(self) -> Fit:
         """The loop with a limit and without, under gravity (or a spring where the output is no angle)."""
         loads = ("hold", "sin", "cos") if self.is_angle else ("hold", "a_1")
-        roughs = [rough for width in SCAN.widths for rough in rough_starts(self.runs, loads, width)]
+        roughs = [rough for width in SCAN.widths for rough in self._rough(loads, width)]
         starts = [self.begun(rough) for rough in roughs]
         first = min(roughs, key=lambda rough: rough.left)
         if "L" in first.values:
@@ -252,7 +254,8 @@ class Selector:
     def _ranked(self, current: Fit, candidates: Sequence[Term]) -> list[Compared]:
         seen = current if self.screen is self.data else fitted(current.model, self.screen, EFFORT.tried)
         quick = sorted(self._map(partial(self._tried, seen), candidates), key=lambda c: -c.gain)
-        least = EFFORT.near * max((c.gain for c in quick), default=0.0)
+        near = EFFORT.near if self.screen is self.data else EFFORT.nearer
+        least = near * max((c.gain for c in quick), default=0.0)
         ready = [c for c in quick[: EFFORT.finalists] if c.gain > max(least, 0.0)]
         full = list(self._map(partial(self._finished, current), ready))
         return sorted([*full, *quick[len(ready) :]], key=lambda c: -c.gain)
@@ -313,7 +316,7 @@ class Selector:
         begun = []
         for speed in speeds:
             for width in SCAN.widths:
-                roughs = rough_starts(self.runs, loads, width, speed, not is_rate)
+                roughs = self._rough(loads, width, speed, not is_rate)
                 begun += [self.begun(rough, **({"R": speed} if is_rate else {})) for rough in roughs]
         for name, values in model.effects:
             if name != GRAVITY:
@@ -321,6 +324,13 @@ class Selector:
         return replace(
             term, starts=(*term.starts, *(replace(m, side=model.side, whole=model.whole) for m in begun)), is_bent=True
         )
+
+    def _rough(self, *asked, **within) -> list[Rough]:
+        """As weak_form.rough_starts of the runs; what was asked once is not worked out again."""
+        key = (*asked, *within.values())
+        if key not in self._roughs:
+            self._roughs[key] = rough_starts(self.runs, *asked, **within)
+        return self._roughs[key]
 
     def _stopped(self, model: LoopModel) -> list[LoopModel]:
         """Stops at the ends of the travel, beside what a regression makes of the rest of it."""
@@ -330,7 +340,7 @@ class Selector:
         found = []
         for lower, upper in ((-np.inf, high), (low, np.inf), (low, high)):
             within = (lower + inset, upper - inset)
-            for rough in rough_starts(self.runs, loads, SCAN.widths[0], within=within):
+            for rough in self._rough(loads, SCAN.widths[0], within=within):
                 found += stops(self.begun(rough), lower + 0.3 * inset, upper - 0.3 * inset)
         return found
 
