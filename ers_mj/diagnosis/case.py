@@ -283,14 +283,14 @@ class Case:
             out[(f.owner, f.name)] = ends
         return out
 
-    def state_errors(self) -> dict[tuple[str, int], tuple[float, float]]:
-        """95 % intervals of the training recordings' states, by (state, recording)."""
-        if not self.model.states:
+    def state_errors(self, model: Model) -> dict[tuple[str, int], tuple[float, float]]:
+        """95 % intervals of the training recordings' states under a model, by (state, recording)."""
+        if not model.states:
             return {}
-        layout = self.model.layout()
-        widths = half_widths(self.model, self.start.traces, (), self.selection.tau)
+        layout = model.layout()
+        widths = half_widths(model, self.start.traces, (), self.selection.tau)
         return {
             (f.owner, f.index): f.ends(q, w)
-            for f, q, w in zip(layout, self.model.vector(layout), widths)
+            for f, q, w in zip(layout, model.vector(layout), widths)
             if f.owner in STATES
         }
