@@ -17,7 +17,7 @@ from ers_mj.position_loop.fit import Data, Fit, fitted
 from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run
 from ers_mj.position_loop.selection import Left, Selection, Selector
-from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, without
+from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, is_there, together, without
 
 
 @dataclass(frozen=True)
@@ -138,16 +138,34 @@ def judged(selection: Selection) -> list[Left]:
 def confirmed(
     selector: Selector, selection: Selection, held: Sequence[Run], policy: Policy
 ) -> tuple[Selection, Confirmed]:
-    """The selection without what held-out data does not confirm, and what it says of the rest."""
+    """The selection without what held-out data does not confirm, and what it says of the rest.
+
+    Of several terms that went each is tried once more beside what stayed: another may have stood in its place.
+    """
     folds, sentence = folds_of(selector.runs, held)
+    first = selection
     while True:
         found = _judged(selector, selection, folds, sentence, policy)
-        doubtful = [x for x in judged(selection) if not _holds(found, x.name, selector.runs, policy)]
+        doubtful = _doubtful(found, selection, selector.runs, policy)
         if not doubtful:
-            return selection, found
+            break
         weakest = min(doubtful, key=lambda x: x.gain)
         lesser = fitted(weakest.fit.model, selector.data)
         selection = selector.pruned(replace(selection, chosen=lesser, left=()))
+    gone = [x for x in first.named if not is_there(selection.chosen.model, x.name)]
+    for name in [x.name for x in sorted(gone, key=lambda x: -x.gain)] if len(gone) > 1 else ():
+        again = selector.grown(selection, together(selection.chosen.model, first.chosen.model, name))
+        if again is None or not is_there(again.chosen.model, name):
+            continue
+        told = _judged(selector, again, folds, sentence, policy)
+        if not _doubtful(told, again, selector.runs, policy):
+            selection, found = again, told
+    return selection, found
+
+
+def _doubtful(found: Confirmed, selection: Selection, runs: Sequence[Run], policy: Policy) -> list[Left]:
+    """What held-out data does not confirm."""
+    return [x for x in judged(selection) if not _holds(found, x.name, runs, policy)]
 
 
 def _judged(

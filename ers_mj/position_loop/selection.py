@@ -16,7 +16,9 @@ import numpy as np
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
+from ers_mj.effects.input_delay import InputDelay
 from ers_mj.effects.rate_limit import RateLimit
+from ers_mj.effects.voltage_saturation import VoltageSaturation
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain, jacobian
 from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run, scales_of
@@ -44,6 +46,7 @@ from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
 Progress = Callable[[str, float], None]
 GRAVITY = GravityImbalance.name
 FIRST = (RateLimit.name, INTEGRAL)
+BARE = (InputDelay.name, VoltageSaturation.name, RateLimit.name)  # what the loop of any servo may have
 
 
 @dataclass(frozen=True)
@@ -362,10 +365,21 @@ class Selector:
                 return replace(selection, chosen=current, left=tuple(left))
             current = weakest.fit
 
+    def grown(self, selection: Selection, begun: LoopModel) -> Selection | None:
+        """The selection from a model with one more term, without what that makes needless; None where chance offers as
+        much.
+        """
+        current, fit = selection.chosen, fitted(begun, self.data, EFFORT.full)
+        if gain(current, fit) < self.policy.loop_gain:
+            return None
+        return self.pruned(replace(selection, chosen=fit, left=()))
+
     def _least(self, left: Left, current: Fit) -> float:
-        """What a term must buy; one whose size says that it is not there, or that takes no share, everything."""
+        """What a term must buy; one whose size says that it is not there, or that takes no share (a part of the bare
+        loop's need not), everything.
+        """
         model = current.model
-        if not self._pays(left.fit, current):
+        if left.name not in BARE and not self._pays(left.fit, current):
             return math.inf
         if left.name == INTEGRAL and model["I"] < self.policy.loop_integral * model["K"]:
             return math.inf
