@@ -23,8 +23,8 @@ These are confounders: each is tried in the place of what is named. Where one ex
 """
 TABLED = """## What stays unknown
 
-Tables without a shape of their own, fitted beside the answer where a mismatch is left, and kept where held-out data asks
-for them (`[[remainder]]` in model.toml). They are neither named nor tried in the place of anything.
+Tables without a shape of their own, fitted beside the answer where a mismatch is left, and kept where held-out data
+asks for them (`[[remainder]]` in model.toml). They are neither named nor tried in the place of anything.
 """
 CLASSES = """## Scored as one
 

@@ -13,7 +13,7 @@ import numpy as np
 from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, paired_p, pays
 from ers_mj.decisions.explained import cost, score
 from ers_mj.decisions.thresholds import Policy
-from ers_mj.position_loop.fit import Data, Fit, fitted
+from ers_mj.position_loop.fit import Data, Fit, fitted, gain
 from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run
 from ers_mj.position_loop.selection import Left, Selection, Selector
@@ -200,9 +200,10 @@ def _holds(found: Confirmed, name: str, runs: Sequence[Run], policy: Policy) -> 
 # -- what a day changes ---------------------------------------------------------------------------------------------
 
 
-def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
+def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold], policy: Policy) -> float:
     """Pooled error [output unit] of the rest of each held-out run, once gain, offset and friction level are fitted to
-    its first 30 %; of all that is held out of a run that was fitted to, whose day is the same.
+    its first 30 %, where that buys as much as a term must; of all that is held out of a run that was fitted to, whose
+    day is the same.
     """
     squares, count = 0.0, 0
     for model, fold in zip(models, folds, strict=True):
@@ -214,8 +215,10 @@ def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
             seen = run.t[run.scored]
             share = (seen[0] + SPLIT.last * (seen[-1] - seen[0])) / run.t[-1]
             state = only_letters(model.having(hold=model["hold"]), ("K", "hold", "c_2"))
-            again = fitted(state, Data.of([run.only(0.0, share)]), 8).model
-            rest = run.only(share, 1.0)
-            e = (rest.y - again.predicted(rest))[rest.scored]
+            head, rest = Data.of([run.only(0.0, share)]), run.only(share, 1.0)
+            again = fitted(state, head, 8)
+            as_it_is = fitted(only_letters(model, ()), head, 0)
+            day = again.model if gain(as_it_is, again) > policy.loop_gain else model
+            e = (rest.y - day.predicted(rest))[rest.scored]
             squares, count = squares + float(e @ e), count + e.size
     return math.sqrt(squares / max(count, 1))
