@@ -57,7 +57,7 @@ def test_what_acts_within_a_loop_alone_is_refused_without_one(effect):
         simulate_recording(read_datasheet("table1"), T, 0 * T, effects=[(effect.name, values)])
 
 
-@pytest.mark.parametrize("effect", [e for e in EFFECTS if not e.only_in_loop], **ids)
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if not (e.only_in_loop or e.tabled)], **ids)
 def test_what_a_reader_may_give_acts_and_leaves_numbers(effect):
     """Any of an effect's numbers, however few, are refused or change the recording: none is swallowed in silence."""
     starts = effect.starts(SCALES)

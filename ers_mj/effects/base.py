@@ -47,6 +47,7 @@ class Effect:
         # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see confounders.py)
         True
     )
+    tabled: ClassVar[bool] = False  # a table of what stays unknown (see selection/unknown.py): no candidate, no suspect
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     redundant: ClassVar[int] = (
@@ -134,6 +135,10 @@ class Effect:
 
     def starts(self, scales: Scales) -> list[np.ndarray]:
         """Parameter vectors (k,) of a visible size from which a fit is begun; empty where the effect cannot apply."""
+        raise NotImplementedError
+
+    def blank(self, scales: Scales) -> np.ndarray:
+        """The entries (k,) of a table over these recordings that changes nothing, if it is ``tabled``."""
         raise NotImplementedError
 
     def symptom(self, seen: Symptoms, policy: Policy) -> np.ndarray | None:

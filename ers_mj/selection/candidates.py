@@ -22,7 +22,7 @@ from ers_mj.selection.finishing import Early, finished, told
 from ers_mj.selection.overlooked import refit_held_taut, refit_the_overlooked
 from ers_mj.selection.refits import Label, Refits, is_law_of_dear, is_out_of_reach, leaders
 from ers_mj.selection.screening import Begin, screen
-from ers_mj.servo.model import DRIFTS, Model
+from ers_mj.servo.model import DAY, DRIFTS, Model
 
 
 def candidates(
@@ -81,6 +81,9 @@ class _Race(Refits):
         model, records = self.base.model, len(self.bench.traces)
         states = [s for s in DRIFTS if records > 1 and s not in (model.states or {})]
         self.starts = {(s, 0): [Begin(model.with_state(s, records), {})] for s in states}
+        if set(DAY) <= set(states):  # of one alone the other may make a local minimum
+            first, second = DAY
+            self.starts[(first, 1)] = [Begin(model.with_state(first, records).with_state(second, records), {})]
         self.best = self.quick([(label, begins[0]) for label, begins in self.starts.items()])
         failed: set[str] = set()
         while new := [name for name in self.screened.promising(failed) if (name, 0) not in self.starts]:
