@@ -254,7 +254,7 @@ def test_a_report_shows_the_worst_moment_before_and_after(sheet):
 @draws
 @pytest.mark.parametrize(
     ("effects", "unit", "rig"),
-    [((), "rad", "blade"), ((), "m", "carriage"), ((("gravity_imbalance", {"g_s": 30.0, "g_c": 10.0}),), "rad", "arm")],
+    [((), "rad", "joint"), ((), "m", "slide"), ((("gravity_imbalance", {"g_s": 30.0, "g_c": 10.0}),), "rad", "arm")],
 )
 def test_the_rig_is_drawn_as_what_it_is(effects, unit, rig):
     plant = plant_of(Datasheet(lumped={"a_2": 70.0, "b": 90.0}, effects=effects), output_unit=unit)

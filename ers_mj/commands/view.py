@@ -46,8 +46,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="show the plant in three dimensions",
         description=(
             "The plant in MuJoCo's viewer, or in a picture. A recording is replayed: what was measured is the"
-            " translucent ghost. A model is drawn as what it is: the rudder, an arm under gravity, a carriage, a"
-            " blade;\none with a position loop follows the shape of --input within +-0.5 rad (+-20 mm)."
+            " translucent ghost. A model is drawn as what it is: the rudder, an arm under gravity, a slide, a"
+            " joint;\none with a position loop follows the shape of --input within +-0.5 rad (+-20 mm)."
         ),
         epilog=(
             "examples:\n  ers view --linkage rod\n  ers view model.toml --replay run1.csv --render replay.gif\n"
