@@ -5,7 +5,7 @@ import pytest
 from csv_made import csv_text, problem, put
 
 from ers_mj.data.recording import read_recording
-from ers_mj.data.sensor_faults import converter_step, frozen_spans, leapt_spans, unmoved_spans
+from ers_mj.data.sensor_faults import converter_step, frozen_spans, leapt_spans, repeated_spans, unmoved_spans
 
 
 def travel(n: int, sigma: float, seed: int) -> np.ndarray:
@@ -117,6 +117,20 @@ def test_a_leap_of_few_counts_is_chance(counts, hold, noise, more):
     assert leapt_spans(y, grid, noise * grid) == []
     y[hold + 2 :] += more * grid
     assert leapt_spans(y, grid, noise * grid) == [slice(hold, hold + 2)]
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-5, 1.3e-4])
+@pytest.mark.parametrize("printed", [1e-6, 1e-5])
+def test_single_repeats_are_lost_samples_where_they_are_more_than_noise_makes(step, printed):
+    rng, n = np.random.default_rng(3), 900
+    y = 0.3 * np.sin(np.arange(n) * 0.05) + 8e-4 * rng.standard_normal(n)
+    y = np.round((np.round(y / step) * step if step else y) / printed) * printed
+    assert repeated_spans(y, 0.0) == []
+    lost = np.arange(20, n, 37)
+    y[lost] = y[lost - 1]
+    found = {k for s in repeated_spans(y, 0.0) for k in range(s.start, s.stop)}
+    assert len(found & set(lost)) >= (0 if step == 1.3e-4 else 0.6 * lost.size)
+    assert len(found - set(lost)) <= 0.3 * lost.size
 
 
 def test_decimal_steps_in_degrees_are_told_apart_by_their_size(tmp_path, columns):

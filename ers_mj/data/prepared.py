@@ -13,7 +13,15 @@ from ers_mj.data.channels import Channel, channels_of, supply_of
 from ers_mj.data.kept import Kept
 from ers_mj.data.quantisation import Converter
 from ers_mj.data.recording import Recording
-from ers_mj.data.sensor_faults import at_extreme, frozen_spans, leapt_spans, noise_sigma, spikes, unmoved_spans
+from ers_mj.data.sensor_faults import (
+    at_extreme,
+    frozen_spans,
+    leapt_spans,
+    noise_sigma,
+    repeated_spans,
+    spikes,
+    unmoved_spans,
+)
 from ers_mj.decisions.thresholds import POLICY
 from ers_mj.errors import InputError
 
@@ -217,7 +225,8 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
     stuck: list[slice] = []
     for found in (frozen_spans(y, recording.quantum), unmoved_spans(y, recording.quantum, sigma)):
         stuck += [s for s in found if not at_extreme(y, s) and not _meets(s, stuck)]
-    stuck += [s for s in leapt_spans(y, recording.quantum, sigma) if not _meets(s, stuck)]
+    for found in (leapt_spans(y, recording.quantum, sigma), repeated_spans(y, recording.quantum)):
+        stuck += [s for s in found if not _meets(s, stuck)]
     lost = (*spikes(np.where(recording.valid, y, np.nan), sigma), *stuck)
     signals = Signals(recording.t, recording.u, y, recording.valid, recording.enable, load)
     trace = make_trace(recording.name, signals, sigma, recording.quantum)

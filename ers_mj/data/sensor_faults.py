@@ -23,6 +23,21 @@ HOLDS = Holds()
 
 
 @dataclass(frozen=True)
+class Repeats:
+    """When readings that stay alike from one sample to the next are more than chance."""
+
+    near: float = 0.5  # of the noise, to either side: changes that tell how often chance gives one of none
+    most_cells: int = 12  # steps to either side that are enough to tell it
+    times: float = 1.5  # that; the print may make the least change of a converter a third smaller than its step
+    chance: float = 1e-5  # that as many repeats come of noise
+    noise: float = 4.0  # steps of noise, from which a reading seldom stays
+    most: float = 0.2  # share of the samples, above which a reading is refreshed slowly and not lost
+
+
+REPEATS = Repeats()
+
+
+@dataclass(frozen=True)
 class Leaps:
     """When the change after a span is the catching up of one that was held."""
 
@@ -125,6 +140,33 @@ def leapt_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
         if abs(leap) > least and before * after > 0 and LEAPS.way[0] < leap / way < LEAPS.way[1]:
             out.append(slice(s.start + 1, s.stop))
     return out
+
+
+def repeated_spans(y: np.ndarray, grid: float) -> list[slice]:
+    """Repeats of y (N,), single ones too, where changes of exactly none are many more than changes of a step or a few:
+    noise of several steps of the ``grid``, or of the least change that there is, makes one as seldom as the other.
+    """
+    changes = np.abs(np.diff(y))
+    grid = max(grid, float(np.min(changes[changes > 0.0], initial=np.inf)))
+    noise = _noise(y)
+    if noise < REPEATS.noise * grid:
+        return []
+    cells = min(int(REPEATS.near * noise / grid), REPEATS.most_cells)
+    alike, near = np.count_nonzero(changes == 0.0), np.count_nonzero(changes < (cells + 0.5) * grid)
+    if not _is_more_than_chance(alike, near, REPEATS.times / (2 * cells + 1)) or alike > REPEATS.most * y.size:
+        return []
+    return [slice(s.start + 1, s.stop) for s in held_spans(y, 2) if _dithered(y, s)]
+
+
+def _is_more_than_chance(seen: int, of: int, p: float) -> bool:
+    """Whether so many successes of probability p are more than chance, by Chernoff's bound (Ann. Math. Stat. 23,
+    1952).
+    """
+    share = seen / max(of, 1)
+    if share <= p:
+        return False
+    missed = (of - seen) * math.log((1.0 - share) / (1.0 - p)) if seen < of else 0.0
+    return -(seen * math.log(share / p) + missed) < math.log(REPEATS.chance)
 
 
 def held_spans(x: np.ndarray, shortest: int = HOLDS.shortest) -> list[slice]:
