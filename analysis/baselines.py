@@ -169,13 +169,15 @@ METHODS = {"whiteness": whiteness, "all-free": all_free, "sparse": sparse, "ours
 # -- cases and scores -------------------------------------------------------------------------------------------------
 
 
-def cases_of(folder: Path, answers: Path) -> tuple[dict[str, list[str]], Path]:
-    """The files of each case, by its name, and the sealed truth; that of a proof is sealed as an export's would be."""
+def cases_of(folder: Path, answers: Path, first: int | None) -> tuple[dict[str, list[str]], Path]:
+    """The files of each of the ``first`` cases, by its name, and their truth, sealed as an export's is."""
     if (folder / "cases.json").is_file():
-        listed = json.loads((folder / "cases.json").read_text())["cases"]
-        return {case: sorted(files) for case, files in listed.items()}, Path(f"{folder}.truth.json")
-    truths = {path.stem: json.loads(path.read_text()) for path in sorted((folder / "sealed").glob("case-*.json"))}
-    seed = json.loads((folder / "settings.json").read_text())["seed"]
+        sealed = json.loads(Path(f"{folder}.truth.json").read_text())
+        seed, truths = sealed["seed"], sealed["truths"]
+    else:
+        truths = {path.stem: json.loads(path.read_text()) for path in sorted((folder / "sealed").glob("case-*.json"))}
+        seed = json.loads((folder / "settings.json").read_text())["seed"]
+    truths = dict(list(truths.items())[:first])
     digest = hash_of(json.dumps(truths, indent=1).encode())
     truth = answers / "truth.json"
     truth.write_text(json.dumps({"version": 1, "truth_sha256": digest, "seed": seed, "truths": truths}, indent=1))
@@ -194,10 +196,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", type=Path)
     parser.add_argument("answers", type=Path)
+    parser.add_argument("--first", type=int, help="so many cases")
     parser.add_argument("--only", default=",".join(METHODS), help="which methods, with commas")
     arguments = parser.parse_args()
     arguments.answers.mkdir(parents=True, exist_ok=True)
-    listed, truth = cases_of(arguments.cases, arguments.answers)
+    listed, truth = cases_of(arguments.cases, arguments.answers, arguments.first)
     methods = arguments.only.split(",")
     for method in methods:
         for case, files in listed.items():

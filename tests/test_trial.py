@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -253,7 +254,9 @@ def test_a_table_and_a_page_are_written(tmp_path, capsys):
     assert cli.main(arguments) == 0
     out = capsys.readouterr().out
     assert "time-optimal" in out and " V, 24 V are there" in out and "report.html" in out
-    page = read((tmp_path / "out" / "report.html").read_text())
+    html = (tmp_path / "out" / "report.html").read_text()
+    assert "--cd9762b: #" in html and not re.search(r'style="[^"]*: #[0-9a-f]{6}', html)  # no colour that is light only
+    page = read(html)
     words = " ".join(page.words)
     assert (
         "The paper's claims are for its own servo" in words

@@ -263,6 +263,14 @@ def test_the_rig_is_drawn_as_what_it_is(effects, unit, rig):
     assert f"The {rig} at the worst moments" in report_page({}, evidence(0.02, unit), frames)
 
 
+@pytest.mark.parametrize(
+    ("kind", "said"), [("position", "joint within the servo’s position loop"), ("voltage", "joint")]
+)
+def test_a_page_of_another_joint_does_not_speak_of_the_paper(kind, said):
+    page = report_page({"data": {"input_kind": kind}}, evidence(0.02))
+    assert f"is a plain {said}, refitted" in page and "paper’s" not in page and "rudder" not in page
+
+
 def test_frames_are_left_out_where_they_would_tell_nothing():
     plant = plant_of(SHEET)
     assert frames_of(plant, evidence(1e-4)) is None and frames_of(plant, evidence(0.02, "m")) is None
