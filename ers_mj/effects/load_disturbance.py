@@ -39,10 +39,11 @@ class LoadDisturbance(Load):
     tries = 3
 
     def starts(self, scales):
-        """Around each hot span: pushes either way, up to four times what friction holds (a preload holds as much),
-        begun somewhat before it or in it; long ones fade.
+        """Those that the recordings ask for, and around each hot span pushes either way, up to four times what friction
+        holds (a preload holds as much), begun somewhat before it or in it; long ones fade.
         """
-        return [
+        asked = [self._of(size, begin, length, record, False) for record, begin, length, size in scales.pushed]
+        return asked + [
             self._of(
                 size * scales.acceleration, begin + later, length, record, length > 0.1
             )  # shorter, it is begun as one that ends

@@ -90,8 +90,9 @@ class Scales:
     recording [s], ``recordings`` their number, ``cog`` the longest period at the output that a motor's cogging has
     behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of
     one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most,
-    ``waves`` the (kind, period) of what it leaves along the travel: of a "torque", a "friction" or the "reading",
-    ``is_held`` whether an effect holds the output where others have a spring.
+    ``pushed`` the pushes (recording, begin [s], length [s], acceleration) that it asks for there, ``waves`` the (kind,
+    period) of what it leaves along the travel: of a "torque", a "friction" or the "reading", ``is_held`` whether an
+    effect holds the output where others have a spring.
     """
 
     position: float
@@ -111,6 +112,7 @@ class Scales:
     duration: float = 10.0
     recordings: int = 1
     hot: tuple[tuple[int, float, float], ...] = ()
+    pushed: tuple[tuple[int, float, float, float], ...] = ()
     waves: tuple[tuple[str, float], ...] = ()
     is_held: bool = False
 

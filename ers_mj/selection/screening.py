@@ -16,6 +16,7 @@ from ers_mj.estimation.objective import Run, run_of
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.impulse_search import NEARING, impulses
+from ers_mj.selection.latent_force import pushes
 from ers_mj.selection.secants import View, by_recordings, first_order, hopeful, of_each_form, promise, view_of
 from ers_mj.selection.spectrum import waves_of
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
@@ -161,7 +162,9 @@ class _Screening:
     def _struck(self, view: View, effect: Effect) -> list[tuple[float, Model]]:
         """What impulses gain, where all that is left around a place is enough for one to be refitted."""
         least = self.bench.search.promising * self._second()
-        starts = effect.starts(replace(view.place.scales, hot=hot_spans(view.run, self.bench, least)))
+        hot = hot_spans(view.run, self.bench, least)
+        pushed = pushes(view.place, self.bench.traces, hot)
+        starts = effect.starts(replace(view.place.scales, hot=hot, pushed=pushed))
         found = impulses(view.run, effect, starts, view.targets[0].power, self.bench.traces, self.bench.tau, least)
         return sorted(found, key=lambda p: -p[0])
 

@@ -84,7 +84,7 @@ def _grown(current: Fit, traces: Sequence[Trace], tau: float) -> Fit:
 def _held(models: Sequence[Model], parts: Sequence[Fold], measure: Measure) -> tuple[Score, Score]:
     """The held-out scores as they are, and recalibrated."""
     pairs = list(zip(models, parts, strict=True))
-    raw = pooled([scored(model, fold.held_out, fold.record, measure=measure) for model, fold in pairs])
+    raw = pooled([scored(model, fold.held_out, measure=measure) for model, fold in pairs])
     return raw, pooled([recalibrated(model, fold.held_out, measure).score for model, fold in pairs])
 
 
