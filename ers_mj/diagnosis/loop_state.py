@@ -100,8 +100,8 @@ def _entry(state: State, names: Sequence[str]) -> dict:
     told = ", ".join(f"{of} {shown(v, unit)}" for of, v in zip(names, values, strict=True))
     if len(values) > MOST_TOLD:
         low, high = int(np.argmin(values)), int(np.argmax(values))
-        ends = f"from {shown(values[low], unit)} ({names[low]}) to {shown(values[high], unit)} ({names[high]})"
-        told = f"{ends}, over {len(values)} of them"
+        least, most = (f"{shown(values[k], unit)} ({names[k]})" for k in (low, high))
+        told = f"from {least} to {most}, over {len(values)} of them"
     return {
         "name": name,
         "unit": unit,
