@@ -1,13 +1,15 @@
-"""Plain methods on the cases of `ers prove --export DIR`: `python analysis/baselines.py DIR ANSWERS [--only NAME,...]`.
+"""Plain methods and ours on the same cases: `python analysis/baselines.py DIR ANSWERS [--only NAME,...]`.
 
-Each writes ANSWERS/NAME/case-NNN/diagnosis.json, which `ers prove --score ANSWERS/NAME --truth SEALED` scores:
+DIR is that of `ers prove --export DIR`, with DIR.truth.json beside it, or the --out of a finished `ers prove`. Each
+method writes ANSWERS/NAME/case-NNN/diagnosis.json (what is there is kept); then `ers prove --score` scores each, and
+ANSWERS/scores.txt holds what it says of all of them.
 
 - whiteness: Eq. (5) by least squares (`ers identify`), then a Ljung-Box test on what the free run of the next recording
   leaves; it names nothing, it can only say that something is missing.
 - all-free: one linear regression of the acceleration on a column or a few for every effect that can be written as one,
   all free at once; an effect is named where its columns pass an F test under one count of chance (Holm).
 - sparse: the same columns by pysindy's sequentially thresholded least squares; what is not thresholded away is named.
-- frozen: ours, as analysis/golden holds it for cases of `ers prove --seed 4201`; of other cases `ers batch` tells.
+- ours: `ers diagnose`, one thread.
 
 Nothing is tuned on the cases: thresholds are 1 % and pysindy's default.
 """
@@ -27,6 +29,8 @@ from scipy import stats
 from scipy.signal import butter, sosfiltfilt
 
 import ers_mj as ers
+from ers_mj.cli import main as command
+from ers_mj.proving.sealing import hash_of
 
 LEVEL = 0.01  # chance of a name where nothing is, and of a flag
 CUTOFF = 25.0  # [Hz] of the filter on both sides of the regression
@@ -154,33 +158,62 @@ def sparse(recordings: list[Path], sheet: Path) -> dict:
     return answer(recordings, sorted((n for n in share if share[n]), key=lambda n: -share[n]), flagged=False)
 
 
-def frozen(recordings: list[Path], sheet: Path) -> dict:
-    """Ours, as commit 581c791 answered the cases of seed 4201 (analysis/golden.py)."""
-    table = Path(__file__).resolve().parent / "golden" / "seeds" / f"{sheet.parent.name}.json"
-    said = json.loads(table.read_text())["answer"]
-    told = answer(recordings, said["names"], said["significant"])
-    return told | {"where": [{"axis": "subsystem", "label": said["where_subsystem"]}]}
+def ours(recordings: list[Path], sheet: Path) -> dict:
+    """What this tree's diagnosis says."""
+    return ers.diagnose([str(path) for path in recordings], str(sheet), jobs=1).to_dict()
 
 
-METHODS = {"whiteness": whiteness, "all-free": all_free, "sparse": sparse, "frozen": frozen}
+METHODS = {"whiteness": whiteness, "all-free": all_free, "sparse": sparse, "ours": ours}
+
+
+# -- cases and scores -------------------------------------------------------------------------------------------------
+
+
+def cases_of(folder: Path, answers: Path, first: int | None) -> tuple[dict[str, list[str]], Path]:
+    """The files of each of the ``first`` cases, by its name, and their truth, sealed as an export's is."""
+    if (folder / "cases.json").is_file():
+        sealed = json.loads(Path(f"{folder}.truth.json").read_text())
+        seed, truths = sealed["seed"], sealed["truths"]
+    else:
+        truths = {path.stem: json.loads(path.read_text()) for path in sorted((folder / "sealed").glob("case-*.json"))}
+        seed = json.loads((folder / "settings.json").read_text())["seed"]
+    truths = dict(list(truths.items())[:first])
+    digest = hash_of(json.dumps(truths, indent=1).encode())
+    truth = answers / "truth.json"
+    truth.write_text(json.dumps({"version": 1, "truth_sha256": digest, "seed": seed, "truths": truths}, indent=1))
+    return {case: sorted(said["files_sha256"]) for case, said in truths.items()}, truth
+
+
+def scores(answers: Path, method: str, truth: Path) -> str:
+    """What `ers prove --score` says of a method."""
+    place = answers / f"{method}.scored"
+    command(["prove", "--score", str(answers / method), "--truth", str(truth), "--out", str(place), "--force"])
+    return (place / "summary.txt").read_text().strip()
 
 
 def main() -> None:
-    """Answer every case by each method."""
+    """Answer every case by each method, and score them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", type=Path)
     parser.add_argument("answers", type=Path)
-    parser.add_argument("--only", default="whiteness,all-free,sparse", help="which methods, with commas")
+    parser.add_argument("--first", type=int, help="so many cases")
+    parser.add_argument("--only", default=",".join(METHODS), help="which methods, with commas")
     arguments = parser.parse_args()
-    listed = json.loads((arguments.cases / "cases.json").read_text())["cases"]
-    for method in arguments.only.split(","):
+    arguments.answers.mkdir(parents=True, exist_ok=True)
+    listed, truth = cases_of(arguments.cases, arguments.answers, arguments.first)
+    methods = arguments.only.split(",")
+    for method in methods:
         for case, files in listed.items():
-            recordings = [arguments.cases / case / file for file in sorted(files) if file.endswith(".csv")]
-            told = METHODS[method](recordings, arguments.cases / case / "datasheet.toml")
             place = arguments.answers / method / case
+            if (place / "diagnosis.json").exists():
+                continue
+            recordings = [arguments.cases / case / file for file in files if file.endswith(".csv")]
+            told = METHODS[method](recordings, arguments.cases / case / "datasheet.toml")
             place.mkdir(parents=True, exist_ok=True)
             (place / "diagnosis.json").write_text(json.dumps(told, indent=1))
             print(method, case, told["verdict"], *(m["effect"] for m in told["missing"]), flush=True)
+    text = "\n\n".join(f"== {method}\n\n{scores(arguments.answers, method, truth)}" for method in methods)
+    (arguments.answers / "scores.txt").write_text(text + "\n")
 
 
 if __name__ == "__main__":

@@ -101,10 +101,10 @@ def in_mjlab(folder: Path, given) -> np.ndarray:
 
 
 def python_of(tool: str, folder: Path) -> Path:
-    """An environment with a tool, made where it is not there."""
+    """An environment with a tool, made where it is not there, or not whole."""
     place = folder / tool
     found = place / ("Scripts" if sys.platform == "win32" else "bin") / "python"
-    if not found.exists():
+    if not found.exists() or subprocess.run([found, "-m", "pip", "-q", "show", tool], capture_output=True).returncode:
         print(f"installing {', '.join(WANTED[tool])} ...", flush=True)
         venv.create(place, with_pip=True)
         subprocess.run([found, "-m", "pip", "install", "-q", *WANTED[tool]], check=True)

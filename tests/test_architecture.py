@@ -32,7 +32,7 @@ MAY_READ = {
     "online": ("data", "estimation", "servo", "solvers"),
     "control": ("data", "effects", "errors", "plants", "servo", "workers"),
     "validation": ("plants", "servo"),
-    "view": ("data", "diagnosis", "errors", "plants", "servo"),
+    "view": ("data", "diagnosis", "errors", "plants", "position_loop", "servo"),
     "proving": ("data", "errors", "plants", "processes", "workers"),
     "report": ("control", "data", "diagnosis", "identification", "online", "plants", "proving", "validation", "view"),
     "export": ("control", "effects", "errors", "plants", "position_loop", "servo"),

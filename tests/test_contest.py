@@ -7,7 +7,7 @@ from stub_tasks import made_case
 
 from ers_mj.cli import main
 from ers_mj.errors import InputError
-from ers_mj.proving import case
+from ers_mj.proving import world
 from ers_mj.proving.contest import answered, export, refuse_places
 from ers_mj.proving.sealing import hash_of
 from ers_mj.workers.base import Task
@@ -136,7 +136,7 @@ def test_what_does_not_go_together_is_one_sentence(handed, argv, said, monkeypat
 
 
 def test_without_a_seed_nobody_can_draw_the_cases_again(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(case, "make", lambda plan, seed: made_case(f"case-{plan.index + 1:03d}", seed))
+    monkeypatch.setattr(world, "make", lambda plan, seed: made_case(f"case-{plan.index + 1:03d}", seed))
     drawn = []
     for name in ("a", "b"):
         assert main(["prove", "--cases", "2", "--export", str(tmp_path / name), "--jobs", "1", "--json"]) == 0

@@ -28,6 +28,7 @@ TRUTH = {
     "emf_share": 0.94,
 }
 NOISE = 1.5e-4
+ONE = replace(POLICY, most_effects=1)  # where one round of the selection tells what is tested
 
 
 def recordings(effects=(), sensor=lambda y: y):
@@ -137,10 +138,10 @@ def test_a_coarse_sensor_is_told_from_the_data():
 
 def test_a_stand_in_is_not_named_where_a_law_without_a_name_explains_more(dead_zone):
     """A motor whose iron saturates is no sagging supply, which takes two thirds of it; a dead zone is no form of such a
-    law. One round of the selection tells it.
+    law.
     """
     iron = recordings([("torque_saturation", np.array([0.15, 24.0]))])
-    document = diagnose(iron, read_datasheet("table1"), policy=replace(POLICY, most_effects=1)).document
+    document = diagnose(iron, read_datasheet("table1"), policy=ONE).document
     assert (document["verdict"], document["missing"]) == ("unexplained", [])
     assert [s["effect"] for s in document["suspects"][:2]] == ["torque_saturation", "supply_sag"]
     assert (
@@ -164,7 +165,7 @@ def acting(*per_record):
 
 def test_a_gust_has_a_phase_of_its_own_in_every_recording():
     gusts = [[("periodic_gust", np.array([12.0, 2.3, phase, *[np.inf] * 4]))] for phase in (0.4, 2.0)]
-    document = diagnose(acting(*gusts), read_datasheet("table1")).document
+    document = diagnose(acting(*gusts), read_datasheet("table1"), policy=ONE).document
     first = document["missing"][0]
     assert first["effect"] == "periodic_gust" and first["evidence"]["heldout_rmse_with_rad"] is None
     assert first["parameters"]["f"]["value"] == pytest.approx(2.3, rel=0.01)
@@ -174,7 +175,7 @@ def test_a_gust_has_a_phase_of_its_own_in_every_recording():
 
 def test_an_impulse_in_one_recording_is_found_there():
     impulse = [("load_disturbance", np.array([60.0, 1.2, 0.3, 0.0, np.inf]))]
-    document = diagnose(acting([], impulse), read_datasheet("table1")).document
+    document = diagnose(acting([], impulse), read_datasheet("table1"), policy=ONE).document
     first = document["missing"][0]
     assert first["effect"] == "load_disturbance" and first["parameters"]["record"]["value"] == 1
     assert first["parameters"]["t_0"]["value"] == pytest.approx(1.2, abs=0.02)

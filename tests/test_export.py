@@ -17,6 +17,7 @@ import pytest
 import ers_mj as ers
 from ers_mj import cli
 from ers_mj.effects import BY_NAME, EFFECTS
+from ers_mj.export import trying
 from ers_mj.export.mujoco_joint import OwnJoint
 from ers_mj.export.servo import servo_of
 from ers_mj.export.targets import TARGETS
@@ -34,6 +35,12 @@ RUN = (
     "stribeck", "limit and delay", "stops, dead zone", "loop, gravity", "loop, late damping", "loop, stops",
     "loop, slide",
 )  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def brief(monkeypatch):
+    """Half of the excitation: through rest and friction both ways, and steps to one side."""
+    monkeypatch.setattr(trying, "DURATION", 2.0)
 
 
 def module(path):

@@ -221,7 +221,7 @@ def test_forgiving_blocks_keeps_the_slope_of_the_sum_that_it_makes():
 
 def test_five_parameters_of_a_mujoco_plant():
     """Within twice their intervals; and with a play, which the plant that is fitted has not, the model is wrong."""
-    t, step = np.arange(4000) / 2e3, 5e-4
+    t, step = np.arange(1500) / 1e3, 5e-4
     u, true = INPUTS["multisine"](t), read_datasheet("table1").to_lumped()
     begin = Datasheet(lumped={name: x * (1.0 if name == "theta_0" else 1.3) for name, x in true.items()})
     settings = Settings(plant="mujoco", fixed={"theta_0": true["theta_0"]}, timestep=step)

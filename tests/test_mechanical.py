@@ -17,7 +17,7 @@ from ers_mj.servo.datasheet import read_datasheet
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 SHEET = read_datasheet("table1")
-T = np.arange(0.0, 3.0, 1e-3)
+T = np.arange(0.0, 1.5, 1e-3)
 EQ_5 = lumped(SHEET.to_lumped() | {"tau_e": 0.0})
 EQ_1 = lumped(SHEET.to_lumped())
 
@@ -61,7 +61,7 @@ def test_a_held_rudder_does_not_creep():
     c = EQ_5
     u = np.full(T.size, (0.9 * c.c_2_plus + c.c_1 + c.a_1 * 0.1) / c.b)
     theta = rudder().simulate(T, u, start=(c.theta_0 + 0.1, 0.0)).theta
-    assert np.degrees(np.ptp(theta[500:2500])) < 1e-3
+    assert np.degrees(np.ptp(theta[500:])) < 1e-3
 
 
 ODD = {

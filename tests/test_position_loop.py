@@ -296,6 +296,6 @@ def test_commands_take_a_model_with_a_loop_or_refuse_it(tmp_path, capsys):
     capsys.readouterr()
     assert main(["simulate", model, "--input", "steps", "--out", out, "--force"]) == 2
     assert "theta_ref_rad" in capsys.readouterr().err
-    assert main(["view", model, "--render", str(tmp_path / "a.png")]) == 2
+    assert main(["excite", model, "--out", str(tmp_path / "a.csv")]) == 2
     assert "position loop" in capsys.readouterr().err
     assert main(["identify", out, "--method", "ga", "--out", str(tmp_path / "other")]) == 2

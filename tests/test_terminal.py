@@ -35,7 +35,7 @@ def test_the_bar_tells_what_has_passed_and_what_is_left(monkeypatch):
 def test_quiet_says_nothing_but_errors_and_json(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["cache", "--quiet"]) == 0 and capsys.readouterr() == ("", "")
-    assert cli.main(["frequency", "--controller", "pid", "--json", "--quiet"]) == 0
+    assert cli.main(["gains", "--json", "--quiet"]) == 0
     assert json.loads(capsys.readouterr().out)
     assert cli.main(["compare", "nowhere", "nowhere", "--quiet"]) == 2
     assert "nowhere: there is no such file" in capsys.readouterr().err

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_mechanical import EQ_1, EQ_5, SHEET, T, rms_deg
+from test_mechanical import EQ_1, EQ_5, SHEET, rms_deg
 from test_reduced import SCALES
 
 from ers_mj.effects import BY_NAME, EFFECTS
@@ -11,6 +11,8 @@ from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.plants.play import rigid_play
 from ers_mj.plants.reduced import ReducedModel
 
+T = np.arange(0.0, 3.0, 1e-3)
+STEP, FINE = 1e-4, 5e-5  # [s] of the twin, and where the effect itself is of such a size
 TOLERANCE = 0.05  # of the effect's own size
 VISIBLE = 0.2  # [deg] RMS
 # where the first start of an effect is too small to be seen beside the two plants' own difference, or has not all of
@@ -56,7 +58,8 @@ def test_law_and_twin_agree(effect, road):
     chosen = [(effect.name, values(effect))]
     law, without = ReducedModel(EQ_5, chosen).simulate(t, u), ReducedModel(EQ_5).simulate(t, u)
     parameters = SHEET.parameters if road == "rudder" else None
-    twin = MechanicalPlant(EQ_5, chosen, parameters=parameters).simulate(t, u)
+    step = FINE if effect.name == "inductance" else STEP
+    twin = MechanicalPlant(EQ_5, chosen, parameters=parameters, timestep=step).simulate(t, u)
     size = rms_deg(law.measured - without.measured)
     assert size > VISIBLE
     if effect.subsystem == "sensor":  # what the sensor does to one and the same angle
@@ -81,7 +84,7 @@ def test_several_effects_at_once_agree():
     ]
     u = INPUTS["multisine"](T)
     law, without = ReducedModel(EQ_1, chosen).simulate(T, u), ReducedModel(EQ_1).simulate(T, u)
-    twin = MechanicalPlant(EQ_1, chosen, parameters=SHEET.parameters).simulate(T, u)
+    twin = MechanicalPlant(EQ_1, chosen, parameters=SHEET.parameters, timestep=STEP).simulate(T, u)
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - without.theta)
 
 
@@ -90,7 +93,7 @@ def test_a_broken_twin_is_noticed():
     drag = next(e for e in EFFECTS if e.name == "quadratic_drag")
     u, p = INPUTS["multisine"](T), values(drag)
     law, without = ReducedModel(EQ_5, [(drag.name, p)]).simulate(T, u), ReducedModel(EQ_5).simulate(T, u)
-    twin = MechanicalPlant(EQ_5, [(drag.name, 1.1 * p)], parameters=SHEET.parameters).simulate(T, u)
+    twin = MechanicalPlant(EQ_5, [(drag.name, 1.1 * p)], parameters=SHEET.parameters, timestep=STEP).simulate(T, u)
     assert rms_deg(twin.theta - law.theta) > TOLERANCE * rms_deg(law.theta - without.theta)
 
 
@@ -98,7 +101,7 @@ def test_both_plants_read_the_recordings_own_clock():
     gust = next(e for e in EFFECTS if e.name == "periodic_gust")
     chosen, late, u = [(gust.name, values(gust))], T + 0.37, INPUTS["multisine"](T)
     law, early = ReducedModel(EQ_5, chosen).simulate(late, u), ReducedModel(EQ_5, chosen).simulate(T, u)
-    twin = MechanicalPlant(EQ_5, chosen).simulate(late, u)
+    twin = MechanicalPlant(EQ_5, chosen, timestep=STEP).simulate(late, u)
     assert rms_deg(law.theta - early.theta) > VISIBLE
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - early.theta)
 
@@ -137,7 +140,7 @@ def test_another_form_agrees(name, p):
     t = BRIEF.get(name, T)
     u = INPUTS["multisine"](t)
     law, plain = (ReducedModel(EQ_5, [(name, np.array(some))]).simulate(t, u) for some in (p, plain_form(name, p)))
-    twin = MechanicalPlant(EQ_5, [(name, np.array(p))], parameters=SHEET.parameters).simulate(t, u)
+    twin = MechanicalPlant(EQ_5, [(name, np.array(p))], parameters=SHEET.parameters, timestep=STEP).simulate(t, u)
     size = rms_deg(law.theta - plain.theta)
     assert size > VISIBLE
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * size
@@ -151,7 +154,7 @@ def test_a_shaft_beside_a_play_softens_its_contact():
     ]
     u = INPUTS["multisine"](T)
     law, stiff = ReducedModel(EQ_5, both).simulate(T, u), ReducedModel(EQ_5, both[:1]).simulate(T, u)
-    twin = MechanicalPlant(EQ_5, both, parameters=SHEET.parameters).simulate(T, u)
+    twin = MechanicalPlant(EQ_5, both, parameters=SHEET.parameters, timestep=STEP).simulate(T, u)
     assert rms_deg(law.theta - stiff.theta) > VISIBLE
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - stiff.theta)
     assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(T, u).theta - law.theta) < 1e-9
@@ -166,7 +169,7 @@ def test_two_bodies_beside_a_bristle_agree(second, bristle):
     both, t = [(second[0], np.array(second[1])), ("presliding", np.array(bristle))], BRIEF["presliding"]
     u = INPUTS["multisine"](t)
     law, rigid = ReducedModel(EQ_5, both).simulate(t, u), ReducedModel(EQ_5, both[:1]).simulate(t, u)
-    twin = MechanicalPlant(EQ_5, both, parameters=SHEET.parameters).simulate(t, u)
+    twin = MechanicalPlant(EQ_5, both, parameters=SHEET.parameters, timestep=STEP).simulate(t, u)
     assert rms_deg(law.theta - rigid.theta) > VISIBLE
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - rigid.theta)
     assert rms_deg(ReducedModel(EQ_5, both[::-1]).simulate(t, u).theta - law.theta) < 1e-9
@@ -192,7 +195,9 @@ def test_a_law_acts_on_its_own_body_in_either_plant(name, road):
     both = [("shaft_compliance", np.array([12.0, 0.1, 0.6, 0.4, np.inf])), (name, values(BY_NAME[name]))]
     u = INPUTS["steps" if BY_NAME[name].friction else "multisine"](T)
     law, plain = ReducedModel(EQ_1, both).simulate(T, u), ReducedModel(EQ_1, both[:1]).simulate(T, u)
-    twin = MechanicalPlant(EQ_1, both, parameters=SHEET.parameters if road == "rudder" else None).simulate(T, u)
+    twin = MechanicalPlant(
+        EQ_1, both, parameters=SHEET.parameters if road == "rudder" else None, timestep=STEP
+    ).simulate(T, u)
     assert rms_deg(law.theta - plain.theta) > VISIBLE
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - plain.theta)
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from ers_mj import cli
 from ers_mj.data.prepared import trace_of
-from ers_mj.data.recording import from_arrays, write_recording
+from ers_mj.data.recording import from_arrays, read_recording, write_recording
 from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.errors import InputError
 from ers_mj.plants.mjcf import mjcf_folder
@@ -19,6 +19,7 @@ from ers_mj.report.diagnosis_report import report_page
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.model_file import write_model
 from ers_mj.view.frames import frames_of
+from ers_mj.view.looped import replayed
 from ers_mj.view.model_file import read_plant, recorded_file
 from ers_mj.view.rendering import Painter
 from ers_mj.view.replay import moments_of, plant_of, posed, recorded, simulated
@@ -50,7 +51,9 @@ def place(tmp_path, monkeypatch):
         "lumped.toml",
         Datasheet(lumped={"a_1": 27.0, "a_2": 70.0, "b": -90.0, "c_1": 129.0, "c_2": 105.0, "theta_0": 0.26}),
     )
+    write_model("loop.toml", Datasheet(lumped={"a_2": 8.0, "c_2": 20.0}, loop={"K": 900.0, "D": 50.0, "L": 600.0}))
     (tmp_path / "plant.xml").write_text(plant_of(PLAY).xml())
+    write_recording("asked.csv", {"t_s": T, "theta_ref_rad": 0.2 * np.sign(T - 0.05), "theta_rad": 2 * T - 0.2})
     write_recording("run.csv", {"t_s": T, "u_V": 4 * np.sin(20 * T), "theta_rad": 0.3 + 0.2 * np.sin(20 * T)})
     write_recording("slide.csv", {"t_s": T, "u_V": 4 * np.sin(20 * T), "x_m": 0.02 * np.sin(20 * T)})
     for name, text in {
@@ -85,6 +88,7 @@ def pictures(path) -> list[np.ndarray]:
         "table1 --linkage rod --gap 1",
         "play.toml",
         "lumped.toml",
+        "loop.toml",
         "plant.xml",
         *(str(mjcf_folder() / f"{name}.xml") for name in ("scene", "rudder_rod", "rudder_constant")),
     ],
@@ -102,7 +106,13 @@ def test_every_model_is_drawn_still_and_moving(model, place, capsys):
 
 @draws
 @pytest.mark.parametrize(
-    "argv", ["play.toml --replay run.csv", "plant.xml --replay run.csv", "lumped.toml --replay slide.csv"]
+    "argv",
+    [
+        "play.toml --replay run.csv",
+        "plant.xml --replay run.csv",
+        "lumped.toml --replay slide.csv",
+        "loop.toml --replay asked.csv",
+    ],
 )
 def test_a_recording_is_replayed(argv, place, capsys):
     assert cli.main(f"view {argv} --render film.gif {SMALL}".split()) == 0
@@ -132,6 +142,19 @@ def test_a_replay_follows_the_simulation():
     rocker, gap = (film.model.joint(name).qposadr[0] for name in ("rocker", "gap"))
     np.testing.assert_allclose(film.qpos[:, rocker] + film.qpos[:, gap], film.theta, atol=1e-12)
     assert 0.01 < np.abs(film.qpos[:, gap]).max() < 0.025 and np.ptp(film.theta) > 0.05
+
+
+def test_a_servo_with_a_loop_follows_what_it_is_asked(place, capsys):
+    """Out and home to half a radian; under a recording it starts where that was measured."""
+    argv = "view loop.toml --input square --render a.png --width 96 --json --duration"
+    ends = {}
+    for seconds in ("0.3", "0.9"):
+        assert cli.main([*argv.split(), seconds, "--force"]) == 0
+        ends[seconds] = json.loads(capsys.readouterr().out)["theta"][-1]
+    assert ends["0.3"] == pytest.approx(0.5, abs=0.05) and ends["0.9"] == pytest.approx(0.0, abs=0.05)
+    film = replayed(read_datasheet("loop.toml"), read_recording("asked.csv"), moments_of(T, 20, 1.0))
+    assert film.theta[0] == pytest.approx(-0.2) and film.theta[-1] > 0.1
+    np.testing.assert_allclose(film.measured, 2 * film.t - 0.2, atol=1e-9)
 
 
 def test_a_recording_starts_where_it_was_measured():
@@ -175,6 +198,9 @@ BAD = {
     "linkage of xml": "plant.xml --linkage rod --render a.png",
     "gap of xml": "plant.xml --gap 1 --render a.png",
     "rod of lumped": "lumped.toml --linkage rod --render a.png",
+    "gap of a loop": "loop.toml --gap 1 --render a.png",
+    "rod of a loop": "loop.toml --replay asked.csv --linkage rod --render a.png",
+    "voltage for a loop": "loop.toml --replay run.csv --render a.png",
     "two plays": "play.toml --gap 1 --render a.png",
     "no model": "none.toml --render a.png",
     "strange": "strange.toml --render a.png",
@@ -228,13 +254,21 @@ def test_a_report_shows_the_worst_moment_before_and_after(sheet):
 @draws
 @pytest.mark.parametrize(
     ("effects", "unit", "rig"),
-    [((), "rad", "blade"), ((), "m", "carriage"), ((("gravity_imbalance", {"g_s": 30.0, "g_c": 10.0}),), "rad", "arm")],
+    [((), "rad", "joint"), ((), "m", "slide"), ((("gravity_imbalance", {"g_s": 30.0, "g_c": 10.0}),), "rad", "arm")],
 )
 def test_the_rig_is_drawn_as_what_it_is(effects, unit, rig):
     plant = plant_of(Datasheet(lumped={"a_2": 70.0, "b": 90.0}, effects=effects), output_unit=unit)
     frames = frames_of(plant, evidence(0.02, unit))
     assert frames.rig == rig and len(frames.moments) == 3
     assert f"The {rig} at the worst moments" in report_page({}, evidence(0.02, unit), frames)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"), [("position", "joint within the servo’s position loop"), ("voltage", "joint")]
+)
+def test_a_page_of_another_joint_does_not_speak_of_the_paper(kind, said):
+    page = report_page({"data": {"input_kind": kind}}, evidence(0.02))
+    assert f"is a plain {said}, refitted" in page and "paper’s" not in page and "rudder" not in page
 
 
 def test_frames_are_left_out_where_they_would_tell_nothing():

@@ -166,8 +166,8 @@ def test_a_monte_carlo_is_the_same_on_a_cluster(cluster, tmp_path):
 
 
 def test_a_proof_is_the_same_on_a_cluster(cluster, tmp_path):
-    """Cases made and answered there, by a diagnosis that refuses what is no recording."""
-    tasks = [Task(f"case-{k:03d}", made_case, (f"case-{k:03d}", k)) for k in (1, 2)]
+    """A case made and answered there, by a diagnosis that refuses what is no recording."""
+    tasks = [Task(f"case-{k:03d}", made_case, (f"case-{k:03d}", k)) for k in (1,)]
     proofs = []
     for hired, name in ((crew(1, cluster.address), "there"), (crew(1), "here")):
         proofs.append(conduct(tmp_path / name, tasks, {"kind": "simulated"}, crew=hired))

@@ -46,7 +46,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="show the plant in three dimensions",
         description=(
             "The plant in MuJoCo's viewer, or in a picture. A recording is replayed: what was measured is the"
-            " translucent ghost. A model is drawn as what it is: the rudder, an arm under gravity, a carriage, a blade."
+            " translucent ghost. A model is drawn as what it is: the rudder, an arm under gravity, a slide, a"
+            " joint;\none with a position loop follows the shape of --input within +-0.5 rad (+-20 mm)."
         ),
         epilog=(
             "examples:\n  ers view --linkage rod\n  ers view model.toml --replay run1.csv --render replay.gif\n"
@@ -168,33 +169,38 @@ def _simulated(arguments: argparse.Namespace, name: str | None) -> Replay:
     import numpy as np
 
     from ers_mj.plants.inputs import INPUTS, RATE_HZ
-    from ers_mj.servo.datasheet import read_plant
+    from ers_mj.servo.datasheet import read_datasheet
     from ers_mj.servo.units import output_unit_of
-    from ers_mj.view import model_file, replay
+    from ers_mj.view import looped, model_file, replay
 
     t = np.arange(1 if name is None else max(2, round(arguments.duration * RATE_HZ) + 1)) / RATE_HZ
     u = np.zeros(1) if name is None else INPUTS[name](t)
     moments = replay.moments_of(t, FILM.fps, arguments.duration)
     if _is_mjcf(arguments.model):
         return model_file.simulated_file(model_file.read_plant(Path(arguments.model)), t, u, moments)
-    sheet = read_plant(arguments.model)
-    plant = replay.plant_of(
-        sheet, arguments.linkage or "constant", math.radians(arguments.gap or 0.0), output_unit_of(sheet.output_unit)
-    )
+    sheet = read_datasheet(arguments.model)
+    unit = output_unit_of(sheet.output_unit)
+    if sheet.loop:
+        looped.refuse_built_on(sheet, arguments.linkage, arguments.gap)
+        return looped.commanded(sheet, t, u, moments, unit)
+    plant = replay.plant_of(sheet, arguments.linkage or "constant", math.radians(arguments.gap or 0.0), unit)
     return replay.simulated(plant, t, u, moments)
 
 
 def _recorded(arguments: argparse.Namespace, recording: Recording) -> Replay:
     from ers_mj.data.prepared import trace_of
-    from ers_mj.servo.datasheet import read_plant
-    from ers_mj.view import model_file, replay
+    from ers_mj.servo.datasheet import read_datasheet
+    from ers_mj.view import looped, model_file, replay
 
     moments, unit = replay.moments_of(recording.t, FILM.fps, arguments.duration), recording.output_unit
     if _is_mjcf(arguments.model):
         return model_file.recorded_file(
             model_file.read_plant(Path(arguments.model)), trace_of(recording, None), moments, unit
         )
-    sheet = read_plant(arguments.model)
+    sheet = read_datasheet(arguments.model)
+    if sheet.loop:
+        looped.refuse_built_on(sheet, arguments.linkage, arguments.gap)
+        return looped.replayed(sheet, recording, moments)
     plant = replay.plant_of(sheet, arguments.linkage or "constant", math.radians(arguments.gap or 0.0), unit)
     return replay.recorded(plant, trace_of(recording, sheet.parameters.get("J")), moments, unit)
 

@@ -22,7 +22,7 @@ from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.initial_state import with_starts
-from ers_mj.estimation.intervals import half_widths, slopes_of, unseen_widths
+from ers_mj.estimation.intervals import half_widths
 from ers_mj.estimation.objective import Fit, residuals
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.comparison import Candidate
@@ -278,21 +278,9 @@ class Case:
     @cached_property
     def errors(self) -> dict[tuple[str, str], tuple[float, float]]:
         """95 % intervals of every fitted number, by (owner, name)."""
-        model = self.model.of_records(range(len(self.start.traces)))
-        left_out = (
-            self.confirmed.models
-            if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2
-            else []
-        )
+        model, out = self.model.of_records(range(len(self.start.traces))), {}
         layout = model.layout()
-        z, out = model.vector(layout), {}
-        traces, tau = self.start.traces, self.selection.tau
-        jacobian = slopes_of(model, traces)
-        for f, q, e in zip(
-            layout,
-            z,
-            np.hypot(half_widths(model, traces, left_out, tau, jacobian), unseen_widths(model, traces, tau, jacobian)),
-        ):
+        for f, q, e in zip(layout, model.vector(layout), self.confirmed.widths):
             if (f.owner, f.name) in out:  # of a further recording
                 continue
             ends = f.ends(q, e)

@@ -347,7 +347,7 @@ def _degrees(case: Case) -> list[str]:
     """A travel far beyond the datasheet's rest angle looks like degrees that are named radians."""
     y = np.concatenate([t.y[t.valid] for t in case.start.traces])
     if case.output_unit == "rad" and case.datasheet is not None and float(np.max(np.abs(y))) > 2 * math.pi:
-        return [f"the output reaches {np.max(np.abs(y)):.3g} rad, more than a turn of a rudder: are these degrees?"]
+        return [f"the output reaches {np.max(np.abs(y)):.3g} rad, more than a full turn: are these degrees?"]
     return []
 
 

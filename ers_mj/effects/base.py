@@ -123,9 +123,11 @@ class Effect:
         return self.sized > 0 and not any(p.positive for p in self.parameters[: self.sized])
 
     def sizes(self, p: np.ndarray) -> list[int]:
-        """Which of its numbers p (k,) tell how large it is: those to which it is proportional, else its first."""
-        finite = [int(k) for k in np.flatnonzero(np.isfinite(p))]
-        return [k for k in finite if k < self.sized] or finite[:1]
+        """Which of its numbers p (k,) tell how large it is: those to which it is proportional, or of which there must
+        be one, else its first.
+        """
+        finite, needed = [int(k) for k in np.flatnonzero(np.isfinite(p))], self.needs[0] if self.needs else ()
+        return [k for k in finite if k < self.sized or self.parameters[k].name in needed] or finite[:1]
 
     def absent(self) -> np.ndarray:
         """Parameter values (k,) at which the effect vanishes, so that models nest."""

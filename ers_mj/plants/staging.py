@@ -39,7 +39,7 @@ def staged(spec: mujoco.MjSpec, reach: float = 1.0) -> mujoco.MjModel:
     rig = rig_of(spec)
     if rig == "rudder":
         _place_stop(spec, "lever_up" in names)
-    elif rig == "carriage":
+    elif rig == "slide":
         _shape_slide(spec, scale)
     elif rig == "arm":
         _shape_arm(spec)
@@ -49,13 +49,13 @@ def staged(spec: mujoco.MjSpec, reach: float = 1.0) -> mujoco.MjModel:
 
 
 def rig_of(spec: mujoco.MjSpec) -> str:
-    """What a plant is drawn as: the rudder system, an arm under gravity, the carriage of a sliding output, a blade."""
+    """What a plant is drawn as: the rudder system, an arm under gravity, a slide, else a joint."""
     names = {body.name for body in spec.bodies}
     if "motor" in names:
         return "rudder"
     if spec.joint("rocker").type == mujoco.mjtJoint.mjJNT_SLIDE:
-        return "carriage"
-    return "arm" if MASS in names else "blade"
+        return "slide"
+    return "arm" if MASS in names else "joint"
 
 
 def _surround(spec: mujoco.MjSpec, scale: float) -> None:

@@ -42,7 +42,7 @@ def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = N
     """The page as HTML, which draws its charts itself: no font, no address outside it."""
     verdict, unit = str(document.get("verdict") or ""), _error_unit(document, evidence)
     sections = (
-        _curves(document, evidence),
+        _curves(document, evidence, frames),
         _frames(frames),
         _where(document, evidence),
         missing_physics(document, unit),
@@ -163,7 +163,7 @@ def _tiles(document: Mapping, unit: Unit) -> list[tuple[str, str]]:
     return tiles
 
 
-def _curves(document: Mapping, evidence: Evidence) -> str:
+def _curves(document: Mapping, evidence: Evidence, frames: Frames | None) -> str:
     """The first recording open, the others to unfold, and the switches of the effects."""
     records = evidence.told[:MOST_DRAWN]
     if not records:
@@ -177,10 +177,17 @@ def _curves(document: Mapping, evidence: Evidence) -> str:
         content.append(f'<p class="note">{len(evidence.records) - len(records)} more recordings are not drawn.</p>')
     lead = (
         f"{page.text(measured(document.get('fit') or {})[1])} "
-        '<span class="b">Before</span> is the paper’s model refitted to the training recordings, '
+        f'<span class="b">Before</span> is {_plain(document, frames)}, refitted to the training recordings; '
         '<span class="a">after</span> has the named physics in it. The grey band is ±2 standard deviations of noise.'
     )
     return page.section("Measured and simulated", lead, "\n".join(content))
+
+
+def _plain(document: Mapping, frames: Frames | None) -> str:
+    """What the model is called that has no named physics in it."""
+    if (document.get("data") or {}).get("input_kind") == "position":
+        return "a plain joint within the servo’s position loop"
+    return "the paper’s model" if frames is not None and frames.rig == "rudder" else "a plain joint"
 
 
 def _record_title(view: RecordView) -> str:

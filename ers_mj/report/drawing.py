@@ -9,7 +9,9 @@ import io
 import itertools
 import re
 from collections.abc import Callable, Sequence
+from functools import cache
 from html import escape
+from importlib.resources import files
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -35,13 +37,14 @@ def both_widths(draw: Callable[[float], Figure], described: str) -> str:
 
 
 def _svg(figure: Figure, described: str) -> str:
-    """The figure as an SVG element: scalable, its ids unique in the page, no address in it."""
+    """The figure as an SVG element: scalable, its ids unique in the page, no address in it, its colours the page's."""
     FigureCanvasSVG(figure)
     out = io.StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     text = out.getvalue()
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.S)
     text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text)
+    text = re.sub(r": (#[0-9a-f]{6})\b", lambda found: f": {of_page(found[1])}", text)
     mark = f"f{next(_serial)}-"
     text = re.sub(r'\bid="', f'id="{mark}', text)
     text = re.sub(r'href="#', f'href="#{mark}', text).replace("url(#", f"url(#{mark}")
@@ -49,6 +52,17 @@ def _svg(figure: Figure, described: str) -> str:
     begin = lambda found: f'<svg viewBox="{found[1]}" role="img" aria-label="{told}">'
     text = re.sub(r'<svg [^>]*?viewBox="([^"]+)"[^>]*>', begin, text, count=1)
     return re.sub(r"\n\s*", "\n", text)
+
+
+def of_page(colour: str) -> str:
+    """A colour as the page gives it: itself, its twin on a dark page where figures.css has one."""
+    return f"var(--c{colour[1:]}, {colour})" if colour in _with_a_twin() else colour
+
+
+@cache
+def _with_a_twin() -> frozenset[str]:
+    css = files("ers_mj.report").joinpath("figures.css").read_text(encoding="utf-8")
+    return frozenset(f"#{digits}" for digits in re.findall(r"--c([0-9a-f]{6}):", css))
 
 
 def margins(figure: Figure, top: float = 0.1) -> None:

@@ -77,7 +77,7 @@ def _loops(document: Mapping, found: Study) -> str:
         )
     c = document["conditions"]
     lead = (
-        f"The rudder swings by ±{math.degrees(c['amplitude_rad']):.3g}° about {math.degrees(c['start_rad']):.3g}°:"
+        f"The output swings by ±{math.degrees(c['amplitude_rad']):.3g}° about {math.degrees(c['start_rad']):.3g}°:"
         " plant and controller each stand for the first harmonic of what they do then, friction and its compensation"
         " included; the voltage's limit is left out. The disk margin is that of gain and phase changing at once."
         " Bandwidth: |T| of the feedback 3 dB below its low end; a feed-forward follows further."
@@ -95,7 +95,7 @@ def _loops(document: Mapping, found: Study) -> str:
 
 def _plants(document: Mapping, found: Study) -> str:
     lead = (
-        "Linear while the rudder slips, where friction and preload are constant: the reduced model from its"
+        "Linear while the output slips, where friction and preload are constant: the reduced model from its"
         " coefficients, MuJoCo from its own derivatives (mjd_transitionFD). Described: with the friction and the"
         " preload of the amplitude."
     )

@@ -20,6 +20,7 @@ def frame(
     title: str, kind: str, body: str, styles: Sequence[str] = ("report.css",), head: str = "", foot: str = ""
 ) -> str:
     """The whole page as HTML: no font, no address outside it, no script but what `foot` brings."""
+    styles = [*styles, "figures.css"] if "<svg" in body else styles
     style = "".join(files("ers_mj.report").joinpath(name).read_text(encoding="utf-8") for name in styles)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'

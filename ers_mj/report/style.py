@@ -1,4 +1,6 @@
-"""How figures look: the colours, the widths and what matplotlib is told, alike on every page."""
+"""How figures look: the colours, the widths and what matplotlib is told, alike on every page. What a colour is on a
+dark page stands in figures.css.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ class Style:
         grid, ink, faint: of lines behind, of words, and of lines that only guide.
         distortion: of what no linear model explains.
         wide, narrow: of a figure for a desktop and for a phone [in].
-        dark: share of the scale of :data:`HEAT` from which numbers upon it are white.
+        strong: share of the scale of :data:`HEAT` from which numbers upon it are white.
+        on_strong, on_weak: of numbers upon a cell of :data:`HEAT`, alike on light and dark pages.
     """
 
     measured: str = "#a3afbc"
@@ -30,13 +33,18 @@ class Style:
     distortion: str = "#a83a1e"
     wide: float = 9.8
     narrow: float = 4.5
-    dark: float = 0.55
+    strong: float = 0.55
+    on_strong: str = "#fdfdfd"
+    on_weak: str = "#333e4b"
 
     @property
     def settings(self) -> dict[str, object]:
         """What matplotlib is told, for its `rc_context`."""
         return {
             "svg.fonttype": "none",
+            "savefig.facecolor": "none",
+            "axes.facecolor": "none",
+            "text.color": self.ink,
             "font.family": "sans-serif",
             "font.size": 9.5,
             "axes.edgecolor": "#c3cad3",
@@ -58,7 +66,7 @@ class Style:
 
     def on_heat(self, share: float) -> str:
         """The colour of a number on a cell at this share of the scale."""
-        return "white" if share > self.dark else self.ink
+        return self.on_strong if share > self.strong else self.on_weak
 
 
 STYLE = Style()

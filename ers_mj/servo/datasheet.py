@@ -215,7 +215,9 @@ def read_plant(path: str | os.PathLike[str]) -> Datasheet:
     """
     sheet = read_datasheet(path)
     if sheet.loop:
-        raise InputError(f"{path}: closes a position loop of its own ([loop]), which only diagnose and simulate take")
+        raise InputError(
+            f"{path}: closes a position loop of its own ([loop]), which diagnose, simulate, view and export take"
+        )
     return sheet
 
 

@@ -1,4 +1,4 @@
 """The plant in motion, to be looked at.
 
-model_file, replay (what moves how) -> rendering (pictures) -> frames (for a report), window (the live viewer)
+model_file, replay, looped (what moves how) -> rendering (pictures) -> frames (for a report), window (the live viewer)
 """

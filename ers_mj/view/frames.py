@@ -57,7 +57,7 @@ class Frame:
 @dataclass(frozen=True)
 class Frames:
     """The moments of a recording; differences from what was measured are drawn `enlarged` times. Empty where `why_not`
-    says why. ``rig`` is what moves: rudder, arm, carriage (see staging.rig_of).
+    says why. ``rig`` is what moves: rudder, arm, slide or joint (see staging.rig_of).
     """
 
     name: str

@@ -100,7 +100,7 @@ def posed(
 def simulated(plant: MechanicalPlant, t: np.ndarray, u: np.ndarray, moments: np.ndarray) -> Replay:
     """The plant from rest under u (N,) at t (N,) [s], shown at the samples `moments` (F,)."""
     motion = plant.simulate(t, u)
-    _refuse_runaway(t, motion.theta)
+    refuse_runaway(t, motion.theta)
     return posed(
         plant, t[moments], motion.theta[moments], None, motion.theta_m[moments], "rad" if plant.is_angle else "m"
     )
@@ -113,7 +113,7 @@ def recorded(plant: MechanicalPlant, trace: Trace, moments: np.ndarray, output_u
     cut = slice(0, int(moments[-1]) + 1)
     enable, load = (None if x is None else x[cut] for x in (trace.enable, trace.load))
     motion = plant.simulate(trace.t[cut], trace.u[cut], trace.start, enable=enable, load=load)
-    _refuse_runaway(trace.t, motion.theta)
+    refuse_runaway(trace.t, motion.theta)
     return posed(plant, trace.t[moments], motion.theta[moments], trace.y[moments], motion.theta_m[moments], output_unit)
 
 
@@ -123,7 +123,8 @@ def moments_of(t: np.ndarray, fps: float, duration: float) -> np.ndarray:
     return np.unique(np.minimum(np.searchsorted(t, frames - 1e-9), t.size - 1))
 
 
-def _refuse_runaway(t: np.ndarray, theta: np.ndarray) -> None:
+def refuse_runaway(t: np.ndarray, theta: np.ndarray) -> None:
+    """Raise InputError where a simulation theta (N,) did not stay finite."""
     if not np.isfinite(theta).all():
         raise InputError(
             f"the simulation leaves all bounds at {t[int(np.argmax(~np.isfinite(theta)))]:.4g} s, "
