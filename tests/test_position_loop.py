@@ -9,10 +9,13 @@ from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.effects.backlash import Backlash
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.input_delay import InputDelay
+from ers_mj.effects.load_dependent_friction import LoadDependentFriction
 from ers_mj.effects.presliding import Presliding
 from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.effects.voltage_saturation import VoltageSaturation
 from ers_mj.errors import InputError
+from ers_mj.plants.looped_mujoco import LoopedPlant
+from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.position_loop.identified import identify_loop
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, runs_of
@@ -268,6 +271,17 @@ def test_the_mujoco_twin_follows_the_reduced_servo(side):
     t, r = steps_of(6, 2.0)
     y = [simulate_loop(sheet, t, r, plant=plant)["theta_rad"] for plant in ("reduced", "mujoco")]
     assert np.sqrt(np.mean((y[0] - y[1]) ** 2)) < 0.01
+
+
+def test_a_gear_rubs_by_what_it_carries_in_mujoco_too():
+    """By the motor's torque alone, as without a load, it would be far off: half of the law's own size."""
+    t, r = steps_of(3, 2.0)
+    loop, gravity = {"K": 110.0, "L": 150.0, "a_2": 30.0, "c_2": 0.3, "share": 0.8}, np.array([33.0, 0.0])
+    bare = LoopModel(loop, (), ((GravityImbalance.name, gravity),))
+    model, run = bare.with_effect(LoadDependentFriction.name, np.array([0.5, *4 * [np.inf]])), run_of(t, r)
+    there = LoopedPlant(MechanicalPlant(*model.plant_of(run), timestep=2.5e-4), model.of(run)[0])
+    y, own = there.simulate(t, r, run.start, run.before), model.predicted(run)
+    assert np.std(y - own) < 0.25 * np.std(own - bare.predicted(run))
 
 
 def test_commands_take_a_model_with_a_loop_or_refuse_it(tmp_path, capsys):

@@ -13,7 +13,6 @@ from ers_mj.effects.base import Parameter
 from ers_mj.effects.quantities import Scales
 
 DRIFTS = "gain", "offset", "friction_level"  # what may differ from one day to the next
-DAY = "gain", "friction_level"  # of these what a drive and its temperature change together
 LOADS = "load", "weight"  # from one load to another: inertia and gravity as a factor, gravity by more than that
 STATES = (*DRIFTS, *LOADS)
 MOST_TAU = 2.0  # of a datasheet's electrical time constant, up to which the baseline's is an ordinary one
