@@ -21,6 +21,11 @@ NAMELESS = """## Laws that are never named
 These are confounders: each is tried in the place of what is named. Where one explains more, the verdict is
 `unexplained`, with the law under `suspects`.
 """
+TABLED = """## What stays unknown
+
+Tables without a shape of their own, fitted beside the answer where a mismatch is left, and kept where held-out data
+asks for them (`[[remainder]]` in model.toml). They are neither named nor tried in the place of anything.
+"""
 CLASSES = """## Scored as one
 
 Recordings of angle and voltage cannot always separate these; the answer lists what it could not exclude, and the
@@ -35,7 +40,8 @@ def catalogue() -> str:
     parts, named = [HEAD], [effect for effect in EFFECTS if effect.named]
     for subsystem in dict.fromkeys(family(effect) for effect in named):
         parts += [f"## {subsystem}\n", *(entry(effect) for effect in named if family(effect) == subsystem)]
-    parts += [NAMELESS, *(entry(effect) for effect in EFFECTS if not effect.named)]
+    parts += [NAMELESS, *(entry(effect) for effect in EFFECTS if not (effect.named or effect.tabled))]
+    parts += [TABLED, *(entry(effect) for effect in EFFECTS if effect.tabled)]
     groups = "\n".join(f"- {', '.join(f'`{name}`' for name in sorted(group))}" for group in EQUIVALENT)
     return "\n".join([*parts, CLASSES.format(groups=groups)])
 

@@ -102,6 +102,20 @@ def test_the_answer_does_not_depend_on_the_number_of_jobs(dead_zone):
 def test_a_servo_with_other_numbers_is_not_missing_physics():
     document = diagnose(recordings(), read_datasheet("table1")).document
     assert document["verdict"] == "parameters_only" and document["missing"] == []
+    assert document["record_state"] == []
+
+
+def test_what_differs_between_training_recordings_is_told():
+    """A gain and a friction of another day, which no model of both recordings has."""
+    first, second = recordings()
+    changed = TRUTH | {"b": 1.1 * TRUTH["b"], "c_2": 0.85 * TRUTH["c_2"]}
+    y = ReducedModel(lumped(changed)).simulate(T, second.u).measured
+    second = replace(second, y=y + NOISE * np.random.default_rng(5).standard_normal(T.size))
+    document = diagnose([first, second], read_datasheet("table1"), jobs=2).document
+    states = {state["name"]: state["values"] for state in document["record_state"]}
+    assert states["gain"] == pytest.approx([1.0, 1.1], abs=0.02)
+    assert states["friction_level"] == pytest.approx([1.0, 0.85], abs=0.05)
+    assert document["missing"] == []
 
 
 def test_a_true_datasheet_is_consistent():

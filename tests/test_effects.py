@@ -57,7 +57,7 @@ def test_what_acts_within_a_loop_alone_is_refused_without_one(effect):
         simulate_recording(read_datasheet("table1"), T, 0 * T, effects=[(effect.name, values)])
 
 
-@pytest.mark.parametrize("effect", [e for e in EFFECTS if not e.only_in_loop], **ids)
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if not (e.only_in_loop or e.tabled)], **ids)
 def test_what_a_reader_may_give_acts_and_leaves_numbers(effect):
     """Any of an effect's numbers, however few, are refused or change the recording: none is swallowed in silence."""
     starts = effect.starts(SCALES)
@@ -243,3 +243,26 @@ def test_an_uneven_gears_torque_is_the_one_of_a_cog():
     assert np.allclose(gear, cog, atol=1e-9)
     with pytest.raises(InputError, match="ripple and A are both given"):
         ReducedModel(c, [("transmission_ripple", np.array([0.1, 0.2, 0.4, 5.0, np.inf, np.inf]))]).simulate(T, u)
+
+
+@pytest.mark.parametrize(
+    "name, values, sizes",
+    [
+        ("sensor_nonlinearity", {"bend": 0.01, "twist": 0.2}, ["bend", "twist"]),
+        ("sensor_nonlinearity", {"A": 0.01, "period": 0.1, "phase": 0.0}, ["A"]),
+        ("sensor_lag", {"T": 1e-3, "T_d": 1e-3}, ["T", "T_d"]),
+        ("stribeck", {"dF_s": 0.1, "v_s": 0.2}, ["dF_s"]),
+        ("gravity_imbalance", {"g_s": 0.0, "g_c": 1.0}, ["g_s", "g_c"]),
+        ("end_stop", {"lower": 0.1, "f_stop": 80.0}, []),
+    ],
+)
+def test_what_tells_how_large_an_effect_is_may_be_any_of_its_terms(name, values, sizes):
+    effect = BY_NAME[name]
+    p = np.array([values.get(parameter.name, np.inf) for parameter in effect.parameters])
+    assert [effect.parameters[k].name for k in effect.sizes(p)] == sizes
+
+
+@pytest.mark.parametrize("lag, told", [(1e-5, "input_delay"), (2e-3, "sensor_lag")])
+def test_a_dead_time_without_a_lag_is_told_as_a_delay(lag, told):
+    assert BY_NAME["sensor_lag"].really(np.array([lag, 1e-2]), 1.0) == told
+    assert BY_NAME["sensor_lag"].really(np.array([lag, np.inf]), 1.0) == "sensor_lag"

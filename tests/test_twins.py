@@ -34,6 +34,9 @@ SIZES = {
     "torque_saturation": [0.5, 24.0],
     "running_in": [0.5, 0.5],
     "uneven_damping": [5.0, 3.0, 0.3, np.inf, np.inf, np.inf],
+    "unexplained_torque": [-0.3, 0.075, 40.0, -30.0, 20.0, 40.0, -10.0, -40.0, 30.0, 0.0, 20.0],
+    "unexplained_friction": [-0.3, 0.075, 60.0, -30.0, 20.0, 50.0, -40.0, -40.0, 30.0, 0.0, 20.0],
+    "unexplained_drag": [4.0, 40.0, -20.0, -30.0, 20.0, 60.0, 50.0, 0.0, -30.0, 10.0, 40.0],
 }
 # a bristle's twin takes steps of its own, each applied from outside: a second of it is long enough to tell
 BRIEF = {"presliding": T[:1300]}

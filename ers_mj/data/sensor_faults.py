@@ -152,7 +152,7 @@ def repeated_spans(y: np.ndarray, grid: float) -> list[slice]:
     if noise < REPEATS.noise * grid:
         return []
     cells = min(int(REPEATS.near * noise / grid), REPEATS.most_cells)
-    alike, near = np.count_nonzero(changes == 0.0), np.count_nonzero(changes < (cells + 0.5) * grid)
+    alike, near = (int(np.count_nonzero(some)) for some in (changes == 0.0, changes < (cells + 0.5) * grid))
     if not _is_more_than_chance(alike, near, REPEATS.times / (2 * cells + 1)) or alike > REPEATS.most * y.size:
         return []
     return [slice(s.start + 1, s.stop) for s in held_spans(y, 2) if _dithered(y, s)]

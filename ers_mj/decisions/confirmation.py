@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,6 +101,28 @@ def pays(held: HeldOut, recalibrated: Recalibrated, policy: Policy = POLICY) -> 
         return True
     again = recalibrated()
     return again is not None and is_worth(*again)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Held-out errors with and without something [output unit], and its p-value."""
+
+    with_it: float
+    without: float
+    p: float
+
+    def is_worth(self, noise: float, policy: Policy) -> bool:
+        """Whether the squared error above the noise rises beyond chance, and by a share of itself, without it."""
+        left, lost = (max(rmse**2 - noise**2, 0.0) for rmse in (self.with_it, self.without))
+        return self.p <= policy.largest_p and lost >= (1.0 + policy.pays) * left
+
+
+def table_pays(pairs: Sequence[Pair], noise: float, policy: Policy = POLICY) -> bool:
+    """Whether a table of what is unknown is kept: held-out data, as it is or recalibrated, asks for it, and neither way
+    loses more than what blocks confirm may.
+    """
+    worse = (pair.with_it > policy.worse * pair.without for pair in pairs)
+    return any(pair.is_worth(noise, policy) for pair in pairs) and not any(worse)
 
 
 def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:

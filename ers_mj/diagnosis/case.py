@@ -22,7 +22,7 @@ from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.initial_state import with_starts
-from ers_mj.estimation.intervals import half_widths, slopes_of, unseen_widths
+from ers_mj.estimation.intervals import half_widths
 from ers_mj.estimation.objective import Fit, residuals
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.comparison import Candidate
@@ -31,6 +31,7 @@ from ers_mj.selection.cross_validation import Score, pooled, recalibrated, score
 from ers_mj.selection.measure import FREE_RUN
 from ers_mj.selection.posterior import probabilities
 from ers_mj.selection.stepwise import Selection
+from ers_mj.selection.unknown import Unknown, unknown
 from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model import OBSERVER_RATE, STATES, Model
@@ -199,6 +200,23 @@ class Case:
         left = residuals(sheet, with_starts(sheet, self.start.traces), OBSERVER_RATE)
         return is_consistent(Blocks.of(self.start.traces).misfit(left), self.policy)
 
+    # -- what stays unknown ------------------------------------------------------------------------------------------
+
+    @property
+    def answer(self) -> Model:
+        """The model that is told: the baseline where nothing of it may be named."""
+        return self.model if self.told_effects or not self.model.names else self.start.fit.model
+
+    @cached_property
+    def unknown(self) -> Unknown | None:
+        """What nothing named accounts for, as tables beside the answer; None where nothing is left or no table pays."""
+        answer, c = self.answer, self.confirmed
+        plant = answer.plant()
+        if not self.search.tabled or plant.coupled or plant.bends or not self.more_is_left:
+            return None
+        models = c.models if answer is self.model else c.base_models
+        return unknown(answer, models, self.start.traces, c.parts, c.measure, self.selection.tau, self.policy)
+
     # -- what follows --------------------------------------------------------------------------------------------------
 
     @cached_property
@@ -260,21 +278,9 @@ class Case:
     @cached_property
     def errors(self) -> dict[tuple[str, str], tuple[float, float]]:
         """95 % intervals of every fitted number, by (owner, name)."""
-        model = self.model.of_records(range(len(self.start.traces)))
-        left_out = (
-            self.confirmed.models
-            if self.confirmed.parts[0].training is not None and len(self.confirmed.models) > 2
-            else []
-        )
+        model, out = self.model.of_records(range(len(self.start.traces))), {}
         layout = model.layout()
-        z, out = model.vector(layout), {}
-        traces, tau = self.start.traces, self.selection.tau
-        jacobian = slopes_of(model, traces)
-        for f, q, e in zip(
-            layout,
-            z,
-            np.hypot(half_widths(model, traces, left_out, tau, jacobian), unseen_widths(model, traces, tau, jacobian)),
-        ):
+        for f, q, e in zip(layout, model.vector(layout), self.confirmed.widths):
             if (f.owner, f.name) in out:  # of a further recording
                 continue
             ends = f.ends(q, e)
@@ -283,14 +289,14 @@ class Case:
             out[(f.owner, f.name)] = ends
         return out
 
-    def state_errors(self) -> dict[tuple[str, int], tuple[float, float]]:
-        """95 % intervals of the training recordings' states, by (state, recording)."""
-        if not self.model.states:
+    def state_errors(self, model: Model) -> dict[tuple[str, int], tuple[float, float]]:
+        """95 % intervals of the training recordings' states under a model, by (state, recording)."""
+        if not model.states:
             return {}
-        layout = self.model.layout()
-        widths = half_widths(self.model, self.start.traces, (), self.selection.tau)
+        layout = model.layout()
+        widths = half_widths(model, self.start.traces, (), self.selection.tau)
         return {
             (f.owner, f.index): f.ends(q, w)
-            for f, q, w in zip(layout, self.model.vector(layout), widths)
+            for f, q, w in zip(layout, model.vector(layout), widths)
             if f.owner in STATES
         }

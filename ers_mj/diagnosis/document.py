@@ -15,8 +15,10 @@ from ers_mj.data.prepared import Trace
 from ers_mj.data.recording import Recording
 from ers_mj.decisions.confirmation import is_no_size
 from ers_mj.decisions.explained import cost
+from ers_mj.diagnosis import unknown
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.evidence import Evidence
+from ers_mj.diagnosis.latent_force import latent_forces
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
@@ -76,7 +78,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "missing": missing,
         "remainder": _remainder(case),
         "record_state": states,
-        "fit": case.fits,
+        "fit": case.fits | unknown.fits(case),
         "parameters": _parameters(case),
         "next_recording": _next_recording(case),
         "data": data,
@@ -96,16 +98,19 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         case.output_unit,
         case.recordings[0].input_unit,
         spectrum,
+        latent_forces(case),
     )
     model_told = with_diagnosis(_improved(case), document)
-    return Diagnosis(document, evidence, model_told, case.rig.plant(model if case.told_effects else base))
+    delivered = case.unknown.model if case.unknown is not None else case.answer
+    return Diagnosis(document, evidence, model_told, case.rig.plant(delivered))
 
 
 def _remainder(case: Case) -> dict:
     """What the answer leaves, beside what memory tells of it by sensor."""
     beyond = beyond_training(case.recordings, case.holdout)
     left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
-    return {**remainder(case.explained, case.more_is_left, case.free_held, beyond), "left_sigma": left_sigma}
+    told = remainder(case.explained, case.more_is_left, case.free_held, [*beyond, *unknown.sentences(case)])
+    return {**told, "left_sigma": left_sigma, "tables": unknown.tables(case)}
 
 
 def _missing(case: Case) -> list[dict]:
@@ -348,17 +353,18 @@ def _degrees(case: Case) -> list[str]:
 
 def _improved(case: Case) -> Datasheet:
     """The improved model: refitted lumped values in [lumped], effects in a reader's units."""
-    model = case.model if case.told_effects or not case.model.names else case.start.fit.model
+    model = case.unknown.model if case.unknown is not None else case.answer
     lumped = {k: float(model.values[k]) for k in ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")}
     extra = {k: float(model.values[k]) for k in ("tau_e", "emf_share")}
     effects = []
     for name in case.told_effects:
-        entries = {p["name"]: p["entry"]["value"] for p in _effect_parameters(case, name)}
-        effects.append((name, {k: v for k, v in entries.items() if v is not None}))
+        effects.append((name, unknown.in_readers_units(case, name, dict(model.effects_of())[name])))
     effects += [
         (name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)})
         for name, values in case.sensors.items()
     ]
+    tables = case.unknown.tables if case.unknown is not None else []
+    effects += [(name, unknown.in_readers_units(case, name, values)) for name, values in tables]
     parameters = dict(case.datasheet.parameters) if case.datasheet is not None else {}
     return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
 

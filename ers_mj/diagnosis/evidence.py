@@ -65,10 +65,23 @@ class ResidualMap:
     rms_after: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class LatentForce:
+    """The acceleration that a recording asks for beside the answer over times t (M,) [s], (M,) [output unit / s^2], and
+    what of it the tables of what is unknown give, or None; ``noise`` is what the sensor's noise alone makes.
+    """
+
+    name: str
+    t: np.ndarray
+    asked: np.ndarray
+    tabled: np.ndarray | None
+    noise: float
+
+
 @dataclass(frozen=True)
 class Evidence:
     """Everything a report draws. ``noise`` is the noise floor in output units, ``spectrum`` what the model before
-    leaves over frequency.
+    leaves over frequency, ``latent`` what the answer lacks over time, where more than noise is left.
     """
 
     records: tuple[RecordView, ...]
@@ -78,6 +91,7 @@ class Evidence:
     output_unit: str
     input_unit: str
     spectrum: Mismatch | None = None
+    latent: LatentForce | None = None
 
     @property
     def told(self) -> list[RecordView]:

@@ -155,11 +155,11 @@ class LoopCase:
     def fits(self) -> dict:
         """The errors before and after, as diagnosis.json has them."""
         c = self.confirmed
-        again = recalibrated(c.before_models, c.folds), recalibrated(c.models, c.folds)
+        before, after = (recalibrated(models, c.folds, self.policy) for models in (c.before_models, c.models))
         multibody = self._in_mujoco(c.before_models), self._in_mujoco(c.models)
         return {
             "measure": "free_run",
-            **errors_told(self.train, (c.before, c.after), again, multibody),
+            **errors_told(self.train, (c.before, c.after), (before, after), multibody),
             "noise_floor_rad": self.noise,
             "heldout_from": c.sentence,
             **self._beside,

@@ -17,6 +17,7 @@ from ers_mj.position_loop.model import only_letters
 from ers_mj.position_loop.runs import Run
 
 STEPS = 8  # of the fit of one recording's state
+MOST_TOLD = 8  # recordings that are told one by one
 SURE = 1.5  # of a 95 % interval, within which so many numbers differ by chance
 LETTERS = ("K", "offset", "c_2")
 State = tuple[str, str, list[float], list[tuple[float, float]]]  # name, unit, values and intervals, a recording each
@@ -97,6 +98,10 @@ def _differs(case: LoopCase, state: State) -> bool:
 def _entry(state: State, names: Sequence[str]) -> dict:
     name, unit, values, ends = state
     told = ", ".join(f"{of} {shown(v, unit)}" for of, v in zip(names, values, strict=True))
+    if len(values) > MOST_TOLD:
+        low, high = int(np.argmin(values)), int(np.argmax(values))
+        least, most = (f"{shown(values[k], unit)} ({names[k]})" for k in (low, high))
+        told = f"from {least} to {most}, over {len(values)} of them"
     return {
         "name": name,
         "unit": unit,

@@ -5,21 +5,46 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ers_mj.data.prepared import Trace
+from ers_mj.decisions.explained import cost
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.sentences import shown
+from ers_mj.estimation.fit import fit
 from ers_mj.selection.cross_validation import recalibrated
-from ers_mj.servo.model import LOADS, STATES
+from ers_mj.servo.model import DRIFTS, LOADS, STATES, Model
 
 ONE_LOAD = 1.05  # factor within which recordings are of one load
+STEPS = 12  # of the answer's refit with what may differ between its recordings
 Ends = tuple[float | None, float | None]  # of a 95 % interval
 
 
 def record_state(case: Case, held: Sequence[Trace]) -> list[dict]:
     """What differs between recordings beyond chance: training ones as fitted, held-out ones as recalibrated."""
     later = [recalibrated(model, h).states for model, h in zip(case.confirmed.models, held)]
-    errors = case.state_errors()
-    found = ((name, *_values(case, name, errors, later)) for name in STATES)
+    fitted = with_drifts(case)
+    errors = case.state_errors(fitted)
+    found = ((name, *_values(case, fitted, name, errors, later)) for name in STATES)
     return [_told(case, name, values, ci95) for name, values, ci95 in found if _differs(case, name, values, ci95)]
+
+
+def with_drifts(case: Case) -> Model:
+    """The answer with what may drift from one training recording to the next beside what it has of it, refitted; the
+    answer itself where that explains no more than chance would.
+
+    What is told so changes no other number: the answer stays the one of all recordings.
+    """
+    model, traces, tau = case.model, case.start.traces, case.selection.tau
+    known = model.states or {}
+    feels_position = model.values["a_1"] > 0 or model.values["c_1"] > 0
+    lacking = [name for name in DRIFTS if name not in known and (feels_position or name != "offset")]
+    if len(traces) < 2 or not lacking or set(known) & set(LOADS):
+        return model
+    fixed = fit(model, traces, tau=tau, steps=STEPS)
+    drifting = fixed.model
+    for name in lacking:
+        drifting = drifting.with_state(name, len(traces))
+    found = fit(drifting, traces, tau=tau, steps=STEPS)
+    bought, price = cost(fixed.misfit, tau) - cost(found.misfit, tau), 0.5 * (found.size - fixed.size)
+    return found.model if bought - price >= case.policy.least_gain else model
 
 
 def _rest(name: str) -> float:
@@ -27,10 +52,10 @@ def _rest(name: str) -> float:
     return 0.0 if name == "offset" else 1.0
 
 
-def _values(case: Case, name: str, errors: dict, later: Sequence[dict]) -> tuple[list[float], list[Ends]]:
+def _values(case: Case, model: Model, name: str, errors: dict, later: Sequence[dict]) -> tuple[list[float], list[Ends]]:
     """The values of a state in each recording, training ones first, and their intervals."""
     count, rest, unknown = len(case.start.traces), _rest(name), (None, None)
-    fitted = (case.model.states or {}).get(name, [rest] * count)
+    fitted = (model.states or {}).get(name, [rest] * count)
     values = [*fitted, *(s.get(name, (rest,))[0] for s in later)]
     ci95 = [errors.get((name, k), unknown) for k in range(count)]
     ci95 += [tuple(s[name][1:]) if name in s else unknown for s in later]

@@ -25,7 +25,8 @@ def _members() -> tuple[Effect, ...]:
 
 EFFECTS: tuple[Effect, ...] = _members()
 BY_NAME: dict[str, Effect] = {effect.name: effect for effect in EFFECTS}
-SUSPECTS: tuple[str, ...] = tuple(effect.name for effect in EFFECTS if not effect.named)
+SUSPECTS: tuple[str, ...] = tuple(effect.name for effect in EFFECTS if not (effect.named or effect.tabled))
+TABLES: tuple[str, ...] = tuple(effect.name for effect in EFFECTS if effect.tabled)
 
 EQUIVALENT: tuple[frozenset[str], ...] = (
     frozenset({"bias_torque", "asymmetric_friction"}),
@@ -39,6 +40,7 @@ __all__ = [
     "EFFECTS",
     "EQUIVALENT",
     "SUSPECTS",
+    "TABLES",
     "Coefficients",
     "Drive",
     "Effect",

@@ -47,6 +47,7 @@ class Effect:
         # whether an answer names it; a law that is not is a suspect, tried in the place of what is (see confounders.py)
         True
     )
+    tabled: ClassVar[bool] = False  # a table of what stays unknown (see selection/unknown.py): no candidate, no suspect
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     absorbs: ClassVar[tuple[str, ...]] = ()  # baseline parameters that the effect makes redundant: held while it is on
     redundant: ClassVar[int] = (
@@ -122,9 +123,11 @@ class Effect:
         return self.sized > 0 and not any(p.positive for p in self.parameters[: self.sized])
 
     def sizes(self, p: np.ndarray) -> list[int]:
-        """Which of its numbers p (k,) tell how large it is: those to which it is proportional, else its first."""
-        finite = [int(k) for k in np.flatnonzero(np.isfinite(p))]
-        return [k for k in finite if k < self.sized] or finite[:1]
+        """Which of its numbers p (k,) tell how large it is: those to which it is proportional, or of which there must
+        be one, else its first.
+        """
+        finite, needed = [int(k) for k in np.flatnonzero(np.isfinite(p))], self.needs[0] if self.needs else ()
+        return [k for k in finite if k < self.sized or self.parameters[k].name in needed] or finite[:1]
 
     def absent(self) -> np.ndarray:
         """Parameter values (k,) at which the effect vanishes, so that models nest."""
@@ -132,6 +135,10 @@ class Effect:
 
     def starts(self, scales: Scales) -> list[np.ndarray]:
         """Parameter vectors (k,) of a visible size from which a fit is begun; empty where the effect cannot apply."""
+        raise NotImplementedError
+
+    def blank(self, scales: Scales) -> np.ndarray:
+        """The entries (k,) of a table over these recordings that changes nothing, if it is ``tabled``."""
         raise NotImplementedError
 
     def symptom(self, seen: Symptoms, policy: Policy) -> np.ndarray | None:

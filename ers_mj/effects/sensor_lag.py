@@ -4,6 +4,8 @@ import numpy as np
 
 from ers_mj.effects.base import Parameter, Sensor, recursive
 
+HARDLY = 0.05  # of the dead time, up to which a time constant beside it is none
+
 
 class SensorLag(Sensor):
     """T y' = theta(t - T_d) - y, settled at the start: a filter in the sensor or its electronics, and a bus that brings
@@ -23,7 +25,7 @@ class SensorLag(Sensor):
         Parameter("T", "time", "time constant of the sensor"),
         Parameter("T_d", "time", "dead time of its reading", absent=np.inf),
     )
-    sized = 1
+    sized, needs = 1, (("T", "T_d"),)
 
     def starts(self, scales):
         return [np.array([2 * scales.sample_time, np.inf])]
@@ -35,6 +37,10 @@ class SensorLag(Sensor):
             if name == self.name and not np.isfinite(p[1])
             else []
         )
+
+    def really(self, p, friction):
+        """A dead time beside which there is hardly a lag makes the motion late and nothing else."""
+        return "input_delay" if np.isfinite(p[1]) and p[0] < HARDLY * p[1] else self.name
 
     def remembers(self, p):
         return p[0], p[1] if np.isfinite(p[1]) else 0.0

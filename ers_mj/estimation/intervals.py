@@ -44,6 +44,12 @@ def slopes_of(model: Model, traces: Sequence[Trace]) -> np.ndarray:
     return central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
 
 
+def told_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> np.ndarray:
+    """95 % half-widths (k,) as they are told: those of ``half_widths`` and ``unseen_widths``, squared and added."""
+    jacobian = slopes_of(model, traces)
+    return np.hypot(half_widths(model, traces, left_out, tau, jacobian), unseen_widths(model, traces, tau, jacobian))
+
+
 def half_widths(
     model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float, jacobian: np.ndarray | None = None
 ) -> np.ndarray:

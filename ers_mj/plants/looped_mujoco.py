@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
+from ers_mj.effects.load_dependent_friction import LoadDependentFriction
 from ers_mj.plants.mechanical import MAX_DELAY_SAMPLES, MechanicalPlant
 from ers_mj.plants.mujoco_stepping import unlogged
 from ers_mj.plants.position_loop import LoopNumbers
 
+SIDE = [parameter.name for parameter in LoadDependentFriction.parameters].index("side")
 CONTROL_STEP = 5e-4  # [s] for which the stepped controller holds its drive
 
 
@@ -33,6 +35,11 @@ class LoopedPlant:
 
     plant: MechanicalPlant
     loop: LoopNumbers
+
+    def __post_init__(self):
+        """A gear behind the motor's share of the inertia rubs by what it carries (see plants/position_loop.py)."""
+        effects = [(name, _carried(name, values, self.loop.share)) for name, values in self.plant.effects]
+        object.__setattr__(self, "plant", replace(self.plant, effects=effects))
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -106,6 +113,13 @@ class LoopedPlant:
                 late = late if q.dead_time > 0.0 else late[-1:]
                 stepper.hold([(min(max(drive, -q.most), q.most), stepper._divide(h)[1])], h)
         return out
+
+
+def _carried(name: str, values: np.ndarray, share: float) -> np.ndarray:
+    """An effect's numbers (k,), friction by the motor's torque alone told by both sides' of a motor of this share."""
+    if name != LoadDependentFriction.name or np.isfinite(values[SIDE]):
+        return values
+    return np.concatenate([values[:SIDE], [share], values[SIDE + 1 :]])
 
 
 class _Firmware:

@@ -13,11 +13,11 @@ import numpy as np
 from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, paired_p, pays
 from ers_mj.decisions.explained import cost, score
 from ers_mj.decisions.thresholds import Policy
-from ers_mj.position_loop.fit import Data, Fit, fitted
+from ers_mj.position_loop.fit import Data, Fit, fitted, gain
 from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run
 from ers_mj.position_loop.selection import Left, Selection, Selector
-from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, without
+from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, is_there, together, without
 
 
 @dataclass(frozen=True)
@@ -138,16 +138,34 @@ def judged(selection: Selection) -> list[Left]:
 def confirmed(
     selector: Selector, selection: Selection, held: Sequence[Run], policy: Policy
 ) -> tuple[Selection, Confirmed]:
-    """The selection without what held-out data does not confirm, and what it says of the rest."""
+    """The selection without what held-out data does not confirm, and what it says of the rest.
+
+    Of several terms that went each is tried once more beside what stayed: another may have stood in its place.
+    """
     folds, sentence = folds_of(selector.runs, held)
+    first = selection
     while True:
         found = _judged(selector, selection, folds, sentence, policy)
-        doubtful = [x for x in judged(selection) if not _holds(found, x.name, selector.runs, policy)]
+        doubtful = _doubtful(found, selection, selector.runs, policy)
         if not doubtful:
-            return selection, found
+            break
         weakest = min(doubtful, key=lambda x: x.gain)
         lesser = fitted(weakest.fit.model, selector.data)
         selection = selector.pruned(replace(selection, chosen=lesser, left=()))
+    gone = [x for x in first.named if not is_there(selection.chosen.model, x.name)]
+    for name in [x.name for x in sorted(gone, key=lambda x: -x.gain)] if len(gone) > 1 else ():
+        again = selector.grown(selection, together(selection.chosen.model, first.chosen.model, name))
+        if again is None or not is_there(again.chosen.model, name):
+            continue
+        told = _judged(selector, again, folds, sentence, policy)
+        if not _doubtful(told, again, selector.runs, policy):
+            selection, found = again, told
+    return selection, found
+
+
+def _doubtful(found: Confirmed, selection: Selection, runs: Sequence[Run], policy: Policy) -> list[Left]:
+    """What held-out data does not confirm."""
+    return [x for x in judged(selection) if not _holds(found, x.name, runs, policy)]
 
 
 def _judged(
@@ -182,9 +200,10 @@ def _holds(found: Confirmed, name: str, runs: Sequence[Run], policy: Policy) -> 
 # -- what a day changes ---------------------------------------------------------------------------------------------
 
 
-def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
+def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold], policy: Policy) -> float:
     """Pooled error [output unit] of the rest of each held-out run, once gain, offset and friction level are fitted to
-    its first 30 %; of all that is held out of a run that was fitted to, whose day is the same.
+    its first 30 %, where that buys as much as a term must; of all that is held out of a run that was fitted to, whose
+    day is the same.
     """
     squares, count = 0.0, 0
     for model, fold in zip(models, folds, strict=True):
@@ -196,8 +215,10 @@ def recalibrated(models: Sequence[LoopModel], folds: Sequence[Fold]) -> float:
             seen = run.t[run.scored]
             share = (seen[0] + SPLIT.last * (seen[-1] - seen[0])) / run.t[-1]
             state = only_letters(model.having(hold=model["hold"]), ("K", "hold", "c_2"))
-            again = fitted(state, Data.of([run.only(0.0, share)]), 8).model
-            rest = run.only(share, 1.0)
-            e = (rest.y - again.predicted(rest))[rest.scored]
+            head, rest = Data.of([run.only(0.0, share)]), run.only(share, 1.0)
+            again = fitted(state, head, 8)
+            as_it_is = fitted(only_letters(model, ()), head, 0)
+            day = again.model if gain(as_it_is, again) > policy.loop_gain else model
+            e = (rest.y - day.predicted(rest))[rest.scored]
             squares, count = squares + float(e @ e), count + e.size
     return math.sqrt(squares / max(count, 1))

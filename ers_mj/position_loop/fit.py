@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -92,15 +93,20 @@ class Data:
     def blocks(self) -> int:
         return int(self.block.max()) + 1
 
+    @cached_property
+    def _simulated(self) -> tuple[Run, ...]:
+        return tuple(run.as_far_as_scored() for run in self.runs)
+
     def residuals(self, model: LoopModel) -> np.ndarray:
         """Errors (N,) of the scored samples in noise sigmas, large ones softened; those of a second signal last."""
         self.simulated[0] += 1
-        motions = [model.motion(run, self.refine) for run in self.runs]
+        runs = self._simulated
+        motions = [model.motion(run, self.refine) for run in runs]
         errors = [
             _softened((run.y - model.logged(m))[run.scored], self.soft, run.sigma)
-            for run, m in zip(self.runs, motions, strict=True)
+            for run, m in zip(runs, motions, strict=True)
         ]
-        for signal, e in beside.errors(model, self.runs, motions):
+        for signal, e in beside.errors(model, runs, motions):
             errors.append(_softened(e, SEARCH.soft * float(np.ptp(signal.values[signal.scored])), signal.sigma))
         return np.concatenate(errors)
 

@@ -102,6 +102,17 @@ class Run:
         share = (self.t - self.t[0]) / (self.t[-1] - self.t[0])
         return (share >= begin) & (share <= end)
 
+    def as_far_as_scored(self) -> Run:
+        """The run up to its last scored sample: what comes after it tells a fit nothing."""
+        end = int(np.flatnonzero(self.scored)[-1]) + 1
+        if end == self.t.size:
+            return self
+        rows = {name: getattr(self, name)[:end] for name in ("t", "r", "y", "scored", "enable")}
+        beside = self.beside
+        if beside is not None:
+            beside = replace(beside, values=beside.values[:end], scored=beside.scored[:end])
+        return replace(self, **rows, beside=beside)
+
     def _scored(self, these: np.ndarray) -> Run:
         beside = replace(self.beside, scored=self.beside.scored & these) if self.beside is not None else None
         return replace(self, scored=self.scored & these, beside=beside)

@@ -16,7 +16,9 @@ import numpy as np
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
+from ers_mj.effects.input_delay import InputDelay
 from ers_mj.effects.rate_limit import RateLimit
+from ers_mj.effects.voltage_saturation import VoltageSaturation
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain, jacobian
 from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run, scales_of
@@ -44,6 +46,7 @@ from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
 Progress = Callable[[str, float], None]
 GRAVITY = GravityImbalance.name
 FIRST = (RateLimit.name, INTEGRAL)
+BARE = (InputDelay.name, VoltageSaturation.name, RateLimit.name)  # what the loop of any servo may have
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,8 @@ class Effort:
     promise: float = 0.3  # of what is asked for, from which a law is refitted,
     begun: int = 3  # from so many of its starts
     finalists: int = 3  # candidates that are refitted to the end,
-    near: float = 0.3  # those that gain this share of what the best one gains at first
+    near: float = 0.3  # those that gain this share of what the best one gains at first,
+    nearer: float = 0.6  # or this one, where a refit to the end takes in more recordings than are screened
     enough: float = 1.15  # noise levels of error that one body may leave before two are tried
     speeds: tuple[float, ...] = (0.9, 1.0, 1.15)  # of the largest seen, to which the reference is limited
     inset: float = 0.06  # of the travel, beyond which a stop may act
@@ -123,6 +127,7 @@ class Selector:
 
     def _take(self, runs: Sequence[Run]) -> None:
         self.data = Data.of(runs)
+        self._roughs: dict[tuple, list[Rough]] = {}
         some = spread_out(runs, EFFORT.screened)
         self.screen = self.data if len(some) == len(runs) else Data.of(some)
 
@@ -166,7 +171,7 @@ class Selector:
     def base(self) -> Fit:
         """The loop with a limit and without, under gravity (or a spring where the output is no angle)."""
         loads = ("hold", "sin", "cos") if self.is_angle else ("hold", "a_1")
-        roughs = [rough for width in SCAN.widths for rough in rough_starts(self.runs, loads, width)]
+        roughs = [rough for width in SCAN.widths for rough in self._rough(loads, width)]
         starts = [self.begun(rough) for rough in roughs]
         first = min(roughs, key=lambda rough: rough.left)
         if "L" in first.values:
@@ -252,7 +257,8 @@ class Selector:
     def _ranked(self, current: Fit, candidates: Sequence[Term]) -> list[Compared]:
         seen = current if self.screen is self.data else fitted(current.model, self.screen, EFFORT.tried)
         quick = sorted(self._map(partial(self._tried, seen), candidates), key=lambda c: -c.gain)
-        least = EFFORT.near * max((c.gain for c in quick), default=0.0)
+        near = EFFORT.near if self.screen is self.data else EFFORT.nearer
+        least = near * max((c.gain for c in quick), default=0.0)
         ready = [c for c in quick[: EFFORT.finalists] if c.gain > max(least, 0.0)]
         full = list(self._map(partial(self._finished, current), ready))
         return sorted([*full, *quick[len(ready) :]], key=lambda c: -c.gain)
@@ -313,7 +319,7 @@ class Selector:
         begun = []
         for speed in speeds:
             for width in SCAN.widths:
-                roughs = rough_starts(self.runs, loads, width, speed, not is_rate)
+                roughs = self._rough(loads, width, speed, not is_rate)
                 begun += [self.begun(rough, **({"R": speed} if is_rate else {})) for rough in roughs]
         for name, values in model.effects:
             if name != GRAVITY:
@@ -321,6 +327,13 @@ class Selector:
         return replace(
             term, starts=(*term.starts, *(replace(m, side=model.side, whole=model.whole) for m in begun)), is_bent=True
         )
+
+    def _rough(self, *asked, **within) -> list[Rough]:
+        """As weak_form.rough_starts of the runs; what was asked once is not worked out again."""
+        key = (*asked, *within.values())
+        if key not in self._roughs:
+            self._roughs[key] = rough_starts(self.runs, *asked, **within)
+        return self._roughs[key]
 
     def _stopped(self, model: LoopModel) -> list[LoopModel]:
         """Stops at the ends of the travel, beside what a regression makes of the rest of it."""
@@ -330,7 +343,7 @@ class Selector:
         found = []
         for lower, upper in ((-np.inf, high), (low, np.inf), (low, high)):
             within = (lower + inset, upper - inset)
-            for rough in rough_starts(self.runs, loads, SCAN.widths[0], within=within):
+            for rough in self._rough(loads, SCAN.widths[0], within=within):
                 found += stops(self.begun(rough), lower + 0.3 * inset, upper - 0.3 * inset)
         return found
 
@@ -352,10 +365,21 @@ class Selector:
                 return replace(selection, chosen=current, left=tuple(left))
             current = weakest.fit
 
+    def grown(self, selection: Selection, begun: LoopModel) -> Selection | None:
+        """The selection from a model with one more term, without what that makes needless; None where chance offers as
+        much.
+        """
+        current, fit = selection.chosen, fitted(begun, self.data, EFFORT.full)
+        if gain(current, fit) < self.policy.loop_gain:
+            return None
+        return self.pruned(replace(selection, chosen=fit, left=()))
+
     def _least(self, left: Left, current: Fit) -> float:
-        """What a term must buy; one whose size says that it is not there, or that takes no share, everything."""
+        """What a term must buy; one whose size says that it is not there, or that takes no share (a part of the bare
+        loop's need not), everything.
+        """
         model = current.model
-        if not self._pays(left.fit, current):
+        if left.name not in BARE and not self._pays(left.fit, current):
             return math.inf
         if left.name == INTEGRAL and model["I"] < self.policy.loop_integral * model["K"]:
             return math.inf

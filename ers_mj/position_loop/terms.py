@@ -138,6 +138,15 @@ def without(model: LoopModel, name: str) -> LoopModel:
     return gone
 
 
+def together(model: LoopModel, other: LoopModel, name: str) -> LoopModel:
+    """The model with one term as another model has it."""
+    if name in other.names:
+        found = model.with_effect(name, dict(other.effects)[name])
+        return replace(found, side=other.side) if BY_NAME[name].subsystem == "transmission" else found
+    letters = OWN.get(name) or BY_NAME[name].in_loop
+    return model.having(**{letter: other[letter] for letter in letters if letter in other.free})
+
+
 def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
     """The candidates beside a model that leaves so large an error [output unit], each from its own starts; what needs a
     closed form is in selection.py.

@@ -82,11 +82,13 @@ def rough_starts(
     largest = max(float(np.nanmax(np.abs(run.r - run.y))) for run in runs)
     rotors = SCAN.rotors if any(run.inertia != runs[0].inertia for run in runs) else (0.0,)
     found: dict[bool, Rough] = {}
-    for rotor in rotors:
-        for tau in SCAN.latencies:
-            references = [_late(f, tau, speed_limit) for f in folded]
-            for share in SCAN.errors:
-                rough = _regressed(folded, references, share * largest, tau, rotor, loads, integral)
+    for tau in SCAN.latencies:
+        references = [_late(f, tau, speed_limit) for f in folded]
+        for share in SCAN.errors:
+            most = share * largest
+            drives = [_driven(f, r, most, integral) for f, r in zip(folded, references, strict=True)]
+            for rotor in rotors:
+                rough = _regressed(folded, drives, most, tau, rotor, loads)
                 known = found.get(np.isfinite(share))
                 if rough is not None and (known is None or rough.left < known.left):
                     found[np.isfinite(share)] = rough
@@ -125,27 +127,32 @@ def _late(f: _Folded, tau: float, speed_limit: float) -> np.ndarray:
     return out
 
 
+def _driven(f: _Folded, r: np.ndarray, most: float, integral: bool) -> np.ndarray:
+    """The drive's column (M, 1) of a run under the reference r (T,), and that of its integral (M, 2)."""
+    e = f.run.gain * (r - f.theta)
+    drive = [np.convolve(np.clip(e, -most, most), f.window, "valid")]
+    if integral:
+        drive.append(np.convolve(np.cumsum(np.clip(e, -most, most)) * (f.t[1] - f.t[0]), f.window, "valid"))
+    return np.column_stack(drive)
+
+
 def _regressed(
     folded: Sequence[_Folded],
-    references: Sequence[np.ndarray],
+    drives: Sequence[np.ndarray],
     most: float,
     tau: float,
     rotor: float,
     loads: Sequence[str],
-    integral: bool,
 ) -> Rough | None:
     """One regression over all runs; None where its gain or damping has the wrong sign."""
+    integral = drives[0].shape[1] > 1
     count = 3 + len(loads) + integral
     normal, right, total = np.zeros((count, count)), np.zeros(count), 0.0
-    for f, r in zip(folded, references, strict=True):
+    for f, drive in zip(folded, drives, strict=True):
         run, light = f.run, (rotor + 1.0) / (rotor + f.run.inertia)
-        e = run.gain * (r - f.theta)
-        drive = [np.convolve(np.clip(e, -most, most), f.window, "valid")]
-        if integral:
-            drive.append(np.convolve(np.cumsum(np.clip(e, -most, most)) * (f.t[1] - f.t[0]), f.window, "valid"))
         weights = np.ones(f.columns.shape[1])
         weights[2:] = [run.pull if load in ("sin", "cos") else 1.0 for load in loads]
-        a = light * np.column_stack([drive[0], f.columns * weights, *drive[1:]])[f.kept]
+        a = light * np.column_stack([drive[:, 0], f.columns * weights, drive[:, 1:]])[f.kept]
         left = f.left[f.kept]
         normal += a.T @ a
         right += a.T @ left

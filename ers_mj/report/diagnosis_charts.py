@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ers_mj.diagnosis.evidence import Evidence, RecordView, ResidualMap, Rung
+from ers_mj.diagnosis.evidence import Evidence, LatentForce, RecordView, ResidualMap, Rung
 from ers_mj.diagnosis.mismatch_spectrum import Mismatch
 from ers_mj.report.charts import packed
 from ers_mj.report.display import Unit, noun, shown
@@ -108,6 +108,28 @@ def switched(view: RecordView, effects: Sequence[str], unit: Unit) -> dict[str, 
 def _rms(view: RecordView, x: np.ndarray) -> float:
     error = (view.measured - x)[np.isfinite(view.measured)]
     return float(np.sqrt(np.mean(error**2))) if error.size else float("nan")
+
+
+# -- what stays unknown --------------------------------------------------------------------------------------------
+
+
+def latent(force: LatentForce, evidence: Evidence) -> dict:
+    """The acceleration that a recording asks for beside the answer, and what the tables give of it, over time."""
+    unit = f"{evidence.output_unit}/s²"
+    drawn = [("asked for beside the answer", "before", force.asked)]
+    if force.tabled is not None:
+        drawn.append(("of which the tables give", "after", force.tabled))
+    return {
+        "kind": "recorded",
+        "panels": [{"name": f"{name} [{unit}]", "unit": unit, "kind": kind, "held": False} for name, kind, _ in drawn],
+        "shaded": [],
+        "levels": [[_over_time(force.t, x) for *_, x in drawn]],
+    }
+
+
+def _over_time(t: np.ndarray, x: np.ndarray) -> dict:
+    at, thinned = decimate(t, x, POINTS)
+    return {"t": packed(at), "y": packed(thinned)}
 
 
 # -- the map of residuals ------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.report import charts, diagnosis_charts, page
 from ers_mj.report.diagnosis_effects import missing_physics
-from ers_mj.report.diagnosis_tables import candidates, fit_table, parameters, record_state, trail
+from ers_mj.report.diagnosis_tables import candidates, fit_table, parameters, record_state, trail, unknown_tables
 from ers_mj.report.display import NONE, Unit, figure, measured, missing, noun, pretty, shown
 from ers_mj.view.frames import Frame, Frames
 
@@ -47,6 +47,7 @@ def report_page(document: Mapping, evidence: Evidence, frames: Frames | None = N
         _where(document, evidence),
         missing_physics(document, unit),
         _residuals(evidence),
+        _unknown(document, evidence),
         candidates(evidence, unit),
         trail(document),
         fit_table(document, unit),
@@ -68,6 +69,8 @@ def _chart_data(document: Mapping, evidence: Evidence) -> dict:
     out = {f"trace-{k}": diagnosis_charts.trace(view, evidence, effects) for k, view in enumerate(records)}
     if evidence.residual_map is not None:
         out["map"] = diagnosis_charts.residual_map(evidence.residual_map, evidence)
+    if evidence.latent is not None:
+        out["latent"] = diagnosis_charts.latent(evidence.latent, evidence)
     if _has_spectrum(document, evidence):
         out["spectrum"] = diagnosis_charts.spectrum(evidence.spectrum, evidence)
     if diagnosis_charts.has_totals(evidence.ladder):
@@ -267,6 +270,19 @@ def _residuals(evidence: Evidence) -> str:
     )
     drawn = charts.place("map", f"rms residual over {output} and speed, before and after")
     return page.section(f"Residual over {output} and speed", lead, drawn)
+
+
+def _unknown(document: Mapping, evidence: Evidence) -> str:
+    """What the answer lacks over time, and the tables that are kept of it."""
+    force = evidence.latent
+    if force is None:
+        return ""
+    lead = (
+        f"The acceleration that {page.text(force.name)} asks for beside the answer, from where the output was measured"
+        f" to be; noise alone makes {figure(force.noise)} {page.text(evidence.output_unit)}/s²."
+    )
+    drawn = charts.place("latent", "the acceleration that the recording asks for beside the answer, over time")
+    return page.section("What stays unknown", lead, drawn + unknown_tables(document))
 
 
 def _data(document: Mapping) -> str:

@@ -146,6 +146,20 @@ def _parameter(name: str, entry: Mapping) -> tuple[tuple[str, ...], str]:
     return cells, "" if told else "untold"
 
 
+def unknown_tables(document: Mapping) -> str:
+    """The tables that are kept of what stays unknown, with their bands."""
+    parts = []
+    for table in (document.get("remainder") or {}).get("tables") or ():
+        rows = []
+        for name, entry in table["parameters"].items():
+            unit = shown(entry["unit"], entry["value"])
+            cells = unit.bare(entry["value"]), interval(entry["ci95"], unit), page.text(unit.label)
+            rows.append(((f"<code>{page.text(name)}</code>", *cells), ""))
+        heads = ["entry", ">value", ">95 % interval", "unit"]
+        parts.append(f"<p>{page.text(table['sentence'])}</p>" + page.table(heads, rows))
+    return "".join(parts)
+
+
 def record_state(document: Mapping, evidence: Evidence) -> str:
     """The section of what changed from one recording to the next."""
     states = document.get("record_state") or []

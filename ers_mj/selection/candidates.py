@@ -22,7 +22,7 @@ from ers_mj.selection.finishing import Early, finished, told
 from ers_mj.selection.overlooked import refit_held_taut, refit_the_overlooked
 from ers_mj.selection.refits import Label, Refits, is_law_of_dear, is_out_of_reach, leaders
 from ers_mj.selection.screening import Begin, screen
-from ers_mj.servo.model import DRIFTS, Model
+from ers_mj.servo.model import DAY, DRIFTS, Model
 
 
 def candidates(
@@ -78,9 +78,7 @@ class _Race(Refits):
 
     def _refit_the_promising(self) -> set[str]:
         """First refits, of further effects as long as a promise was none; the names of those."""
-        model, records = self.base.model, len(self.bench.traces)
-        states = [s for s in DRIFTS if records > 1 and s not in (model.states or {})]
-        self.starts = {(s, 0): [Begin(model.with_state(s, records), {})] for s in states}
+        self.starts = self._states_begun()
         self.best = self.quick([(label, begins[0]) for label, begins in self.starts.items()])
         failed: set[str] = set()
         while new := [name for name in self.screened.promising(failed) if (name, 0) not in self.starts]:
@@ -90,6 +88,16 @@ class _Race(Refits):
             least = self.bench.search.failed * max(self.most_won(self.best), 0.0)
             failed = {name for name, found in leaders(self.best, self.total).items() if self.won(found) <= least}
         return failed
+
+    def _states_begun(self) -> dict[Label, list[Begin]]:
+        """The starts of what differs between recordings."""
+        model, records = self.base.model, len(self.bench.traces)
+        states = [s for s in DRIFTS if records > 1 and s not in (model.states or {})]
+        starts: dict[Label, list[Begin]] = {(s, 0): [Begin(model.with_state(s, records), {})] for s in states}
+        if set(DAY) <= set(states):  # of one alone the other may make a local minimum
+            first, second = DAY
+            starts[(first, 1)] = [Begin(model.with_state(first, records).with_state(second, records), {})]
+        return starts
 
     def _refit_from_other_starts(self, failed: set[str]) -> list[Early]:
         """What may lead is refitted from its other starts: where the base is bent the foremost to the end and on

@@ -16,7 +16,7 @@ from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit, polished
-from ers_mj.estimation.intervals import half_widths
+from ers_mj.estimation.intervals import half_widths, told_widths
 from ers_mj.estimation.objective import Fit, residuals_in
 from ers_mj.selection.comparison import stands_alone
 from ers_mj.selection.cross_validation import Fold, Score, folds, halves, pooled, recalibrated, refits, scored
@@ -33,7 +33,8 @@ class Confirmed:
     """What held-out data says: scores before and after, without each effect, and the p-value of each effect.
 
     ``base`` is the best refit without the named effects. ``shown`` are the scores before and after with the noise of
-    what was held out, by halves where an effect was judged so; ``measure`` is how all of them are taken.
+    what was held out, by halves where an effect was judged so; ``measure`` is how all of them are taken. ``widths``
+    are the 95 % half-widths of the answer's numbers.
     """
 
     base: Fit
@@ -46,6 +47,7 @@ class Confirmed:
     parts: list[Fold]
     sentence: str
     shown: list[tuple[Score, Score, float]]
+    widths: np.ndarray
     measure: Measure = FREE_RUN
 
 
@@ -199,26 +201,30 @@ class Court:
         if not BY_NAME[name].local and not decisions.pays(numbers, again, policy):
             return False
         return not (
-            self.is_unsure(name, model)
+            self.is_unsure(name, model, after_models)
             or may_be_none(name, model, traces, self.tau, policy)
             or is_a_converters(name, model, traces)
             or is_any_wave(name, model, with_it, without, policy)
         )
 
-    def is_unsure(self, name: str, model: Model) -> bool:
-        """Whether the interval of an effect's size spans zero, or decades where it has a sign."""
+    def is_unsure(self, name: str, model: Model, after_models: Sequence[Model]) -> bool:
+        """Whether the interval of an effect's size, as it would be told, spans zero, or decades where it has a sign."""
         if name in model.frozen or BY_NAME[name].local:
             return False
         effect, layout = BY_NAME[name], model.layout()
         sizes = {effect.parameters[k].name for k in effect.sizes(dict(model.effects)[name])}
-        widths = zip(layout, model.vector(layout), self.widths(model))
+        widths = zip(layout, model.vector(layout), self.widths(model, after_models))
         ends = [f.ends(q, w) for f, q, w in widths if f.owner == name and f.name in sizes]
         return bool(ends) and all(decisions.is_no_size(low, high, self.policy) for low, high in ends)
 
-    def widths(self, model: Model) -> np.ndarray:
-        """95 % half-widths of a model's numbers, the last model's kept."""
+    def widths(self, model: Model, after_models: Sequence[Model]) -> np.ndarray:
+        """95 % half-widths of a model's numbers, the last model's kept; ``after_models`` are its refits to each part,
+        which tell them where each leaves one training recording out.
+        """
         if self._wide is None or self._wide[0] is not model:
-            self._wide = model, half_widths(model, self.start.traces, (), self.tau)
+            left_out = after_models if self.parts[0].training is not None and len(after_models) > 2 else ()
+            own = model.of_records(range(len(self.start.traces)))
+            self._wide = model, told_widths(own, self.start.traces, left_out, self.tau)
         return self._wide[1]
 
     def _halved(
@@ -262,8 +268,9 @@ class Court:
             shown += [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(*ends, cut)]
             sentence += f"; {traces[record].name}, which teaches most of an effect, by halves as well"
         without, p = ({name: getattr(one, of) for name, one in judged.items()} for of in ("without", "p"))
+        widths, measure = self.widths(model, after_models), self.measure
         return Confirmed(
-            base, before, after, without, p, after_models, base_models, self.parts, sentence, shown, self.measure
+            base, before, after, without, p, after_models, base_models, self.parts, sentence, shown, widths, measure
         )
 
 

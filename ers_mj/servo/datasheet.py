@@ -55,7 +55,7 @@ SHEET_UNITS: Mapping[str, str] = MappingProxyType(
 LUMPED = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
 SIGNED = ("theta_0", "b")  # may be negative: where the spring rests, and the sense of the input
 NEVER_ZERO = ("J", "R", "n", "K_t", "b", "sample_rate_hz")
-SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect", "diagnosis")
+SECTIONS = ("parameters", "lumped", "recording", "baseline", "loop", "effect", "remainder", "diagnosis")
 VERDICTS = ("consistent", "parameters_only", "missing_physics", "unexplained")
 KINDS, SENSORS = ("P", "PD", "PI", "PID"), ("load", "link", "motor")  # of a firmware's loop, and where its sensor sits
 LOOP = (
@@ -73,7 +73,8 @@ class Datasheet:
         lumped: Eq. (6)'s, in output unit/s^2 per input unit.
         sample_rate_hz: of the recordings it comes with [Hz], or None.
         output_unit, input_unit: of these recordings, see servo.units; empty where not told.
-        effects: the physics that a diagnosis added, each a name and its parameters.
+        effects: the physics that a diagnosis added, each a name and its parameters; what stays unknown ([[remainder]])
+            last.
         baseline: what a diagnosis refitted, by free names.
         loop: the firmware's loop under a position command, by LOOP's letters; empty where there is none.
         loop_kind, loop_sensor: one of KINDS, and one of SENSORS: loop and log on the load, the loop on the motor and
@@ -300,10 +301,14 @@ def _diagnosis(table: object, where: str) -> dict[str, Any]:
 
 
 def _entries(document: Mapping[str, Any], path: Path) -> list[object]:
-    entries = document.get("effect", [])
-    if not isinstance(entries, list):
-        raise InputError(f"{path}: effect is {_kind(entries)}, a list of [[effect]] was expected")
-    return entries
+    """The effects, and behind them the tables of what is unknown."""
+    found: list[object] = []
+    for section in ("effect", "remainder"):
+        entries = document.get(section, [])
+        if not isinstance(entries, list):
+            raise InputError(f"{path}: {section} is {_kind(entries)}, a list of [[{section}]] was expected")
+        found += entries
+    return found
 
 
 def _effect(entry: object, path: Path) -> tuple[str, dict[str, float]]:

@@ -13,6 +13,7 @@ from ers_mj.effects.base import Parameter
 from ers_mj.effects.quantities import Scales
 
 DRIFTS = "gain", "offset", "friction_level"  # what may differ from one day to the next
+DAY = "gain", "friction_level"  # of these what a drive and its temperature change together
 LOADS = "load", "weight"  # from one load to another: inertia and gravity as a factor, gravity by more than that
 STATES = (*DRIFTS, *LOADS)
 MOST_TAU = 2.0  # of a datasheet's electrical time constant, up to which the baseline's is an ordinary one
@@ -32,6 +33,7 @@ class Bounds:
     # standard deviation of ln(gain), ln(friction level); a tenth of it, over half the travel, for an offset
     state_prior: float = 0.2
     load_prior: float = 1.0  # the same of a load
+    table_prior: float = 0.5  # of an entry of what stays unknown, over the friction's level
 
 
 BOUNDS = Bounds()
@@ -123,6 +125,9 @@ def _of_states(states: Mapping[str, np.ndarray], scales: Scales) -> Iterator[Fre
 
 
 def _of_effect(name: str, parameter: Parameter, index: int, value: float, scales: Scales, local: bool = False) -> Free:
+    if BY_NAME[name].tabled:
+        ends = -np.inf, np.inf
+        return Free(name, parameter.name, index, False, scales.acceleration, *ends, (0.0, BOUNDS.table_prior))
     scale = 1.0 if parameter.positive else CLOCKED.get(parameter.kind, max(abs(value), 1e-12))
     ends = _near_travel(scales) if parameter.on_travel else _ends(name, parameter, scales)
     return Free(name, parameter.name, index, parameter.positive, scale, *ends, local=local)

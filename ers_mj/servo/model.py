@@ -14,6 +14,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.quantities import Scales
 from ers_mj.plants.effort import Effort
 from ers_mj.plants.reduced import ReducedModel, lumped
+from ers_mj.servo.free import DAY as DAY
 from ers_mj.servo.free import DRIFTS as DRIFTS
 from ers_mj.servo.free import LOADS as LOADS
 from ers_mj.servo.free import MOST_TAU as MOST_TAU

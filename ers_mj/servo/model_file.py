@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ers_mj.data.whole import write_whole
+from ers_mj.effects import TABLES
 from ers_mj.servo.datasheet import Datasheet
 
 
@@ -24,7 +25,8 @@ def write_model(path: str | os.PathLike[str], datasheet: Datasheet) -> None:
         title = f'[loop]\nkind = "{datasheet.loop_kind}"\nsensor = "{datasheet.loop_sensor}"'
         lines += _lines(title, datasheet.loop)
     for name, values in datasheet.effects:
-        lines += ["[[effect]]", f"name = {_quoted(name)}", *_lines("[effect.parameters]", values)]
+        section = "remainder" if name in TABLES else "effect"
+        lines += [f"[[{section}]]", f"name = {_quoted(name)}", *_lines(f"[{section}.parameters]", values)]
     if datasheet.verdict:
         lines += ["[diagnosis]", f"verdict = {_quoted(datasheet.verdict)}", ""]
     if datasheet.intervals:
