@@ -130,8 +130,9 @@ def test_with_an_effect_both_simulators_agree(name):
     shape = draw_shape(rng, CATALOGUE[name], CONTEXT)
     shape = shape | {"form": "Hunt-Crossley"} if name in ("backlash", "end_stop") else shape
     effect = {"label": name, "strength": float(np.sqrt(CATALOGUE[name].low * CATALOGUE[name].high)), "shape": shape}
+    step = 2.5e-5 if name in ("load_dependent_friction", "supply_sag", "friction_ageing") else 5e-5  # faint, these
     bare, truth = quick.simulate(TABLE_1, [], T, u).clean, quick.simulate(TABLE_1, [effect], T, u).clean
-    apart, size = rms_deg(recorder.record(TABLE_1, [effect], T, u, step=5e-5).clean - truth), rms_deg(truth - bare)
+    apart, size = rms_deg(recorder.record(TABLE_1, [effect], T, u, step=step).clean - truth), rms_deg(truth - bare)
     assert apart < max(0.002, 0.01 * size)
 
 

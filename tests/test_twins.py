@@ -195,9 +195,7 @@ def test_a_law_acts_on_its_own_body_in_either_plant(name, road):
     both = [("shaft_compliance", np.array([12.0, 0.1, 0.6, 0.4, np.inf])), (name, values(BY_NAME[name]))]
     u = INPUTS["steps" if BY_NAME[name].friction else "multisine"](T)
     law, plain = ReducedModel(EQ_1, both).simulate(T, u), ReducedModel(EQ_1, both[:1]).simulate(T, u)
-    twin = MechanicalPlant(
-        EQ_1, both, parameters=SHEET.parameters if road == "rudder" else None, timestep=STEP
-    ).simulate(T, u)
+    twin = MechanicalPlant(EQ_1, both, parameters=SHEET.parameters if road == "rudder" else None).simulate(T, u)
     assert rms_deg(law.theta - plain.theta) > VISIBLE
     assert rms_deg(twin.theta - law.theta) < TOLERANCE * rms_deg(law.theta - plain.theta)
 
