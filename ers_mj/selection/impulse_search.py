@@ -70,8 +70,8 @@ def impulses(
     nearer = search.nearer(tried.values(), (1,), effect.tries)
     outweighed = [pushes for pushes in tried.values() if search.is_outweighed(pushes[0][1])]
     nearer += search.nearer(outweighed, (2, 1), 1)
-    gained = ((search.gains(start)[0], start) for start in nearer)
-    return [(2.0 * won / power, place.with_effect(effect.name, start)) for won, start in gained if won > 0]
+    gained = sorted(((search.gains(start), start) for start in nearer), key=lambda found: -found[0][1])
+    return [(2.0 * won[0] / power, place.with_effect(effect.name, start)) for won, start in gained if won[0] > 0]
 
 
 class _Pushes:

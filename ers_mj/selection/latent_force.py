@@ -72,9 +72,9 @@ def _push(model: Model, trace: Trace, record: int, begin: float) -> tuple[int, f
     if begins.size < 3 or not np.all(np.isfinite(asked)):
         return None
     total = np.concatenate([[0.0], np.cumsum(asked)])
-    i, j = np.triu_indices(total.size, k=2)  # what lasts a span only is the noise of one
-    given = (total[j] - total[i]) / np.sqrt(j - i)
+    firsts, lasts = np.triu_indices(total.size, k=2)  # what lasts a span only is the noise of one
+    given = (total[lasts] - total[firsts]) / np.sqrt(lasts - firsts)
     best = int(np.argmax(np.abs(given)))
-    i, j, n = int(i[best]), int(j[best]), span_of(trace)
-    t_0, end = trace.t[begins[i]], trace.t[min(begins[j - 1] + n, trace.t.size - 1)]
+    i, j = int(firsts[best]), int(lasts[best])
+    t_0, end = trace.t[begins[i]], trace.t[min(begins[j - 1] + span_of(trace), trace.t.size - 1)]
     return record, float(t_0), float(end - t_0), float((total[j] - total[i]) / (j - i))

@@ -165,8 +165,7 @@ class _Screening:
         hot = hot_spans(view.run, self.bench, least)
         pushed = pushes(view.place, self.bench.traces, hot)
         starts = effect.starts(replace(view.place.scales, hot=hot, pushed=pushed))
-        found = impulses(view.run, effect, starts, view.targets[0].power, self.bench.traces, self.bench.tau, least)
-        return sorted(found, key=lambda p: -p[0])
+        return impulses(view.run, effect, starts, view.targets[0].power, self.bench.traces, self.bench.tau, least)
 
     def _found(
         self, view: View, effect: Effect, starts: Sequence[np.ndarray], told: Sequence[tuple[float, float]]
@@ -188,7 +187,7 @@ class _Screening:
     def _keep(self, effect: Effect, found: list[tuple[float, Model]], known: Columns, is_first: bool) -> None:
         if not found:
             return
-        best, name = found[0][0], effect.name
+        best, name = max(promise for promise, _ in found), effect.name
         of_forms = of_each_form(found, lambda p: p[1].effects[-1][1])[: max(effect.tries, self.tries)]
         begun = [Begin(model, known) for _, model in of_forms]
         if not effect.dear:
