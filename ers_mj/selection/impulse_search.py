@@ -54,7 +54,7 @@ def impulses(
     """What happens once, tried as it is in its own recording: a rudder at rest moves for a large push and not at all
     for a small one, so that no secant may be scaled. The best starts of different side, length or recording, brought
     nearer where they may gain the ``least`` share that matters, with what they gain in C as a share of the residual's
-    ``power``.
+    ``power``; first that which brings its surroundings nearest.
 
     They are compared and brought nearer at a tau that the recording's part around them gives (see fit): at the last one
     C has a local minimum wherever one block is met. Where one block is so bad that it outweighs all others they are
