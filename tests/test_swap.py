@@ -10,7 +10,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
 from ers_mj.selection import swap
 from ers_mj.selection.comparison import Candidate, judged
-from ers_mj.selection.swap import begun_anew, exchanged, in_its_place, other_way_round, reviewed, widened
+from ers_mj.selection.swap import as_what_it_is, begun_anew, exchanged, in_its_place, other_way_round, reviewed, widened
 
 
 def test_a_play_begins_anew_beside_what_was_found_since(pushed):
@@ -117,3 +117,14 @@ def test_what_a_refit_turns_into_another_effect_gives_way_to_it(pushed, rho, fir
     now = having(pushed.fit, "shaft_compliance", [50.0, 0.7, rho, 0.0, np.inf])
     other = in_its_place(bench_of(pushed), now, pushed.fit, (shaft, winding))
     assert (other and other[0].name) == first and (other is None or len(other) == 2)
+
+
+def test_a_late_reading_without_a_lag_gives_way_to_the_delay_that_it_is():
+    start = started(recorded([("input_delay", np.array([0.006]))]))
+    late = start.fit.model.with_effect("sensor_lag", np.array([1e-6, 0.006]))
+    current, bench = fit(late, start.traces), bench_of(start)
+    ranked = (judged("sensor_lag", current, start.fit, bench.tau),)
+    found, rounds = as_what_it_is(bench, current, [ranked])
+    assert found.model.names == ("input_delay",) and rounds[0][0].name == "input_delay"
+    assert dict(found.model.effects)["input_delay"][0] == pytest.approx(0.006, rel=0.02)
+    assert as_what_it_is(bench, found, rounds) is None

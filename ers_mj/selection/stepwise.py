@@ -27,7 +27,7 @@ from ers_mj.selection.foundation import held_beside, held_instead
 from ers_mj.selection.loads import still_loaded, under_loads
 from ers_mj.selection.moves import Grown, Move, less
 from ers_mj.selection.pair import bending_and_twisting, beside_a_rival, paired
-from ers_mj.selection.swap import exchanged, in_its_place, other_way_round, reviewed, widened
+from ers_mj.selection.swap import as_what_it_is, exchanged, in_its_place, other_way_round, reviewed, widened
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
 from ers_mj.selection.whiteness import is_beyond_rounding, left_by_sensor
 from ers_mj.servo.model import Model
@@ -111,6 +111,7 @@ class _Stepwise:
                 self.tried.add("review")
             else:
                 self._add(because)
+        self._look_again(("swap", lambda: as_what_it_is(self.bench, self.current, self.rounds)))
         bench, rounds, trail = self.bench, tuple(self.rounds), tuple(self.trail)
         return Selection(self.base, self.current, rounds, bench.tau, bench.traces, trail, cut_short)
 
@@ -318,8 +319,7 @@ class _Stepwise:
         self._go_on("drop", pruned(bench, leader.fit, leader.name), leader.fit, "no longer pays beside the newest")
         current, self.rounds = reconsidered(bench, self.current, self.rounds)
         self._go_on("drop", current, self.current, "it was found in a model that the newest had bent")
-        tau = tau_of(self.current.misfit)
-        traces = bench.traces
+        tau, traces = tau_of(self.current.misfit), bench.traces
         if is_rough(traces):  # within a step a model tells where the rudder began, and a wrong one tells it wrongly
             traces = with_starts(self.current.model, traces)
         self.bench = replace(bench, tau=tau, traces=traces)

@@ -166,6 +166,26 @@ def widened(bench: Bench, current: Fit, newest: str) -> Fit:
     return current
 
 
+def as_what_it_is(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate, ...]]) -> Grown | None:
+    """The model with the effect itself in the place of one whose numbers are a form of it (see Effect.really), and the
+    rounds led by it, where that is as good; None where nothing is.
+    """
+    for name in current.model.names:
+        other, without = really(name, current), current.model.without_effect(name)
+        if other in current.model.names:
+            continue
+        begun = (without.with_effect(other, start) for start in BY_NAME[other].starts(without.scales))
+        found = min((bench.fit(model, 20) for model in begun), key=bench.priced, default=None)
+        if found is None or bench.priced(found) > bench.priced(current) + bench.policy.tie:
+            continue
+        one = bench.judged(other, found, bench.fit(without, 20))
+        return found, [
+            (one, *(c for c in ranked if c.name != other)) if ranked and ranked[0].name == name else ranked
+            for ranked in rounds
+        ]
+    return None
+
+
 def in_its_place(bench: Bench, current: Fit, before: Fit, ranked: Sequence[Candidate]) -> tuple[Candidate, ...] | None:
     """The candidates of a round that added its leader to the model ``before``, with a rival first where the refit has
     made of the leader a form of another effect (see Effect.really); None where it is still itself, or still the
