@@ -118,7 +118,7 @@ class _Screening:
         """Ask the effects what they promise from one place, the likeliest to first order first, and of what happens
         once last.
         """
-        is_first, scales, some = view.place is self.first, view.place.scales, view.foremost()
+        is_first, scales, some = view.place is self.first, view.place.scales, view.foremost
         sparse = some.sparse()
         if is_first and self.bent:
             scales = replace(scales, waves=waves_of(view.run, self.bench.traces))

@@ -75,6 +75,7 @@ class View:
         """Whether what a secant asks for is another size than that at which it was taken."""
         return not 1.0 / self.search.another < factor < self.search.another
 
+    @cached_property
     def foremost(self) -> View:
         """The view of the recordings that leave most, as few as hold MOST of it together: enough to choose by. All of
         them where the model tells them apart.
@@ -125,7 +126,7 @@ def view_of(run: Run, traces: Sequence[Trace], tau: float, search: Search = SEAR
     m = blocks.misfit(e)
     jacobian = central_jacobian(place, layout, place.vector(layout), traces, OBSERVER_RATE)  # refits borrow it
     free, targets = np.array([not place.at_bound(f) for f in layout], bool), []
-    for level in (tau, max(tau, float(np.mean(m)))):
+    for level in dict.fromkeys((tau, max(tau, float(np.mean(m))))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
         basis, _ = np.linalg.qr(jacobian[:, free] * root[:, None])
         targets.append(Target(root, basis, root * e - basis @ (basis.T @ (root * e))))
@@ -178,7 +179,7 @@ def by_recordings(view: View, effect: Effect, starts: Sequence[np.ndarray], most
     """The starts of an effect that no first order tells, of many as many as promise ``most`` in the recordings that
     leave most.
     """
-    fewer = view.foremost()
+    fewer = view.foremost
     if fewer is view or len(starts) <= most:
         return starts
     shares = {k: found[0] for k, start in enumerate(starts) if (found := promise(fewer, effect, start, 1.0))}
