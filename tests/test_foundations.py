@@ -18,7 +18,7 @@ from ers_mj.estimation.objective import run_of, tau_of
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.cross_validation import scored
-from ers_mj.selection.foundation import held_instead
+from ers_mj.selection.foundation import held_instead, hung
 from ers_mj.selection.loads import under_loads
 from ers_mj.selection.measure import FREE_RUN, measure_of
 from ers_mj.selection.spectrum import waves_of
@@ -177,3 +177,13 @@ def test_a_dead_zone_that_is_wider_one_way():
     effect, u = BY_NAME["drive_dead_zone"], np.array([-0.4, -0.25, 0.0, 0.15, 0.4])
     assert effect.command(np.array([0.2, np.inf, 0.1]), u) == pytest.approx([-0.3, -0.15, 0.0, 0.0, 0.1])
     assert effect.command(np.array([0.2, np.inf, np.inf]), u) == pytest.approx([-0.2, -0.05, 0.0, 0.0, 0.2])
+
+
+def test_a_weight_is_begun_from_the_spring_that_does_nearly_as_well():
+    start = baseline([swung(k, pull=6.0 * PULL) for k in range(2)], None, True)
+    bench = Bench(start.traces, 1.0)
+    found = hung(bench, start.fit)
+    assert found.model.names == ("gravity_imbalance",) and "a_1" not in found.model.free
+    assert dict(found.model.effects)["gravity_imbalance"] == pytest.approx(6.0 * PULL, rel=0.05)
+    loose = replace(start.fit.model, values={**start.fit.model.values, "a_1": 0.0})
+    assert hung(bench, replace(start.fit, model=loose)) is None

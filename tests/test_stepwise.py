@@ -13,7 +13,8 @@ from ers_mj.estimation.fit import fit
 from ers_mj.selection import stepwise
 from ers_mj.selection.budget import Budget
 from ers_mj.selection.comparison import judged
-from ers_mj.selection.stepwise import rounds_that_count, select
+from ers_mj.selection.moves import rounds_that_count
+from ers_mj.selection.stepwise import select
 
 SURE = replace(POLICY, mismatch=np.inf)  # nothing that is left is more than noise
 

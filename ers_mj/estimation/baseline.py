@@ -55,7 +55,8 @@ class Held:
 @dataclass(frozen=True)
 class Start:
     """The refitted baseline, the traces with their fitted initial states, other values that fits may start from, and
-    the best baseline with an effect in the spring's place, where one was looked for.
+    the best baseline with an effect in the spring's place, where one was looked for; ``is_spring_known`` where a
+    datasheet names the spring.
 
     A refitted baseline has swallowed what it could of a missing effect; the datasheet's values, or those found under a
     scaffold, have not.
@@ -65,6 +66,7 @@ class Start:
     traces: Sequence[Trace]
     anchors: tuple[Mapping[str, float], ...] = ()
     held: Held | None = None
+    is_spring_known: bool = False
 
 
 def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: bool, jobs: int = 1) -> Start:
@@ -175,7 +177,9 @@ def _from_datasheet(traces: Sequence[Trace], known: Mapping[str, float], is_angl
             sheet, refitted, started, others = turned, other, there, more
     anchors = ({**sheet.values, "theta_0": refitted.model.values["theta_0"]}, *others)
     found = Start(refitted, started, anchors)
-    if sheet.values["a_1"] > 0 or sheet.values["c_1"] > 0 or _explains(refitted):
+    if sheet.values["a_1"] > 0 or sheet.values["c_1"] > 0:
+        return replace(found, is_spring_known=True)
+    if _explains(refitted):
         return found
     kinds = Kinds.of(traces, {**known, **{n: sheet.values[n] for n in SIGNED if n in known}}, is_angle)
     if "a_1" not in known:

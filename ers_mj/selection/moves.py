@@ -40,3 +40,11 @@ def less(model: Model, name: str) -> Model:
     if name in BY_NAME:
         return model.without_effect(name)
     return replace(model, states={k: v for k, v in (model.states or {}).items() if k != name} or None)
+
+
+def rounds_that_count(rounds: int, model: Model) -> int:
+    """Of the rounds that led to a model: those for what differs between recordings do not count, nor, once, one whose
+    effect a later one made needless.
+    """
+    effects = rounds - len(model.states or {})
+    return effects - (effects > len(model.names))

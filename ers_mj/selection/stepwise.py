@@ -14,6 +14,7 @@ from ers_mj.data.prepared import Trace
 from ers_mj.decisions import acceptance, explained
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.decisions.verdict import is_more_than_noise
+from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Held, Start
 from ers_mj.estimation.fit import hopped
 from ers_mj.estimation.initial_state import with_starts
@@ -23,14 +24,13 @@ from ers_mj.selection.budget import Budget
 from ers_mj.selection.candidates import candidates
 from ers_mj.selection.comparison import Candidate, bends_and_twists, is_dear, stands_alone
 from ers_mj.selection.drop import pruned, reconsidered
-from ers_mj.selection.foundation import held_beside, held_instead
+from ers_mj.selection.foundation import held_beside, held_instead, hung
 from ers_mj.selection.loads import still_loaded, under_loads
-from ers_mj.selection.moves import Grown, Move, less
+from ers_mj.selection.moves import Grown, Move, less, rounds_that_count
 from ers_mj.selection.pair import bending_and_twisting, beside_a_rival, paired
 from ers_mj.selection.swap import as_what_it_is, exchanged, in_its_place, other_way_round, reviewed, widened
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
 from ers_mj.selection.whiteness import is_beyond_rounding, left_by_sensor
-from ers_mj.servo.model import Model
 
 Progress = Callable[[str, float], None]
 
@@ -74,6 +74,7 @@ def select(
     base = replace(base, model=replace(base.model, effort=budget.effort))
     bench = Bench(traces, tau_of(base.misfit), jobs, exclude, policy, budget.search, budget)
     growing = _Stepwise(bench, base, start.anchors if start is not None else (), progress)
+    growing.may_hang = start is not None and start.held is None and not start.is_spring_known
     if start is not None and start.held is not None:
         growing.begin_with(start.held)
     growing.tell_loads()
@@ -90,6 +91,7 @@ class _Stepwise:
         self.tried: set[str] = set()  # of what is tried once a case
         self.mended, self.took = 0, 0.0
         self.held: Fit | None = None  # a baseline that holds the output otherwise, as a candidate
+        self.may_hang = False  # whether one is to be made where a load is named
         self.given: tuple[str, ...] = ()  # effects of the baseline
 
     def run(self) -> Selection:
@@ -168,6 +170,8 @@ class _Stepwise:
 
     def _hold_otherwise(self) -> None:
         """Stand on what holds the output otherwise, where what was found since shows it."""
+        if self.may_hang and any(BY_NAME[name].subsystem == "load" for name in self.current.model.names):
+            self.may_hang, self.held = False, hung(self.bench, self.base)
         if self.held is None or any(name in self.current.model.names for name in self.held.model.names):
             return
         if (found := held_beside(self.bench, self.current, self.held)) is None:
@@ -390,11 +394,3 @@ class _Stepwise:
             return None
         self.tried.add("part")
         return beside_a_rival(bench, self.current, self.rounds)
-
-
-def rounds_that_count(rounds: int, model: Model) -> int:
-    """Of the rounds that led to a model: those for what differs between recordings do not count, nor, once, one whose
-    effect a later one made needless.
-    """
-    effects = rounds - len(model.states or {})
-    return effects - (effects > len(model.names))
