@@ -4,7 +4,7 @@ effect that has them.
 
 import numpy as np
 import pytest
-from test_reduced import SCALES, TABLE_1, T
+from test_reduced import SCALES, TABLE_1
 
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.plants.inputs import INPUTS
@@ -12,6 +12,7 @@ from ers_mj.plants.reduced import ReducedModel, lumped
 
 VALUES = {**TABLE_1.to_lumped(), "emf_share": 0.9}
 SEEN_BY_EQ_5 = ("a_1", "a_2", "b", "c_1", "c_2", "theta_0")
+T = np.arange(0.0, 4.0, 1e-3)
 STEP = 1e-5
 FORKS = 0.1  # share of the samples where a finite difference may have caught another stick event than the tangent
 CLOSE, ROUGHLY = (
