@@ -20,6 +20,11 @@ BECOMES_ANOTHER = (
 COMPILED_TEXT = "exec('import time; time.sleep(100)')"
 IN_A_THREAD = f"with ThreadPoolExecutor() as pool:\n        pool.submit(lambda: {LONG_CALL}).result()"
 IN_PROCESSES = "with ProcessPoolExecutor(2) as pool:\n        list(pool.map(time.sleep, [100, 100]))"
+# a child that multiprocessing does not know of, as in the moment of its fork; time.sleep outlasts HUNG
+FORKED = pytest.param(
+    SWALLOWED.replace("pass", "os.fork()"),
+    marks=pytest.mark.skipif(sys.platform != "linux", reason="the system tells no children"),
+)
 PROGRAM = """import hashlib, os, sys, time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
@@ -55,7 +60,9 @@ def stopped(program: list[str], number: int = signal.SIGINT) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize(
-    "job", [LONG_CALL, SWALLOWED, BECOMES_ANOTHER, COMPILED_TEXT, IN_A_THREAD, IN_PROCESSES], ids=lambda job: job[:30]
+    "job",
+    [LONG_CALL, SWALLOWED, BECOMES_ANOTHER, COMPILED_TEXT, IN_A_THREAD, IN_PROCESSES, FORKED],
+    ids=lambda job: job[:30],
 )
 def test_any_moment_ends_with_130(job, tmp_path):
     part = tmp_path / "part"
