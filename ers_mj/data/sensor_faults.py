@@ -29,7 +29,7 @@ class Repeats:
     near: float = 0.5  # of the noise, to either side: changes that tell how often chance gives one of none
     most_cells: int = 12  # steps to either side that are enough to tell it
     times: float = 1.5  # that; the print may make the least change of a converter a third smaller than its step
-    chance: float = 1e-5  # that as many repeats come of noise
+    chance: float = 1e-6  # that as many repeats come of noise
     noise: float = 4.0  # steps of noise, from which a reading seldom stays
     most: float = 0.2  # share of the samples, above which a reading is refreshed slowly and not lost
 

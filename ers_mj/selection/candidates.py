@@ -78,7 +78,9 @@ class _Race(Refits):
 
     def _refit_the_promising(self) -> set[str]:
         """First refits, of further effects as long as a promise was none; the names of those."""
-        self.starts = self._states_begun()
+        model, records = self.base.model, len(self.bench.traces)
+        states = [s for s in DRIFTS if records > 1 and s not in (model.states or {})]
+        self.starts = {(s, 0): [Begin(model.with_state(s, records), {})] for s in states}
         self.best = self.quick([(label, begins[0]) for label, begins in self.starts.items()])
         failed: set[str] = set()
         while new := [name for name in self.screened.promising(failed) if (name, 0) not in self.starts]:
@@ -88,12 +90,6 @@ class _Race(Refits):
             least = self.bench.search.failed * max(self.most_won(self.best), 0.0)
             failed = {name for name, found in leaders(self.best, self.total).items() if self.won(found) <= least}
         return failed
-
-    def _states_begun(self) -> dict[Label, list[Begin]]:
-        """The starts of what differs between recordings."""
-        model, records = self.base.model, len(self.bench.traces)
-        states = [s for s in DRIFTS if records > 1 and s not in (model.states or {})]
-        return {(s, 0): [Begin(model.with_state(s, records), {})] for s in states}
 
     def _refit_from_other_starts(self, failed: set[str]) -> list[Early]:
         """What may lead is refitted from its other starts: where the base is bent the foremost to the end and on
