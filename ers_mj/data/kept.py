@@ -30,12 +30,12 @@ class Kept:
             return self._found[key]
 
     def keep(self, key: Hashable, arrays: tuple[np.ndarray, ...]) -> None:
-        """Keep arrays under a key that holds none yet, as long as there is room."""
+        """Keep arrays under a key, in the place of those that it holds, as long as there is room."""
         size = sum(a.nbytes for a in arrays)
         with self._lock:
-            if key in self._found or size > self._most:
+            if size > self._most:
                 return
+            self._bytes += size - sum(a.nbytes for a in self._found.pop(key, ()))
             self._found[key] = arrays
-            self._bytes += size
             while self._bytes > self._most:
                 self._bytes -= sum(a.nbytes for a in self._found.popitem(last=False)[1])

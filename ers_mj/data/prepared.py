@@ -115,14 +115,16 @@ class Trace:
         """Whether all steps are alike."""
         return self.t.size > 1 and bool(np.ptp(np.diff(self.t)) < 1e-5 * self.sample_time)
 
-    def part(self, begin: int, end: int) -> Trace:
-        """Samples begin..end as a trace of their own."""
+    def part(self, begin: int, end: int, start: tuple[float, float] | None = None) -> Trace:
+        """Samples begin..end as a trace of their own, which begins in the state ``start``, else as the samples show
+        it.
+        """
         cut = slice(begin, end)
         pick = lambda a: None if a is None else a[cut]
         signals = self.t[cut], self.u[cut], self.y[cut], self.valid[cut]
         kept = Signals(*signals, pick(self.enable), pick(self.load))
         return replace(
-            make_trace(self.name, kept, self.sigma, self.quantum),
+            make_trace(self.name, kept, self.sigma, self.quantum, start),
             channels=tuple(replace(c, values=c.values[cut]) for c in self.channels),
             supply=pick(self.supply),
             converter=self.converter,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,9 +31,7 @@ def run_in_mujoco(parts: Sequence[Fold]) -> list[Trace]:
     ends = np.cumsum([trace.t[-1] - trace.t[0] for trace in traces])
     whole = int(np.searchsorted(ends, most, side="right"))
     first = traces[0]
-    return traces[:whole] or [
-        replace(first.part(0, int(np.searchsorted(first.t, first.t[0] + most))), start=first.start)
-    ]
+    return traces[:whole] or [first.part(0, int(np.searchsorted(first.t, first.t[0] + most)), first.start)]
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ class SensorNonlinearity(Sensor):
         for _ in range(6):
             step = (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), 0.2)
             theta = theta + step
-            if np.nanmax(np.abs(step), initial=0.0) < 1e-7:  # its error is of the order of its square
+            if np.fmax.reduce(np.abs(step), initial=0.0) < 1e-7:  # its error is of the order of its square
                 break
         return theta
 

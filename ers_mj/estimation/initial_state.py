@@ -81,7 +81,7 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
     if trace.converter is not None:
         return _start_within(model, trace, record)
     n = start_samples(trace.t)
-    head = trace.part(0, n)
+    head = trace.part(0, n, trace.start)
 
     def misses(x):
         e = np.where(head.valid, head.weighed(model.predict(head, record, start=x)), 0.0)

@@ -51,22 +51,23 @@ def run_of(model: Model, traces: Sequence[Trace], rate: float) -> Run:
 
 def residuals(model: Model, traces: Sequence[Trace], rate: float) -> np.ndarray:
     """What the run leaves (N,) (see Run)."""
-    return run_of(model, traces, rate).left
+    return np.concatenate([residuals_in(model, trace, k, rate) for k, trace in enumerate(traces)])
 
 
 def residuals_in(model: Model, trace: Trace, record: int, rate: float) -> np.ndarray:
     """The same (rows,) in one recording."""
-    return _run_in(model, trace, record, rate)[0]
+    return _run_in(model, trace, record, rate, moves=False)[0]
 
 
-def _run_in(model: Model, trace: Trace, record: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
+def _run_in(model: Model, trace: Trace, record: int, rate: float, moves: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """What a run leaves (rows,), and its motion (n, 4): kept with the trace, since fits, comparisons and intervals ask
-    for the same places again. The effort is counted each time, so that it tells the same whatever is kept.
+    for the same places again; of what ``moves`` are not asked for only what it leaves, a fifth of it all. The effort
+    is counted each time, so that it tells the same whatever is kept.
     """
     plant = model.plant(record, trace.supply)
     key = (*plant.told, rate, model.offset(record), model.values.get("ampere"), model.dead_time)
     kept = trace.runs.get(key)
-    if kept is not None:
+    if kept is not None and (kept[1].size or not moves):
         plant.count_outputs(trace.t, rate > 0, int(kept[2][0]))
         return kept[0], kept[1]
     (theta, *others), motion, beyond = model.observed(trace, record, rate)
@@ -81,7 +82,7 @@ def _run_in(model: Model, trace: Trace, record: int, rate: float) -> tuple[np.nd
     flat = left.ravel()
     flat[trace.unseen] = 0.0
     flat.flags.writeable = False
-    trace.runs.keep(key, (flat, motion, np.array([beyond])))
+    trace.runs.keep(key, (flat, motion if moves else motion[:0].copy(), np.array([beyond])))
     return flat, motion
 
 

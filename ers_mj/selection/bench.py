@@ -64,6 +64,8 @@ class Bench:
 
     def each(self, function: Callable[[A], B], items: Iterable[A]) -> list[B]:
         """The function of each item, side by side."""
+        if self.jobs == 1:
+            return list(map(function, items))
         with ThreadPoolExecutor(self.jobs) as pool:
             return list(pool.map(function, items))
 

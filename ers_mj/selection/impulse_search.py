@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -147,7 +147,7 @@ class Surroundings:
             theta, omega = self.run.motions[record][begin, :2]
             start = (theta + self.run.model.offset(record), omega) if begin else trace.start
             is_all = (begin, end) == (0, trace.t.size)
-            part = trace if is_all else replace(trace.part(begin, end), start=start)
+            part = trace if is_all else trace.part(begin, end, start)
             misfit = self.misfit(part, residuals_in(self.run.model, part, record, OBSERVER_RATE))
             geometric = float(np.exp(np.mean(np.log(misfit + self.tau))))
             levels = self.tau, geometric, float(np.mean(misfit)) + self.tau

@@ -52,8 +52,8 @@ def asked_for(
 
 
 def _asked(model: Model, trace: Trace, k: int, n: int, speed: float, record: int) -> float:
-    part = trace.part(k, k + n + 1)
-    run = model.predict(part, record, start=(float(trace.y[k]), float(speed)))
+    part = trace.part(k, k + n + 1, (float(trace.y[k]), speed))
+    run = model.predict(part, record)
     return 2.0 * float(trace.y[k + n] - run[-1]) / float(part.t[-1] - part.t[0]) ** 2
 
 

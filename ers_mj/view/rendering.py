@@ -33,6 +33,7 @@ class Painter:
         self.data, self.other = mujoco.MjData(model), mujoco.MjData(model)
         self.option, self.scene = mujoco.MjvOption(), mujoco.MjvScene(model, 2000)
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        model.vis.quality.shadowsize *= not plain
         try:
             self.context = _context_class()(width, height)
             self.context.make_current()
