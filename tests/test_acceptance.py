@@ -7,8 +7,8 @@ import pytest
 from ers_mj.decisions.acceptance import Bar, Offer, asked, bar, is_asked_for, is_steady, least_of
 from ers_mj.decisions.thresholds import POLICY
 
-FIRST = Bar(usual=3.0, faint=3.0, z=1.7, outstanding=False, beside=False)
-LATER = Bar(usual=4.0, faint=1.5, z=2.0, outstanding=False, beside=True)
+FIRST = Bar(usual=3.0, faint=3.0, drifts=3.0, z=1.7, outstanding=False, beside=False)
+LATER = Bar(usual=4.0, faint=1.5, drifts=4.0, z=2.0, outstanding=False, beside=True)
 
 
 def law(name="stribeck", gain=5.0, z=3.0, lost=0.0, best=3.0, **kind):
@@ -80,6 +80,7 @@ def test_of_laws_the_first_that_is_asked_for_is_named():
     assert named(offers, LATER) == "quadratic_drag" and named(offers, FIRST) is None
     level = law("friction_level", 9.0, is_effect=False, clocked=True)
     assert named([dear, level], LATER) is None and named([level, dear], LATER) == "friction_level"
+    assert named([level], replace(LATER, usual=50.0, faint=50.0)) == "friction_level"  # be much left or little
     assert "3" in asked([law(gain=1.0)], [False], FIRST)[1]  # says what was asked
 
 
@@ -103,12 +104,13 @@ def test_beside_an_effect_a_law_may_buy_less_where_it_stands_alone():
 
 
 def test_the_bar_rises_with_what_is_left_and_what_is_named():
-    assert bar(0.0, 0, False, True, False) == Bar(3.0, 3.0, POLICY.least_z, False, False)
-    assert bar(0.0, 1, False, True, True) == Bar(4.0, 1.5, POLICY.later_z, True, True)
+    assert bar(0.0, 0, False, True, False) == Bar(3.0, 3.0, 3.0, POLICY.least_z, False, False)
+    assert bar(0.0, 1, False, True, True) == Bar(4.0, 1.5, 4.0, POLICY.later_z, True, True)
     assert bar(0.0, 1, True, True, False).faint == 4.0  # beside what is dear nothing is faint
     for count, in_order, share in ((0, True, 0.1), (1, True, 0.1), (2, True, 1 / 6), (2, False, POLICY.good_part)):
         at = bar(100.0, count, False, in_order, False)
         assert at.usual == at.faint == pytest.approx(100.0 * share)
+        assert at.drifts == bar(0.0, count, False, in_order, False).usual
 
 
 def test_another_policy_asks_something_else():

@@ -135,6 +135,13 @@ def test_the_exported_model_is_the_plant():
     assert rms_deg(np.array(theta) - plant.simulate(T[:1000], u).theta) < 0.01
 
 
+def test_a_step_at_the_first_sample_arrives_after_the_dead_time_as_in_the_reduced_model():
+    late, u = [("input_delay", np.array([0.0335]))], np.full(200, 8.0)
+    theta = rudder(EQ_1, effects=late).simulate(T[:200], u).theta
+    assert np.ptp(theta[:34]) < 1e-4 < np.ptp(theta)
+    assert rms_deg(theta - ReducedModel(EQ_1, late).simulate(T[:200], u).theta) < 0.05
+
+
 def test_the_export_says_what_it_does_not_carry():
     plant = rudder(
         effects=[("load_dependent_friction", np.array([0.05, *4 * [np.inf]])), ("drive_dead_zone", np.array([0.2]))]

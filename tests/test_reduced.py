@@ -227,6 +227,27 @@ def test_a_delay_of_one_sample_shifts_the_input_by_one_sample():
     assert np.max(np.abs(late - shifted)) < 1e-9
 
 
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [],
+        [("gravity_imbalance", np.array([10.0, 4.0]))],
+        [("presliding", np.array([0.004, 0.5, np.inf, np.inf, np.inf, np.inf]))],
+    ],
+    ids=["spring", "gravity", "bristle"],
+)
+def test_what_begins_at_rest_was_told_nothing_that_moves_it_before(effects):
+    """A step at the first sample arrives after the dead time, not before the recording; one that holds it may."""
+    late, start = [*effects, ("input_delay", np.array([0.0335]))], (TABLE_1.to_lumped()["theta_0"], 0.0)
+    plant = ReducedModel(table_1().coefficients, late)
+    rest = plant.before(0.0, 10.0, start)
+    held = plant.simulate(T, np.full(T.size, rest), start).theta
+    assert 0.0 < rest < 10.0 and np.ptp(held) < 1e-9
+    steps = plant.simulate(T, np.full(T.size, 10.0), start).theta
+    assert np.allclose(steps[:34], held[:34], atol=1e-9, rtol=0.0) and np.ptp(steps[34:60]) > 0.01
+    assert plant.before(0.0, 10.0, (start[0], 0.1)) == 10.0
+
+
 def test_a_rigid_play_of_no_width_is_no_play():
     """Backlash with a tiny gap and a stiff contact tends to the one-body motion."""
     u = INPUTS["chirp"](T)

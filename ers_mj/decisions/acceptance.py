@@ -41,12 +41,14 @@ class Offer:
 
 @dataclass(frozen=True)
 class Bar:
-    """What must be bought in a round: the ``usual`` gain, the ``faint`` one of what stands alone, the ``z``-score;
-    whether a block is ``outstanding`` among much that is left, and whether an effect is named ``beside``.
+    """What must be bought in a round: the ``usual`` gain, the ``faint`` one of what stands alone, that of what
+    ``drifts`` from one recording to the next, the ``z``-score; whether a block is ``outstanding`` among much that is
+    left, and whether an effect is named ``beside``.
     """
 
     usual: float
     faint: float
+    drifts: float
     z: float
     outstanding: bool
     beside: bool
@@ -54,14 +56,15 @@ class Bar:
 
 def bar(left: float, named: int, dear: bool, in_order: bool, outstanding: bool, policy: Policy = POLICY) -> Bar:
     """The bar where a model with so many ``named`` effects leaves C ``left``; a good part of that where the model stays
-    wrong (not ``in_order``). What is ``dear`` to simulate has no faint effects beside it.
+    wrong (not ``in_order``). What is ``dear`` to simulate has no faint effects beside it, and what differs between
+    recordings names no physics, so that it need be no share of what is left.
     """
     usual_share = policy.third_share if named >= policy.fewer_effects else policy.least_share
     share = (usual_share if in_order else policy.good_part) * left
     usual = policy.later_gain if named else policy.least_gain
     faint = policy.faint_gain if named and not dear else usual
     z = policy.later_z if named else policy.least_z
-    return Bar(max(usual, share), max(faint, share), z, outstanding, named > 0)
+    return Bar(max(usual, share), max(faint, share), usual, z, outstanding, named > 0)
 
 
 def asked(
@@ -89,7 +92,9 @@ def asked(
 
 
 def least_of(offer: Offer, stands_alone: bool, bar: Bar, policy: Policy = POLICY) -> float:
-    """What an offer must buy: less where it stands alone, or is steady."""
+    """What an offer must buy: less where it stands alone, is steady, or differs between recordings."""
+    if not offer.is_effect:
+        return bar.drifts
     is_faint = offer.gain < bar.usual and (stands_alone or is_steady(offer, policy))
     return bar.faint if is_faint else bar.usual
 

@@ -44,7 +44,7 @@ def slips_on(t, u, enable, load, c, cuts, maps, k, last, x, m, slips, out):
     e_t, e_w, e_j = maps[n, 2, 0], maps[n, 2, 1], maps[n, 2, 2]
     tau, a_emf, s, side = c.tau_e, c.a_emf, m.s, m.side
     while k < last and _is_usual(t, enable, cuts, k):
-        drive, pull = c.b * u[max(k - cuts.skip, 0)], load[k]
+        drive, pull = c.b * u[k + 1], load[k]
         x = with_drive(c, x, drive, tau, a_emf)
         theta = a_t * x.theta + a_w * x.w + a_j * x.j + maps[n, 0, CONSTANT] + maps[n, 0, DRIVE] * drive
         theta += maps[n, 0, SIDE] * side + maps[n, 0, ON_RUDDER] * pull
@@ -81,7 +81,7 @@ def rests_on(t, u, enable, load, c, cuts, k, last, x, m, out):
     kept = math.exp(-cuts.h0 / tau) if tau > 0 else 0.0
     spring = c.a_1 * (c.theta_0 - x.theta)
     while k < last and _is_usual(t, enable, cuts, k):
-        drive, push = c.b * u[max(k - cuts.skip, 0)], c.bias + load[k] + spring - c.c_1 * m.side
+        drive, push = c.b * u[k + 1], c.bias + load[k] + spring - c.c_1 * m.side
         j = x.j if tau > 0 else drive
         later = drive + (x.j - drive) * kept if tau > 0 else drive
         if not (_is_held(c, j, push, up, down) and _is_held(c, later, push, up, down)):

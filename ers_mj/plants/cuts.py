@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ers_mj.plants.compiled import compiled, inline
-from ers_mj.plants.state import MODES, VECTOR, F, N, has_bristle, types
+from ers_mj.plants.state import MODES, VECTOR, F, has_bristle, types
 
 FALL_STEP = 0.1  # length of a segment over the electrical time constant where the inductance falls with the current
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
@@ -21,17 +21,16 @@ BRISTLE_CORNER = 0.1  # the same for a rudder that no friction slows: share of c
 
 class Cuts(NamedTuple):
     """Ends (k,) of a sample's segments [s], whether the input of this sample (1) or the one before (0) acts in each,
-    the whole samples that the delay swallows, the length of a sample and of its last segment.
+    the length of a sample and of its last segment.
     """
 
     ends: np.ndarray
     fresh: np.ndarray
-    skip: int
     h0: float
     last: float
 
 
-CUTS = types.NamedTuple([VECTOR, MODES, N, F, F], Cuts)
+CUTS = types.NamedTuple([VECTOR, MODES, F, F], Cuts)
 
 
 @inline
@@ -69,7 +68,7 @@ def split_delay(c, h0):
 def cut(c, h0, refine):
     """A uniform sample's cuts, ``refine`` times as many."""
     step = _longest(c, h0) / refine
-    skip, late = split_delay(c, h0)
+    _, late = split_delay(c, h0)
     before, after = int(math.ceil(late / step - 1e-9)), int(math.ceil((h0 - late) / step - 1e-9))
     ends, fresh = np.empty(before + after), np.zeros(before + after, np.int64)
     for k in range(before):
@@ -78,7 +77,7 @@ def cut(c, h0, refine):
         ends[before + k] = late + (h0 - late) * (k + 1) / after
         fresh[before + k] = 1
     last = ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
-    return Cuts(ends, fresh, skip, h0, last)
+    return Cuts(ends, fresh, h0, last)
 
 
 @inline

@@ -69,7 +69,7 @@ EVENT_BUDGET = 4
 class Sample(NamedTuple):
     """What acts from one sample to the next: time [s] of its beginning, length over the usual one, whether it has the
     usual length and the circuit is closed, known acceleration of the rudder, the same of the next sample, drive of the
-    sample before and of this one as the delay lets them through.
+    sample before and of this one as they arrive.
     """
 
     k: int
@@ -301,8 +301,7 @@ def _sample(t, u, enable, load, c, cuts, k):
     """Sample k, which is not the last."""
     is_usual = abs(t[k + 1] - t[k] - cuts.h0) < 1e-6 * cuts.h0
     stretch = 1.0 if is_usual else (t[k + 1] - t[k]) / cuts.h0
-    before, now = c.b * u[max(k - cuts.skip - 1, 0)], c.b * u[max(k - cuts.skip, 0)]
-    return Sample(k, t[k], stretch, is_usual, enable[k], load[k], load[k + 1], before, now)
+    return Sample(k, t[k], stretch, is_usual, enable[k], load[k], load[k + 1], c.b * u[k], c.b * u[k + 1])
 
 
 @inline
@@ -375,9 +374,10 @@ def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
     there were.
 
     ``gain`` in [0, 1] is the observer's: at one sample in ``every`` theta is moved by gain * (y - theta); 0 is a free
-    run. ``y`` may hold NaN (no correction there). ``load`` is a known acceleration of the rudder, ``enable`` false an
-    open circuit. ``plant`` is what laws.laid_out gives, of which memories change; ``refine`` divides the segments. A
-    motion that runs away, or chatters beyond EVENT_BUDGET, is NaN from there on.
+    run. ``u`` (N + 1,) is what arrives, from the sample before the first on; ``y`` may hold NaN (no correction there).
+    ``load`` is a known acceleration of the rudder, ``enable`` false an open circuit. ``plant`` is what laws.laid_out
+    gives, of which memories change; ``refine`` divides the segments. A motion that runs away, or chatters beyond
+    EVENT_BUDGET, is NaN from there on.
     """
     c, h0 = plant_in(plant), t[1] - t[0]
     cuts = cut(c, h0, refine)

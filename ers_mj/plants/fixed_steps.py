@@ -221,7 +221,7 @@ def _moved(c, x, jump):
 def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
     """As march.simulate, of a plant that has both a motor's side and a bristle."""
     c, n, h0 = plant_in(plant), t.size, t[1] - t[0]
-    longest, (skip, late) = _step_length(c, refine), split_delay(c, h0)
+    longest, (_, late) = _step_length(c, refine), split_delay(c, h0)
     x = _bent_start(c, x0[0], x0[1], x0[2])
     for k in range(n):
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x.theta, x.w, x.j, x.theta_m
@@ -233,8 +233,8 @@ def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
             x = _moved(c, x, gain * (y[k] - x.theta))
         first = min(late * h / h0, h)
         if first > 0.0:
-            x = _through(c, t[k], x, c.b * u[max(k - skip - 1, 0)], enable[k], load[k], first, longest)
-        x = _through(c, t[k] + first, x, c.b * u[max(k - skip, 0)], enable[k], load[k], h - first, longest)
+            x = _through(c, t[k], x, c.b * u[k], enable[k], load[k], first, longest)
+        x = _through(c, t[k] + first, x, c.b * u[k + 1], enable[k], load[k], h - first, longest)
         if not is_bounded(x):
             out[k + 1 :, :] = np.nan
             return

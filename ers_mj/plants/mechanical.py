@@ -16,9 +16,9 @@ import numpy as np
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.quantities import Coefficients, Twin
 from ers_mj.errors import InputError
-from ers_mj.plants.mujoco_stepping import Law, Observer, Stepper, step_many
+from ers_mj.plants.mujoco_stepping import Late, Law, Observer, Stepper, delayed, step_many
 from ers_mj.plants.play import rigid_play
-from ers_mj.plants.reduced import Motion
+from ers_mj.plants.reduced import Motion, ReducedModel
 from ers_mj.plants.skeletons import Skeleton, lumped_skeleton, rudder_skeleton
 from ers_mj.plants.writing import motor_gain, write_coefficients
 
@@ -98,9 +98,17 @@ class MechanicalPlant:
         stepper = self._stepper()
         stepper.reset(self._start(start))
         rows = stepper.run(
-            t, u, self._lowered.delay, enable, load, Observer(y, gain, every, self._moved) if gain > 0 else None
+            t, u, self._late(t, u, start), enable, load, Observer(y, gain, every, self._moved) if gain > 0 else None
         )
         return self._motion(t, rows)
+
+    def _late(self, t: np.ndarray, u: np.ndarray, start: Sequence[float] | None) -> Late | None:
+        """How the command arrives after a dead time; what came before is the reduced model's."""
+        if self._lowered.delay <= 0:
+            return None
+        twin = ReducedModel(self.coefficients, self.effects)
+        begun = (self.coefficients.theta_0, 0.0) if start is None else start
+        return delayed(t, u, self._lowered.delay, twin.before(t[0], u[0], begun))
 
     def ratio(self, theta: float) -> float:
         """The motor's speed over the rudder's at the angle theta, the play closed."""

@@ -21,6 +21,8 @@ TIME_CONSTANT = 0  # where MuJoCo keeps a motor's electrical time constant in it
 LAW_STEPS = 4
 LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dynprm
 
+Late = Callable[[np.ndarray], np.ndarray]  # mean input between given instants [s] (k + 1,) -> (k,)
+
 
 @dataclass(frozen=True)
 class Law:
@@ -106,11 +108,12 @@ class Stepper:
 
     @unlogged()
     def run(
-        self, t: np.ndarray, u: np.ndarray, delay: float, enable=None, load=None, observer: Observer | None = None
+        self, t: np.ndarray, u: np.ndarray, late: Late | None, enable=None, load=None, observer: Observer | None = None
     ) -> np.ndarray:
-        """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration."""
+        """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration; under u
+        (N,), or what of it ``late`` gives.
+        """
         model, data, rows = self.model, self.data, np.full((t.size, 5), np.nan)
-        late = _delayed(t, u, delay) if delay > 0 else None
         data.time = t[0]
         for k in range(t.size):
             rows[k] = self._observe()
@@ -246,11 +249,12 @@ class Stepper:
         return level * share / (1.0 - math.copysign(abs(1.0 - share) ** self.c.dahl, 1.0 - share))
 
 
-def _delayed(t: np.ndarray, u: np.ndarray, delay: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Mean of u(t - delay) between given instants: the impulse of a switch inside a step is exact."""
-    before = t[0] - delay - 1.0
-    at = np.concatenate([[before], t])
-    area = np.concatenate([[0.0], np.cumsum(np.concatenate([u[:1], u[:-1]]) * np.diff(at))])
+def delayed(t: np.ndarray, u: np.ndarray, delay: float, before: float) -> Late:
+    """Mean of u(t - delay) between given instants, ``before`` in front of the first sample: the impulse of a switch
+    inside a step is exact.
+    """
+    at = np.concatenate([[t[0] - delay - 1.0], t])
+    area = np.concatenate([[0.0], np.cumsum(np.concatenate([[before], u[:-1]]) * np.diff(at))])
     return lambda ends: np.diff(np.interp(ends - delay, at, area)) / np.diff(ends)
 
 

@@ -12,6 +12,7 @@ from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Effect
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants import event_integrator, fixed_steps
+from ers_mj.plants.before import resting_input
 from ers_mj.plants.effort import Effort
 from ers_mj.plants.laws import Acting, acting, laid_out
 from ers_mj.plants.state import N_CONSTANTS
@@ -101,6 +102,11 @@ def _step(c: np.ndarray, c_2: np.ndarray) -> np.ndarray:
     return np.subtract(c_2, c, out=np.zeros_like(c), where=c != c_2)
 
 
+def _whole(delay: float, h: float) -> int:
+    """Samples of length h that a delay swallows."""
+    return int(delay / h + 1e-9)
+
+
 def _touches_sensor(name: str) -> bool:
     return type(BY_NAME[name]).measure is not Effect.measure
 
@@ -178,7 +184,7 @@ class ReducedModel:
         by_steps = self.bends and self.has_motor_side
         run = fixed_steps.simulate if by_steps else event_integrator.simulate
         plant = self._laid_out.copy()
-        events = run(t, self.terminal(u), enable, load, y, held.gain, held.every, plant, refine, x0, out)
+        events = run(t, self._late(t, u, x0), enable, load, y, held.gain, held.every, plant, refine, x0, out)
         beyond = 0 if by_steps else max(0, int(EVENT * events - self._price * (t[-1] - t[0])))
         self._count(t, self._price, beyond)
         return out, beyond
@@ -271,7 +277,7 @@ class ReducedModel:
         c, on, p = self._lowered
         held = Held(**held)
         enable, load, y = held.beside(t)
-        theta, arriving = path[:, 0], self._arriving(t, u)
+        theta, arriving = path[:, 0], self._arriving(t, u, path[0])
         read, followed, instant, out = self.read(t, theta), self.behind(y), self._is_instant, []
         maps, slopes, still = np.empty((6, 5, 17)), np.zeros((t.size, 3)), np.zeros(t.size)
         nothing = acting((), False)
@@ -284,7 +290,7 @@ class ReducedModel:
             if self._touches_reading or other._touches_reading:
                 added = (other.read(t, theta) - read) * scale
                 dy = (other.behind(y) - followed) * scale if instant else -added
-            du, here = self._moved_input(t, u, arriving, other, scale), followed if instant else y
+            du, here = self._moved_input(t, u, path[0], arriving, other, scale), followed if instant else y
             motion = (t, arriving, du, enable, load, here, dy, path, maps, slopes, held.gain, held.every)
             tangent(*motion, self._laid_out.copy(), other._laid_out.copy(), dc, differ, scale, change)
             change[:, 3] = self._read_change(t, theta, read, change[:, 0])
@@ -317,23 +323,32 @@ class ReducedModel:
             self.effort.add(t, per_second, beyond)
 
     def _moved_input(
-        self, t: np.ndarray, u: np.ndarray, arriving: np.ndarray, other: ReducedModel, scale: float
+        self, t: np.ndarray, u: np.ndarray, start: np.ndarray, arriving: np.ndarray, other: ReducedModel, scale: float
     ) -> np.ndarray:
         """Change (N,) towards another plant, times the scale, of the input that arrives at the motor."""
         if self._keeps_command and other._keeps_command and self._with_effects.delay == other._with_effects.delay:
             return np.zeros(t.size)
-        return (other._arriving(t, u) - arriving) * scale
+        return (other._arriving(t, u, start) - arriving) * scale
 
-    def _arriving(self, t: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def before(self, t: float, u: float, start: Sequence[float]) -> float:
+        """The input at the terminals before a first sample at t [s] with u there: u itself, but where the plant is at
+        rest (``start`` is theta, omega) what holds it so.
+        """
+        return u if start[1] != 0.0 else resting_input(t, u, start[0], self._laid_out.copy())
+
+    def _late(self, t: np.ndarray, u: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """The input (N + 1,) that a dead time lets through by whole samples, from the sample before the first on."""
+        u = self.terminal(u)
+        delay = self._with_effects.delay
+        before = self.before(t[0], u[0], start) if delay > 0 else u[0]
+        return np.concatenate([np.full(1 + _whole(delay, t[1] - t[0]), before), u])[: t.size + 1]
+
+    def _arriving(self, t: np.ndarray, u: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Mean (N,) over each uniform sample of the input that arrives at the motor: after a dead time the impulse of a
         switch within a sample is exact.
         """
-        u, delay, h = self.terminal(u), self._with_effects.delay, t[1] - t[0]
-        if delay <= 0:
-            return u
-        skip = int(delay / h)
-        late, k = delay / h - skip, np.arange(t.size) - skip
-        return late * u[np.maximum(k - 1, 0)] + (1.0 - late) * u[np.maximum(k, 0)]
+        delay, h, late = self._with_effects.delay, t[1] - t[0], self._late(t, u, start)
+        return late[1:] - (delay / h - _whole(delay, h)) * np.diff(late)
 
     def _read_change(self, t: np.ndarray, theta: np.ndarray, read: np.ndarray, change: np.ndarray) -> np.ndarray:
         """First-order change (N,) of the reading that a change (N,) of the output makes."""
