@@ -8,6 +8,7 @@ import pytest
 from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.thresholds import POLICY
 from ers_mj.decisions.verdict import Shown
+from ers_mj.diagnosis.sentences import of_another_day
 
 
 def left(output=0.0, current=0.0):
@@ -126,3 +127,18 @@ def test_held_out_error_far_above_the_noise_is_a_mismatch_that_is_left(names):
     case = replace(RIGHT if names else NONE, explained=0.99 if names else 0.0, free_held=3.1)
     assert rules.is_more_left(case) and not rules.is_more_left(replace(case, free_held=2.9))
     assert rules.verdict(case) == ("missing_physics" if names else "unexplained")
+
+
+@pytest.mark.parametrize(
+    "raw, again, states, said",
+    [
+        (0.46, 0.054, [{"sentence": "gain differs"}], True),
+        (0.46, 0.4, [{"sentence": "gain differs"}], False),  # little of the error goes with it
+        (0.46, 0.054, [], False),
+        (0.46, None, [{"sentence": "gain differs"}], False),
+    ],
+)
+def test_a_rig_that_changed_before_the_held_out_recording_is_told(raw, again, states, said):
+    fits = {"heldout_rmse_after_rad": raw, "recalibrated_rmse_after_rad": again}
+    told = of_another_day(fits, states, "V", POLICY)
+    assert ("gain differs" in told and "0.054 V, not 0.46 V" in told) if said else told == ""

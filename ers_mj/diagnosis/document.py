@@ -22,7 +22,7 @@ from ers_mj.diagnosis.latent_force import latent_forces
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
-from ers_mj.diagnosis.sentences import sentence, shown
+from ers_mj.diagnosis.sentences import of_another_day, sentence, shown
 from ers_mj.diagnosis.told_model import with_diagnosis
 from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
@@ -68,12 +68,13 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         case.input_unit,
         spectrum,
     )
+    changed = of_another_day(case.fits, states, case.output_unit, case.policy) if case.holdout else ""
     data = data_of(case.recordings, case.holdout)
     data["problems"] += _degrees(case)
     document = {
         "version": 1,
         "verdict": verdict,
-        "sentence": sentence(case, missing, found),
+        "sentence": sentence(case, missing, found) + changed,
         "where": [] if verdict == "consistent" else [place_of(p) for p in found],
         "missing": missing,
         "remainder": _remainder(case),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from ers_mj.decisions.thresholds import Policy
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.localisation import Place
 from ers_mj.diagnosis.unexcited import CANNOT, is_unexcited
@@ -31,6 +32,17 @@ def sentence(case: Case, missing: Sequence[dict], found: Sequence[Place]) -> str
         else f" (the best explains {case.explained:.0%} of the held-out error)"
     )
     return f"Something acts here that no effect of the library accounts for{much}; {place}."
+
+
+def of_another_day(fits: Mapping[str, float | None], states: Sequence[Mapping], unit: str, policy: Policy) -> str:
+    """What the sentence adds where the rig itself changed before the held-out recordings, so much that the squared
+    error is halved once that is known; nothing where it did not.
+    """
+    raw, again = fits["heldout_rmse_after_rad"], fits["recalibrated_rmse_after_rad"]
+    if not states or raw is None or again is None or again**2 >= policy.half * raw**2:
+        return ""
+    how, before, after = "; ".join(state["sentence"] for state in states), shown(raw, unit), shown(again, unit)
+    return f" The rig changed ({how}): once that is known, the held-out error is {after}, not {before}."
 
 
 def _of_what_is_missing(case: Case, names: str) -> str:
