@@ -13,6 +13,7 @@ from ers_mj.decisions.confirmation import (
     is_doubtful,
     is_no_closer,
     is_no_size,
+    is_none_together,
     paired_p,
     pays,
 )
@@ -79,6 +80,13 @@ def test_where_the_rig_has_changed_a_name_is_worth_what_it_is_once_the_day_is_kn
 )
 def test_an_interval_across_zero_or_decades_is_no_size(ends, told):
     assert is_no_size(*ends) is not told
+
+
+def test_sizes_that_are_unknown_apart_may_be_known_together():
+    spread = np.array([[4.0, -3.9], [-3.9, 4.0]])  # each to +-2, their sum to +-0.45
+    assert not is_none_together(np.array([1.0, 1.0]), spread)
+    assert is_none_together(np.array([1.0, -1.0]), spread)
+    assert is_none_together(np.array([0.2, 0.1]), spread)
 
 
 def test_losses_alone_tell_the_scatter_of_chance():

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from servo import TRUTH, recorded, started
 
-from ers_mj.estimation.intervals import half_widths, unseen_widths
+from ers_mj.estimation.intervals import half_widths, unseen_spread, widths_of
 
 
 def test_what_is_too_small_to_be_found_widens_the_intervals():
     faint = started(recorded([("quadratic_drag", np.array([0.02, np.inf]))]))
     model, layout = faint.fit.model, faint.fit.model.layout()
-    noise, unseen = half_widths(model, faint.traces, (), 1.0), unseen_widths(model, faint.traces, 1.0)
+    noise, unseen = half_widths(model, faint.traces, (), 1.0), widths_of(unseen_spread(model, faint.traces, 1.0))
     off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))
     assert np.all(unseen > 0) and np.all(off < 2.0 * np.hypot(noise, unseen))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
 from ers_mj.decisions.thresholds import POLICY, Policy
 
@@ -128,6 +129,14 @@ def table_pays(pairs: Sequence[Pair], noise: float, policy: Policy = POLICY) -> 
 def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:
     """Whether an interval tells no size: it spans zero, or decades."""
     return low <= 0.0 <= high or max(abs(low), abs(high)) > policy.unsure * min(abs(low), abs(high))
+
+
+def is_none_together(sizes: np.ndarray, spread: np.ndarray) -> bool:
+    """Whether the joint 95 % region of signed sizes (k,) holds none at all: each may be unknown for itself and their
+    sum be known. ``spread`` is their covariance times the squared 95 % quantile of one.
+    """
+    far = float(sizes @ np.linalg.pinv(spread) @ sizes)
+    return not far * chdtri(1, 0.05) > chdtri(sizes.size, 0.05)
 
 
 def is_confirmed(held: HeldOut, recalibrated: Recalibrated, policy: Policy = POLICY) -> bool:

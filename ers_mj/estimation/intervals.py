@@ -1,6 +1,6 @@
 """Intervals that survive model error: a jackknife over recordings and a sandwich over blocks.
 
-What is too small to be found moves the parameters as well, further than the noise does: ``unseen_widths`` tells how
+What is too small to be found moves the parameters as well, further than the noise does: ``unseen_spread`` tells how
 far.
 
 (J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what
@@ -44,34 +44,44 @@ def slopes_of(model: Model, traces: Sequence[Trace]) -> np.ndarray:
     return central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
 
 
-def told_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> np.ndarray:
-    """95 % half-widths (k,) as they are told: those of ``half_widths`` and ``unseen_widths``, squared and added."""
+def told_spread(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> np.ndarray:
+    """Covariance (k, k) of the model's transformed numbers times the square of its 95 % quantile, as it is told: that
+    of ``half_spread`` and that of ``unseen_spread``. The roots of its diagonal are the half-widths.
+    """
     jacobian = slopes_of(model, traces)
-    return np.hypot(half_widths(model, traces, left_out, tau, jacobian), unseen_widths(model, traces, tau, jacobian))
+    return half_spread(model, traces, left_out, tau, jacobian) + unseen_spread(model, traces, tau, jacobian)
 
 
-def half_widths(
+def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> np.ndarray:
+    """95 % half-widths (k,) by ``half_spread``."""
+    return widths_of(half_spread(model, traces, left_out, tau))
+
+
+def widths_of(spread: np.ndarray) -> np.ndarray:
+    """95 % half-widths (k,) of a spread (k, k)."""
+    return np.sqrt(np.maximum(np.diag(spread), 0.0))
+
+
+def half_spread(
     model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float, jacobian: np.ndarray | None = None
 ) -> np.ndarray:
-    """95 % half-widths (k,) of the model's transformed numbers: those of jackknife and sandwich, squared and added.
+    """Spread (k, k) of the model's transformed numbers: that of the jackknife and that of the sandwich.
 
     ``left_out`` holds the model refitted without each recording in turn; with fewer than three, or where some numbers
     belong to one recording only, the sandwich serves alone. The ``jacobian`` is ``slopes_of`` the model, where it is
     known.
     """
     layout = model.layout()
-    widths = _sandwich(model, traces, tau, slopes_of(model, traces) if jacobian is None else jacobian)
+    spread = _sandwich(model, traces, tau, slopes_of(model, traces) if jacobian is None else jacobian)
     if len(left_out) >= DOUBT.fewest_records and not any(f.local or f.owner in STATES for f in layout):
         z = np.array([m.vector(layout) for m in left_out])
-        n = len(left_out)
-        widths = np.hypot(
-            widths, stdtrit(n - 1, 0.975) * np.sqrt((n - 1) / n * np.sum((z - z.mean(axis=0)) ** 2, axis=0))
-        )
-    return widths
+        off, n = z - z.mean(axis=0), len(left_out)
+        spread = spread + stdtrit(n - 1, 0.975) ** 2 * (n - 1) / n * (off.T @ off)
+    return spread
 
 
 def _sandwich(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray) -> np.ndarray:
-    """95 % half-widths (k,) by H^-1 (sum of outer products of the slopes of runs of blocks) H^-1."""
+    """Spread (k, k) by H^-1 (sum of outer products of the slopes of runs of blocks) H^-1."""
     layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     weighted = jacobian * weight[:, None]
@@ -81,7 +91,7 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.nd
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
     n = slopes.shape[0]
     covariance = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
-    return stdtrit(max(n - len(layout), 1), 0.975) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return stdtrit(max(n - len(layout), 1), 0.975) ** 2 * covariance
 
 
 def _left(model: Model, traces: Sequence[Trace]) -> np.ndarray:
@@ -94,13 +104,13 @@ def _is_in(effect: Effect, model: Model) -> bool:
     return any(model.values[name] > 0 for name in effect.absorbs)
 
 
-def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
-    """95 % half-widths (k,) by effects of the library that act and are too small to be found: how far the numbers move
+def unseen_spread(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
+    """Spread (k, k) by effects of the library that act and are too small to be found: how far the numbers move
     to make up for them.
 
     Each effect's secant, at a size that would gain DOUBT.unseen_gain beside the model and never larger than its start,
     shifts the numbers by what a fit makes of it; any effect is as likely as the next, DOUBT.unseen of them act. Of
-    several recordings every second one tells that. The ``jacobian`` is as in ``half_widths``.
+    several recordings every second one tells that. The ``jacobian`` is as in ``half_spread``.
     """
     layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
     jacobian = slopes_of(model, traces) if jacobian is None else jacobian
@@ -121,5 +131,5 @@ def unseen_widths(model: Model, traces: Sequence[Trace], tau: float, jacobian: n
                 apart = float(secant @ (weight * secant) - pull @ inverse @ pull)
                 found.append(inverse @ pull * min(1.0, np.sqrt(2.0 * DOUBT.unseen_gain / max(apart, 1e-12))))
         if found:
-            shifts.append(np.mean(np.square(found), axis=0))
-    return 1.96 * np.sqrt(DOUBT.unseen * np.mean(shifts, axis=0)) if shifts else np.zeros(len(layout))
+            shifts.append(np.mean([np.outer(shift, shift) for shift in found], axis=0))
+    return 1.96**2 * DOUBT.unseen * np.mean(shifts, axis=0) if shifts else np.zeros(2 * (len(layout),))

@@ -16,7 +16,7 @@ from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit, polished
-from ers_mj.estimation.intervals import half_widths, told_widths
+from ers_mj.estimation.intervals import half_widths, told_spread, widths_of
 from ers_mj.estimation.objective import Fit, residuals_in
 from ers_mj.selection.comparison import stands_alone
 from ers_mj.selection.cross_validation import Fold, Score, folds, halves, pooled, recalibrated, refits, scored
@@ -74,7 +74,8 @@ def confirmed(
         after_models = court.refits(model)
         after = court.scores(after_models)
         judged = {name: court.judged(name, model, after) for name in model.names}
-        failed = [n for n, one in judged.items() if not court.is_confirmed(n, one, model, after_models, after)]
+        against = {name: court.against(name, one, model, after_models, after) for name, one in judged.items()}
+        failed = [name for name, because in against.items() if because]
         if not failed:
             return selection, court.told(model, after_models, after, judged)
         worst = max(failed, key=lambda n: judged[n].p)
@@ -82,7 +83,7 @@ def confirmed(
         if not (kept.model.names or kept.model.states):
             kept = court.bare(model)
             court.start = replace(start, fit=kept)
-        because = f"held-out data does not confirm that it is needed (p {judged[worst].p:.2g})"
+        because = f"{against[worst]} (p {judged[worst].p:.2g})"
         move = Move("drop", model.names, kept.model.names, selection.chosen.cost - kept.cost, True, because)
         selection = replace(selection, chosen=kept, trail=(*selection.trail, move))
 
@@ -181,10 +182,11 @@ class Court:
             log_ratio=float(np.mean(logs)),
         )
 
-    def is_confirmed(
+    def against(
         self, name: str, one: Judged, model: Model, after_models: Sequence[Model], after: Sequence[Score]
-    ) -> bool:
-        """Whether an effect is confirmed, pays, and is none that few samples, a converter or any remainder would show.
+    ) -> str:
+        """What speaks against an effect; empty where it is confirmed, pays, and is none that few samples, a converter
+        or any remainder would show.
 
         What acts in one recording only was judged there: it cannot make another one better.
         """
@@ -195,36 +197,42 @@ class Court:
             return _recalibrated(after_models, one.lesser_models, self.parts, self.measure)
 
         if not decisions.is_confirmed(numbers, again, self.policy):
-            return False
+            return "held-out data does not confirm that it is needed"
         traces, policy = self.start.traces, self.policy
         with_it, without = (pooled(scores) for scores in one.pair)
         if not BY_NAME[name].local and not decisions.pays(numbers, again, policy):
-            return False
-        return not (
-            self.is_unsure(name, model, after_models)
-            or may_be_none(name, model, traces, self.tau, policy)
-            or is_a_converters(name, model, traces)
-            or is_any_wave(name, model, with_it, without, policy)
-        )
+            return f"without it the squared held-out error rises by less than {policy.pays:.0%}"
+        if self.is_unsure(name, model, after_models):
+            return "its size may be none"
+        if may_be_none(name, model, traces, self.tau, policy):
+            return "it acts where a recording begins or ends"
+        if is_a_converters(name, model, traces):
+            return "it is within half a step of the converter"
+        return "a wave fits any remainder as well" if is_any_wave(name, model, with_it, without, policy) else ""
 
     def is_unsure(self, name: str, model: Model, after_models: Sequence[Model]) -> bool:
-        """Whether the interval of an effect's size, as it would be told, spans zero, or decades where it has a sign."""
+        """Whether the interval of each size of an effect, as it would be told, spans zero, or decades where it has a
+        sign, and those without a sign may be none together.
+        """
         if name in model.frozen or BY_NAME[name].local:
             return False
         effect, layout = BY_NAME[name], model.layout()
         sizes = {effect.parameters[k].name for k in effect.sizes(dict(model.effects)[name])}
-        widths = zip(layout, model.vector(layout), self.widths(model, after_models))
-        ends = [f.ends(q, w) for f, q, w in widths if f.owner == name and f.name in sizes]
-        return bool(ends) and all(decisions.is_no_size(low, high, self.policy) for low, high in ends)
+        at = [k for k, f in enumerate(layout) if f.owner == name and f.name in sizes]
+        z, spread = model.vector(layout), self.spread(model, after_models)
+        widths, signless = widths_of(spread), [k for k in at if not layout[k].positive]
+        if not at or not all(decisions.is_no_size(*layout[k].ends(z[k], widths[k]), self.policy) for k in at):
+            return False
+        return len(signless) < 2 or decisions.is_none_together(z[signless], spread[np.ix_(signless, signless)])
 
-    def widths(self, model: Model, after_models: Sequence[Model]) -> np.ndarray:
-        """95 % half-widths of a model's numbers, the last model's kept; ``after_models`` are its refits to each part,
-        which tell them where each leaves one training recording out.
+    def spread(self, model: Model, after_models: Sequence[Model]) -> np.ndarray:
+        """Spread (k, k) of a model's numbers (estimation/intervals.py), the last model's kept; ``after_models`` are its
+        refits to each part, which tell it where each leaves one training recording out.
         """
         if self._wide is None or self._wide[0] is not model:
             left_out = after_models if self.parts[0].training is not None and len(after_models) > 2 else ()
             own = model.of_records(range(len(self.start.traces)))
-            self._wide = model, told_widths(own, self.start.traces, left_out, self.tau)
+            self._wide = model, told_spread(own, self.start.traces, left_out, self.tau)
         return self._wide[1]
 
     def _halved(
@@ -268,7 +276,7 @@ class Court:
             shown += [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(*ends, cut)]
             sentence += f"; {traces[record].name}, which teaches most of an effect, by halves as well"
         without, p = ({name: getattr(one, of) for name, one in judged.items()} for of in ("without", "p"))
-        widths, measure = self.widths(model, after_models), self.measure
+        widths, measure = widths_of(self.spread(model, after_models)), self.measure
         return Confirmed(
             base, before, after, without, p, after_models, base_models, self.parts, sentence, shown, widths, measure
         )
