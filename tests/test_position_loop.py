@@ -138,6 +138,14 @@ def test_a_latency_moves_the_answer_smoothly():
     assert np.linalg.norm(second - first) < 0.2 * np.linalg.norm(first)
 
 
+@pytest.mark.parametrize("values", [LIMITED, {**LIMITED, "L": np.inf}, {**LIMITED, "D": 15.0, "lag_s": 0.003}])
+def test_the_longest_step_is_fine_enough_where_a_reference_switches_and_friction_turns_within_one(values):
+    t, r = steps_of(3)
+    model = LoopModel({**values, "tau_s": 0.0109}, ())
+    coarse, fine = (model.motion(run_of(t, r), refine)[:, 0] for refine in (1, 50))
+    assert np.sqrt(np.mean((coarse - fine) ** 2)) < 2e-5  # 1.1e-4 where neither parts a step
+
+
 @pytest.mark.parametrize("letter", ["tau_s", "dead_time_s"])
 def test_a_delay_is_as_long_as_it_says(letter):
     t = np.arange(0.0, 1.0, 0.001)

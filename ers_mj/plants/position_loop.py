@@ -6,7 +6,8 @@
     theta'' = drive - a_emf w + Eq. (6)'s forces and the laws of effects, friction set-valued
 
 Fixed steps of second order (leapfrog, dampers by the trapezium), friction and limits solved for with the speed at the
-end of a step; a reference that switches within a step enters by its mean, so that a motion moves smoothly with tau.
+end of a step. A step is parted where the reference switches by more than friction holds, since friction and limits bend
+what the drive makes of it; a smaller switch enters by the reference's mean: a motion moves smoothly with tau.
 All accelerations are per total inertia, in output unit / s^2.
 """
 
@@ -126,6 +127,20 @@ def _mean_reference(t, r, before, k, a, b):
 
 
 @inline
+def _parted(t, r, before, k, tau, at, end, least):
+    """The first instant within at..end at which a reference that is tau late switches by more than ``least``, or the
+    end; the search begun at the sample k that holds at ``at``.
+    """
+    if at < t[0] + tau < end and abs(r[0] - before) > least:
+        return t[0] + tau
+    while k + 1 < t.size and t[k + 1] + tau < end:
+        if t[k + 1] + tau > at and abs(r[k + 1] - r[k]) > least:
+            return t[k + 1] + tau
+        k += 1
+    return end
+
+
+@inline
 def _pushed(q, e):
     """The error that the drive answers to."""
     size = abs(e)
@@ -140,7 +155,8 @@ def _pushed(q, e):
 
 @inline
 def _slipped(gain, push, a, level, creep, heavy, w, h):
-    """Speed after h of gain w' = push - a w - friction, dampers by the trapezium.
+    """Speed after h of gain w' = push - a w - friction, dampers by the trapezium; friction turns where the speed does
+    within the step.
 
     Friction that creeps is creep w below its level, and (heavy - 1) gain w' of a body that it slows.
     """
@@ -152,10 +168,14 @@ def _slipped(gain, push, a, level, creep, heavy, w, h):
             return end
         way = math.copysign(1.0, holds)
         return ((gain - 0.5 * h * a) * w + h * (push - way * level)) / (gain + 0.5 * h * a)
-    reach = (gain - 0.5 * h * a) * w + h * push
-    if abs(reach) <= h * level:
+    if w != 0.0:
+        end = ((gain - 0.5 * h * a) * w + h * (push - math.copysign(level, w))) / (gain + 0.5 * h * a)
+        if end * w >= 0.0:
+            return end
+        h *= end / (end - w)
+    if abs(push) <= level:
         return 0.0
-    return (reach - math.copysign(h * level, reach)) / (gain + 0.5 * h * a)
+    return h * (push - math.copysign(level, push)) / (gain + 0.5 * h * a)
 
 
 @inline
@@ -337,6 +357,7 @@ def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
     longest, n = _step_length(c) / refine, t.size
     x = _started(c, q, theta, w, before)
     past = np.full(PAST, x.drive)
+    least = max(c.c_2_plus, c.c_2_minus) / q.K  # of a switch that parts a step
     k, step = 0, 0
     for i in range(n):
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = x.theta, x.w, x.theta_m, x.drive
@@ -346,17 +367,23 @@ def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
         h = (t[i + 1] - t[i]) / steps
         remember(c, x.theta, x.w, x.drive, x.theta_m, x.w_m, t[i + 1] - t[i])
         for s in range(steps):
-            at = t[i] + s * h
-            asked, k = _mean_reference(t, r, before, k, at - q.tau, at - q.tau + h)
-            now = x.r + min(max(asked - x.r, -q.R * h), q.R * h)
-            mean = 0.5 * (x.r + now) if q.R < np.inf else asked
+            at, end = t[i] + s * h, t[i] + (s + 1) * h
             fresh, late = _late_drive(q, past, step, h) if enable[i] else (0.0, 0.0)
-            x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, x.slow, now, x.drive, x.carried, x.z)
-            if is_parted(c):
-                x = _two_bodies(c, q, at, x, mean, fresh, late, h)
-            else:
-                x = _one_body(c, q, at, x, mean, fresh, late, h)
-            past[step % PAST] = x.drive
+            mean_drive = 0.0
+            while at < end:
+                until = _parted(t, r, before, k, q.tau, at, end, least)
+                part = until - at
+                asked, k = _mean_reference(t, r, before, k, at - q.tau, until - q.tau)
+                now = x.r + min(max(asked - x.r, -q.R * part), q.R * part)
+                mean = 0.5 * (x.r + now) if q.R < np.inf else asked
+                x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, x.slow, now, x.drive, x.carried, x.z)
+                if is_parted(c):
+                    x = _two_bodies(c, q, at, x, mean, fresh, late, part)
+                else:
+                    x = _one_body(c, q, at, x, mean, fresh, late, part)
+                mean_drive += part / h * x.drive
+                at = until
+            past[step % PAST] = mean_drive
             step += 1
         if not (abs(x.theta) < RUNAWAY and abs(x.w) < RUNAWAY):
             out[i + 1 :, :] = np.nan
