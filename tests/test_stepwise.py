@@ -49,7 +49,17 @@ def test_the_trail_tells_every_move(dragged):
     added = [move for move in accepted if move.kind == "add"]
     assert [{*move.after} - {*move.before} for move in added] == [{"quadratic_drag"}, {"load_dependent_friction"}]
     assert [move.gain for move in added] == [ranked[0].gain for ranked in found.rounds[:2]]
-    assert {move.kind for move in found.trail} <= {"add", "drop", "swap", "pair", "part", "sweep", "widen", "restart"}
+    assert {move.kind for move in found.trail} <= {
+        "add",
+        "drop",
+        "swap",
+        "pair",
+        "part",
+        "sweep",
+        "widen",
+        "narrow",
+        "restart",
+    }
     assert found.trail[0].before == () and found.trail[-1].after == found.chosen.model.names
     assert all(one.after == other.before for one, other in pairwise(accepted))  # each begins where the last has led
     last = found.trail[-1]

@@ -9,6 +9,7 @@ is carried as an acceleration [output unit / s^2] and only turned into N m for t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
@@ -128,6 +129,21 @@ class Effect:
         """
         finite, needed = [int(k) for k in np.flatnonzero(np.isfinite(p))], self.needs[0] if self.needs else ()
         return [k for k in finite if k < self.sized or self.parameters[k].name in needed] or finite[:1]
+
+    def narrower(self, p: np.ndarray) -> list[np.ndarray]:
+        """Its numbers p (k,) without those that may be absent, one by one, or together where they say something only
+        together; what ``needs`` one of them keeps it.
+        """
+        names, found = [x.name for x in self.parameters], []
+        alone = [(name,) for name in names if not any(name in group for group in self.together)]
+        for group in (*self.together, *alone):
+            at, less = [names.index(name) for name in group], p.copy()
+            may_go = [math.isinf(x.absent) and x.fitted and not x.per_record for x in (self.parameters[k] for k in at)]
+            less[at] = self.absent()[at]
+            is_whole = all(any(np.isfinite(less[names.index(name)]) for name in one) for one in self.needs)
+            if all(may_go) and is_whole and np.all(np.isfinite(p[at])) and np.any(np.isfinite(less)):
+                found.append(less)
+        return found
 
     def absent(self) -> np.ndarray:
         """Parameter values (k,) at which the effect vanishes, so that models nest."""

@@ -96,7 +96,8 @@ def _sized(found: Fit, traces: Sequence[Trace], datasheet: Datasheet | None) -> 
     # a turn of a motor: the least common multiple of its poles and slots, of which the smallest have two and three
     cogs = 3
     drive = max(float(np.max(np.abs(motion[:, 2]))) for motion in run_of(model, traces, OBSERVER_RATE).motions)
-    is_held = bool(model.effects)
+    springs = model.values["a_1"] * model.scales.position + model.values["c_1"]
+    is_held = bool(model.effects) or springs > model.scales.acceleration
     scales = replace(
         model.scales, is_held=is_held, drive=drive, cog=2 * np.pi / (cogs * gear) if gear else model.scales.cog
     )

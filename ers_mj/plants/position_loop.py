@@ -38,7 +38,7 @@ from ers_mj.plants.state import (
     types,
 )
 
-LONGEST = 1e-3  # [s] of a step
+LONGEST, SHORTEST = 1e-3, 1e-9  # [s] of a step, and of a part of one
 STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
 PAST = 512  # steps of the drive that are kept: the longest dead time
 
@@ -128,13 +128,13 @@ def _mean_reference(t, r, before, k, a, b):
 
 @inline
 def _parted(t, r, before, k, tau, at, end, least):
-    """The first instant within at..end at which a reference that is tau late switches by more than ``least``, or the
-    end; the search begun at the sample k that holds at ``at``.
+    """The first instant well within at..end at which a reference that is tau late switches by more than ``least``, or
+    the end; the search begun at the sample k that holds at ``at``.
     """
-    if at < t[0] + tau < end and abs(r[0] - before) > least:
+    if at + SHORTEST < t[0] + tau < end - SHORTEST and abs(r[0] - before) > least:
         return t[0] + tau
-    while k + 1 < t.size and t[k + 1] + tau < end:
-        if t[k + 1] + tau > at and abs(r[k + 1] - r[k]) > least:
+    while k + 1 < t.size and t[k + 1] + tau < end - SHORTEST:
+        if t[k + 1] + tau > at + SHORTEST and abs(r[k + 1] - r[k]) > least:
             return t[k + 1] + tau
         k += 1
     return end

@@ -62,6 +62,7 @@ class _Race(Refits):
         if self.quiet and not self.screened.promising():
             return []
         failed = self._refit_the_promising()
+        self._refit_the_lost()
         early = self._refit_from_other_starts(failed)
         self._run_laps({label for label, _, _ in early})
         best = leaders(self.best, self.total)
@@ -90,6 +91,20 @@ class _Race(Refits):
             least = self.bench.search.failed * max(self.most_won(self.best), 0.0)
             failed = {name for name, found in leaders(self.best, self.total).items() if self.won(found) <= least}
         return failed
+
+    def _refit_the_lost(self) -> None:
+        """What stands above the base after its first refit, which it has as its limit, has not been fitted: forks of
+        stick and slip lie between it and its start, and a borrowed Jacobian does not lead through them. It is fitted
+        from all of its starts on Jacobians of its own.
+        """
+        lost = [
+            label
+            for label, found in self.best.items()
+            if label[0] in BY_NAME and not BY_NAME[label[0]].dear and self.won(found) < 0.0
+        ]
+        again = self.lap([(label, begin) for label in lost for begin in self.starts[label]])
+        for label, found in again:
+            self.best[label] = min(self.best[label], found, key=self.total)
 
     def _refit_from_other_starts(self, failed: set[str]) -> list[Early]:
         """What may lead is refitted from its other starts: where the base is bent the foremost to the end and on

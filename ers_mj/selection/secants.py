@@ -20,6 +20,7 @@ from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 SPARSE = 4e-3  # [s] between the samples that tell a share to first order
+FURTHEST, TOLD = 0.5, 1e-3  # of a step beside an effect, in transformed numbers, along what so much of the slopes tells
 MOST = 0.5  # of what is left, in the recordings by which starts are chosen
 # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
 RUNAWAY = 1e12
@@ -28,12 +29,14 @@ RUNAWAY = 1e12
 @dataclass(frozen=True)
 class Target:
     """What is to be explained at one weighting: the square roots of the weights (N,), an orthonormal basis (N, k) of
-    what the model's own parameters can do, and the weighted residual (N,) that they leave.
+    what the model's own parameters can do, the weighted residual (N,) that they leave, and how the basis makes up their
+    slopes, (k, k).
     """
 
     root: np.ndarray
     basis: np.ndarray
     residual: np.ndarray
+    slopes: np.ndarray
 
     @cached_property
     def power(self) -> float:
@@ -55,6 +58,17 @@ class View:
     @property
     def place(self) -> Model:
         return self.run.model
+
+    def beside(self, change: np.ndarray, target: Target) -> Model:
+        """The place with its own numbers where they make the best of a ``change`` (N,) of what it leaves, to first
+        order; those that rest at a bound stay.
+        """
+        layout = [f for f in self.place.layout() if not self.place.at_bound(f)]
+        pull = target.basis.T @ (target.root * (self.run.left + change))
+        size = np.maximum(np.linalg.norm(target.slopes, axis=0), 1e-300)
+        way = -np.linalg.lstsq(target.slopes / size, pull, rcond=TOLD)[0] / size
+        way *= min(1.0, FURTHEST / max(float(np.max(np.abs(way), initial=0.0)), 1e-300))
+        return self.place.at(layout, self.place.vector(layout) + way)
 
     def secant(self, effect: Effect, start: np.ndarray) -> np.ndarray:
         """What the effect at a start changes of what the run leaves (N,)."""
@@ -88,7 +102,7 @@ class View:
             return self
         records = sorted(order[:enough].tolist())
         rows = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in records])
-        fewer = [Target(t.root[rows], np.linalg.qr(t.basis[rows])[0], t.residual[rows]) for t in self.targets]
+        fewer = [_target(t.root[rows], t.basis[rows] @ t.slopes, t.residual[rows]) for t in self.targets]
         place, motions = self.place.of_records(records), tuple(self.run.motions[k] for k in records)
         return View(Run(place, self.run.left[rows], motions), fewer, [self.traces[k] for k in records], self.search)
 
@@ -107,12 +121,18 @@ class View:
             shares.append(np.full(some.size, math.sqrt(stride)))
         kept, weight = np.concatenate(rows), np.concatenate(shares)
         fewer = [
-            Target(t.root[kept] * weight, np.linalg.qr(t.basis[kept] * weight[:, None])[0], t.residual[kept] * weight)
+            _target(t.root[kept] * weight, t.basis[kept] @ t.slopes * weight[:, None], t.residual[kept] * weight)
             for t in self.targets
         ]
         motions = tuple(np.ascontiguousarray(motion[::stride]) for motion, stride in zip(self.run.motions, strides))
         run = Run(self.place, self.run.left[kept], motions)
         return View(run, fewer, [t.sparse(stride) for t, stride in zip(self.traces, strides)], self.search)
+
+
+def _target(root: np.ndarray, slopes: np.ndarray, residual: np.ndarray) -> Target:
+    """The target of weighted slopes (N, k) and residual (N,)."""
+    basis, made_up = np.linalg.qr(slopes)
+    return Target(root, basis, residual, made_up)
 
 
 def view_of(run: Run, traces: Sequence[Trace], tau: float, search: Search = SEARCH) -> tuple[View, Columns]:
@@ -128,8 +148,8 @@ def view_of(run: Run, traces: Sequence[Trace], tau: float, search: Search = SEAR
     free, targets = np.array([not place.at_bound(f) for f in layout], bool), []
     for level in dict.fromkeys((tau, max(tau, float(np.mean(m))))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
-        basis, _ = np.linalg.qr(jacobian[:, free] * root[:, None])
-        targets.append(Target(root, basis, root * e - basis @ (basis.T @ (root * e))))
+        basis, slopes = np.linalg.qr(jacobian[:, free] * root[:, None])
+        targets.append(Target(root, basis, root * e - basis @ (basis.T @ (root * e)), slopes))
     return View(run, targets, traces, search), {f.key: column for f, column in zip(layout, jacobian.T)}
 
 
@@ -246,13 +266,15 @@ def promise(view: View, effect: Effect, start: np.ndarray, size: float) -> tuple
         secant = view.secant(effect, _scaled(effect, start, size))
         if not np.all(np.isfinite(secant)):
             break
-        share, factor = max(
-            (float(part[0]), float(multiples[0, 0, 0]))
-            for part, multiples in (_shares(secant[None], 1, ends, target, effect.signed) for target in view.targets)
+        told = [_shares(secant[None], 1, ends, target, effect.signed) for target in view.targets]
+        share, factor, n = max(
+            (float(part[0]), float(multiples[0, 0, 0]), n) for n, (part, multiples) in enumerate(told)
         )
-        size = view.tried(size * factor)
+        asked = view.tried(size * factor)
         if best is None or share > best[0]:
-            best = share, view.place.with_effect(effect.name, _scaled(effect, start, size))
+            place = view.beside(asked / size * secant, view.targets[n]) if share > 0.0 else view.place
+            best = share, place.with_effect(effect.name, _scaled(effect, start, asked))
+        size = asked
         if not view.is_another(factor):
             break
     return best

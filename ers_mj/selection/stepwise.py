@@ -28,7 +28,7 @@ from ers_mj.selection.foundation import held_beside, held_instead, hung
 from ers_mj.selection.loads import still_loaded, under_loads
 from ers_mj.selection.moves import Grown, Move, less, rounds_that_count
 from ers_mj.selection.pair import bending_and_twisting, beside_a_rival, paired
-from ers_mj.selection.swap import as_what_it_is, exchanged, in_its_place, other_way_round, reviewed, widened
+from ers_mj.selection.swap import as_what_it_is, exchanged, in_its_place, narrowed, other_way_round, reviewed, widened
 from ers_mj.selection.sweep import SIZED, any_body, joined, of_one_body, of_two_bodies, swept
 from ers_mj.selection.whiteness import is_beyond_rounding, left_by_sensor
 
@@ -114,6 +114,8 @@ class _Stepwise:
             else:
                 self._add(because)
         self._look_again(("swap", lambda: as_what_it_is(self.bench, self.current, self.rounds)))
+        if not is_dear(self.current):
+            self._go_on("narrow", narrowed(self.bench, self.current), self.current, "a narrower form does as well")
         bench, rounds, trail = self.bench, tuple(self.rounds), tuple(self.trail)
         return Selection(self.base, self.current, rounds, bench.tau, bench.traces, trail, cut_short)
 

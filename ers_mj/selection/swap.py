@@ -166,6 +166,27 @@ def widened(bench: Bench, current: Fit, newest: str) -> Fit:
     return current
 
 
+def narrowed(bench: Bench, current: Fit) -> Fit:
+    """With effects in narrower forms (Effect.narrower) that do as well: what one was widened for may have been what was
+    named later, and of two numbers that stand for one nothing is known.
+    """
+    policy = bench.policy
+    for name in (n for n in current.model.names if not BY_NAME[n].dear):
+        for less in BY_NAME[name].narrower(dict(current.model.effects)[name]):
+
+            def lost(found: Fit, before: Fit = current) -> float:
+                price = policy.wider_price + policy.parameter_price * (before.size - found.size)
+                return bench.cost(found) - bench.cost(before) - price
+
+            begun = [current.model.with_form(name, less)]
+            (found,) = bench.carried_on(
+                begun, lambda x, lost=lost: lost(x) < bench.search.missed, first=4, then=20, along=Along(renewals=2)
+            )
+            if lost(found) < 0.0:
+                return narrowed(bench, found)
+    return current
+
+
 def as_what_it_is(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate, ...]]) -> Grown | None:
     """The model with the effect itself in the place of one whose numbers are a form of it (see Effect.really), and the
     rounds led by it, where that is as good; None where nothing is.
