@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from servo import TRUTH, recorded, started
 
-from ers_mj.estimation.intervals import half_widths, unseen_spread, widths_of
+from ers_mj.estimation.intervals import at_given, half_widths, unseen_spread, widths_of
 
 
 def test_what_is_too_small_to_be_found_widens_the_intervals():
@@ -14,3 +14,9 @@ def test_what_is_too_small_to_be_found_widens_the_intervals():
     noise, unseen = half_widths(model, faint.traces, (), 1.0), widths_of(unseen_spread(model, faint.traces, 1.0))
     off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))
     assert np.all(unseen > 0) and np.all(off < 2.0 * np.hypot(noise, unseen))
+
+
+def test_what_is_held_widens_nothing():
+    spread = np.array([[4.0, 1.9, 0.0], [1.9, 1.0, 0.0], [0.0, 0.0, 9.0]])
+    known = np.linalg.inv(np.linalg.inv(spread)[:1, :1])  # of the first where nothing else moves
+    assert np.allclose(at_given(spread, [0], [1, 2]), known) and np.allclose(at_given(spread, [0], []), 4.0)

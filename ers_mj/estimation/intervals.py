@@ -62,6 +62,12 @@ def widths_of(spread: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(np.diag(spread), 0.0))
 
 
+def at_given(spread: np.ndarray, asked: Sequence[int], given: Sequence[int]) -> np.ndarray:
+    """Spread (n, n) of the n ``asked`` numbers while the ``given`` ones stay where they are."""
+    own, held, between = (spread[np.ix_(*ends)] for ends in ((asked, asked), (given, given), (asked, given)))
+    return own - between @ np.linalg.pinv(held, hermitian=True) @ between.T
+
+
 def half_spread(
     model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float, jacobian: np.ndarray | None = None
 ) -> np.ndarray:

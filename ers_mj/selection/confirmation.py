@@ -16,7 +16,7 @@ from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit, polished
-from ers_mj.estimation.intervals import half_widths, told_spread, widths_of
+from ers_mj.estimation.intervals import at_given, half_widths, told_spread, widths_of
 from ers_mj.estimation.objective import Fit, residuals_in
 from ers_mj.selection.comparison import stands_alone
 from ers_mj.selection.cross_validation import Fold, Score, folds, halves, pooled, recalibrated, refits, scored
@@ -213,17 +213,25 @@ class Court:
     def is_unsure(self, name: str, model: Model, after_models: Sequence[Model]) -> bool:
         """Whether the interval of each size of an effect, as it would be told, spans zero, or decades where it has a
         sign, and those without a sign may be none together.
+
+        Its other numbers, a speed or a place, are held where they are: of an effect that is none nothing tells them, so
+        that they say nothing of whether it is.
         """
         if name in model.frozen or BY_NAME[name].local:
             return False
-        effect, layout = BY_NAME[name], model.layout()
+        effect, layout, z = BY_NAME[name], model.layout(), model.vector(model.layout())
         sizes = {effect.parameters[k].name for k in effect.sizes(dict(model.effects)[name])}
-        at = [k for k, f in enumerate(layout) if f.owner == name and f.name in sizes]
-        z, spread = model.vector(layout), self.spread(model, after_models)
-        widths, signless = widths_of(spread), [k for k in at if not layout[k].positive]
-        if not at or not all(decisions.is_no_size(*layout[k].ends(z[k], widths[k]), self.policy) for k in at):
+        own = [k for k, f in enumerate(layout) if f.owner == name]
+        at = [k for k in own if layout[k].name in sizes]
+        if not at:
             return False
-        return len(signless) < 2 or decisions.is_none_together(z[signless], spread[np.ix_(signless, signless)])
+        spread = at_given(self.spread(model, after_models), at, [k for k in own if k not in at])
+        ends = (layout[k].ends(z[k], width) for k, width in zip(at, widths_of(spread), strict=True))
+        if not all(decisions.is_no_size(low, high, self.policy) for low, high in ends):
+            return False
+        signless = [n for n, k in enumerate(at) if not layout[k].positive]
+        sizes_of = z[[at[n] for n in signless]]
+        return len(signless) < 2 or decisions.is_none_together(sizes_of, spread[np.ix_(signless, signless)])
 
     def spread(self, model: Model, after_models: Sequence[Model]) -> np.ndarray:
         """Spread (k, k) of a model's numbers (estimation/intervals.py), the last model's kept; ``after_models`` are its
