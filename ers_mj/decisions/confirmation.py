@@ -139,6 +139,21 @@ def is_none_together(sizes: np.ndarray, spread: np.ndarray) -> bool:
     return not far * chdtri(1, 0.05) > chdtri(sizes.size, 0.05)
 
 
+def are_no_sizes(
+    ends: Sequence[tuple[float, float]],
+    signed: Sequence[int],
+    sizes: np.ndarray,
+    spread: np.ndarray,
+    policy: Policy = POLICY,
+) -> bool:
+    """Whether the intervals ``ends`` of all sizes (k,) of an effect tell none, and those that are ``signed`` may be
+    none together, by their ``spread`` (k, k).
+    """
+    if not all(is_no_size(low, high, policy) for low, high in ends):
+        return False
+    return len(signed) < 2 or is_none_together(sizes[signed], spread[np.ix_(signed, signed)])
+
+
 def is_confirmed(held: HeldOut, recalibrated: Recalibrated, policy: Policy = POLICY) -> bool:
     """Whether an effect is confirmed: by blocks and free runs, or by an error that is halved once gain, offset and
     friction level of another day are known (asked for only where nothing else confirms it).

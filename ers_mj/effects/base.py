@@ -10,7 +10,7 @@ is carried as an acceleration [output unit / s^2] and only turned into N m for t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -134,16 +134,23 @@ class Effect:
         """Its numbers p (k,) without those that may be absent, one by one, or together where they say something only
         together; what ``needs`` one of them keeps it.
         """
-        names, found = [x.name for x in self.parameters], []
+        names = [x.name for x in self.parameters]
         alone = [(name,) for name in names if not any(name in group for group in self.together)]
-        for group in (*self.together, *alone):
-            at, less = [names.index(name) for name in group], p.copy()
-            may_go = [math.isinf(x.absent) and x.fitted and not x.per_record for x in (self.parameters[k] for k in at)]
-            less[at] = self.absent()[at]
-            is_whole = all(any(np.isfinite(less[names.index(name)]) for name in one) for one in self.needs)
-            if all(may_go) and is_whole and np.all(np.isfinite(p[at])) and np.any(np.isfinite(less)):
-                found.append(less)
-        return found
+        groups = [[names.index(name) for name in group] for group in (*self.together, *alone)]
+        return [self._less(p, at) for at in groups if np.all(np.isfinite(p[at])) and self._may_lack(p, at)]
+
+    def _less(self, p: np.ndarray, at: Sequence[int]) -> np.ndarray:
+        less = p.copy()
+        less[at] = self.absent()[at]
+        return less
+
+    def _may_lack(self, p: np.ndarray, at: Sequence[int]) -> bool:
+        """Whether there is a form of p (k,) without these fitted numbers."""
+        lacked, left = [self.parameters[k] for k in at], np.isfinite(self._less(p, at))
+        names = {x.name for x, is_left in zip(self.parameters, left, strict=True) if is_left}
+        return all(math.isinf(x.absent) and x.fitted and not x.per_record for x in lacked) and all(
+            names.intersection(one) for one in self.needs or (names,)
+        )
 
     def absent(self) -> np.ndarray:
         """Parameter values (k,) at which the effect vanishes, so that models nest."""

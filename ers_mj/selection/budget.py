@@ -21,7 +21,8 @@ class Search:
     first order tells ``beside_tries`` more starts than are refitted; where a model is quiet a secant must promise
     ``least_promise`` of the gain that matters. Further places of a bent baseline ask those with ``less``, from the
     ``asked_again`` foremost of their starts. A start is scaled to between ``least_size`` and ``most_size`` of itself,
-    and its secant taken again where that is ``another`` size.
+    and its secant taken again where that is ``another`` size; the servo makes room for it by a step of ``aside`` at
+    most, in transformed numbers, along slopes that are ``telling``, as a share of the largest.
     """
 
     most_sent: int = 10
@@ -37,6 +38,8 @@ class Search:
     least_size: float = 0.002
     most_size: float = 3.0
     another: float = 1.5
+    aside: float = 0.5
+    telling: float = 1e-3
     # A round's refits: ``quick`` steps on a borrowed Jacobian; ``renewals`` Jacobians of their own each lap, ``laps``
     # at most, ``later_laps`` beside an effect, as long as one wins ``pace`` of the gain that matters and
     # ``pace_share``; from its other starts what has won ``again``, and the ``foremost`` promises; a promise was none

@@ -211,8 +211,8 @@ class Court:
         return "a wave fits any remainder as well" if is_any_wave(name, model, with_it, without, policy) else ""
 
     def is_unsure(self, name: str, model: Model, after_models: Sequence[Model]) -> bool:
-        """Whether the interval of each size of an effect, as it would be told, spans zero, or decades where it has a
-        sign, and those without a sign may be none together.
+        """Whether the interval of each size of an effect spans zero, or decades where it has a sign, and those without
+        a sign may be none together.
 
         Its other numbers, a speed or a place, are held where they are: of an effect that is none nothing tells them, so
         that they say nothing of whether it is.
@@ -226,12 +226,9 @@ class Court:
         if not at:
             return False
         spread = at_given(self.spread(model, after_models), at, [k for k in own if k not in at])
-        ends = (layout[k].ends(z[k], width) for k, width in zip(at, widths_of(spread), strict=True))
-        if not all(decisions.is_no_size(low, high, self.policy) for low, high in ends):
-            return False
-        signless = [n for n, k in enumerate(at) if not layout[k].positive]
-        sizes_of = z[[at[n] for n in signless]]
-        return len(signless) < 2 or decisions.is_none_together(sizes_of, spread[np.ix_(signless, signless)])
+        ends = [layout[k].ends(z[k], width) for k, width in zip(at, widths_of(spread), strict=True)]
+        signed = [n for n, k in enumerate(at) if not layout[k].positive]
+        return decisions.are_no_sizes(ends, signed, z[at], spread, self.policy)
 
     def spread(self, model: Model, after_models: Sequence[Model]) -> np.ndarray:
         """Spread (k, k) of a model's numbers (estimation/intervals.py), the last model's kept; ``after_models`` are its

@@ -20,7 +20,6 @@ from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 SPARSE = 4e-3  # [s] between the samples that tell a share to first order
-FURTHEST, TOLD = 0.5, 1e-3  # of a step beside an effect, in transformed numbers, along what so much of the slopes tells
 MOST = 0.5  # of what is left, in the recordings by which starts are chosen
 # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
 RUNAWAY = 1e12
@@ -66,8 +65,8 @@ class View:
         layout = [f for f in self.place.layout() if not self.place.at_bound(f)]
         pull = target.basis.T @ (target.root * (self.run.left + change))
         size = np.maximum(np.linalg.norm(target.slopes, axis=0), 1e-300)
-        way = -np.linalg.lstsq(target.slopes / size, pull, rcond=TOLD)[0] / size
-        way *= min(1.0, FURTHEST / max(float(np.max(np.abs(way), initial=0.0)), 1e-300))
+        way = -np.linalg.lstsq(target.slopes / size, pull, rcond=self.search.telling)[0] / size
+        way *= min(1.0, self.search.aside / max(float(np.max(np.abs(way), initial=0.0)), 1e-300))
         return self.place.at(layout, self.place.vector(layout) + way)
 
     def secant(self, effect: Effect, start: np.ndarray) -> np.ndarray:
