@@ -266,3 +266,13 @@ def test_what_tells_how_large_an_effect_is_may_be_any_of_its_terms(name, values,
 def test_a_dead_time_without_a_lag_is_told_as_a_delay(lag, told):
     assert BY_NAME["sensor_lag"].really(np.array([lag, 1e-2]), 1.0) == told
     assert BY_NAME["sensor_lag"].really(np.array([lag, np.inf]), 1.0) == "sensor_lag"
+
+
+def test_an_effect_is_narrower_without_what_may_be_absent():
+    none = np.inf
+    load, stop, site = (BY_NAME[n] for n in ("load_dependent_friction", "end_stop", "position_dependent_friction"))
+    wide = np.array([0.1, none, 0.5, 0.02, 1.0])
+    assert [p.tolist() for p in load.narrower(wide)] == [[0.1, none, 0.5, none, none], [0.1, none, none, 0.02, 1.0]]
+    assert not load.narrower(load.narrower(load.narrower(wide)[0])[0])  # the share itself stays
+    assert [p[:2].tolist() for p in stop.narrower(np.array([-1.0, 1.0, 40.0, 0.3]))] == [[-none, 1.0], [-1.0, none]]
+    assert not site.narrower(np.array([1.0, 2.0, 3.0, none, none]))  # a place or a period it needs

@@ -4,13 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import Watched, all_but, alone, bench_of, having, recorded, started
+from servo import SPARSE, Watched, all_but, alone, bench_of, having, recorded, started
 
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
 from ers_mj.selection import swap
 from ers_mj.selection.comparison import Candidate, judged
-from ers_mj.selection.swap import as_what_it_is, begun_anew, exchanged, in_its_place, other_way_round, reviewed, widened
+from ers_mj.selection.swap import (
+    as_what_it_is,
+    begun_anew,
+    exchanged,
+    in_its_place,
+    narrowed,
+    other_way_round,
+    reviewed,
+    widened,
+)
 
 
 def test_a_play_begins_anew_beside_what_was_found_since(pushed):
@@ -128,3 +137,22 @@ def test_a_late_reading_without_a_lag_gives_way_to_the_delay_that_it_is():
     assert found.model.names == ("input_delay",) and rounds[0][0].name == "input_delay"
     assert dict(found.model.effects)["input_delay"][0] == pytest.approx(0.006, rel=0.02)
     assert as_what_it_is(bench, found, rounds) is None
+
+
+def test_an_effect_ends_in_the_narrowest_form_that_does_as_well():
+    name = "quadratic_drag"
+    concealed = [(name, np.array([1.5, np.inf]))]
+    start = started(recorded(concealed, t=SPARSE))
+    bench = bench_of(start)
+    wide, plain = (alone(start, name, p, steps=20).fit for p in ([1.0, 2.4], [1.0, np.inf]))
+    found = narrowed(bench, wide)
+    assert not np.isfinite(dict(found.model.effects)[name][1])
+    assert abs(bench.cost(found) - bench.cost(plain)) < 0.1
+    assert narrowed(bench, found) is found  # no number is left that may go
+
+
+def test_an_effect_stays_as_wide_as_it_is_where_that_pays():
+    name = "quadratic_drag"
+    start = started(recorded([(name, np.array([12.0, 3.2]))], t=SPARSE))
+    wide = alone(start, name, [1.0, 3.0], steps=25).fit
+    assert narrowed(bench_of(start), wide) is wide
