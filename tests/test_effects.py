@@ -245,6 +245,18 @@ def test_an_uneven_gears_torque_is_the_one_of_a_cog():
         ReducedModel(c, [("transmission_ripple", np.array([0.1, 0.2, 0.4, 5.0, np.inf, np.inf]))]).simulate(T, u)
 
 
+def test_a_gears_ratio_may_swing_twice_a_period():
+    """Without back-EMF and friction's switching the torque is the drive's, by the swing."""
+    name, k, drive = "transmission_ripple", 2 * np.pi / 0.2, 7.0
+    law, effect = BY_NAME[name].torque, BY_NAME[name]
+    p = effect.constants(np.array([0.05, 0.2, 0.4, np.inf, 0.3, 1.0]), lumped({**TRUTH}))
+    theta = np.linspace(-0.3, 0.3, 7)
+    swing = 0.05 * (np.sin(k * theta + 0.4) + 0.3 * np.sin(2 * (k * theta + 0.4) + 1.0))
+    assert [law(p, x, 0.0, drive, 0.0) for x in theta] == pytest.approx(list(swing * drive))
+    wider = effect.grown(name, np.array([0.05, 0.2, 0.4, np.inf, np.inf, np.inf]), replace(SCALES, low=-1.0, high=1.0))
+    assert [tuple(np.isfinite(q)) for q in wider] == 2 * [(True, True, True, False, True, True)]
+
+
 @pytest.mark.parametrize(
     "name, values, sizes",
     [

@@ -13,8 +13,8 @@ ORDERS = range(
 
 
 class TransmissionRipple(Transmission):
-    """r = 1 + ripple sin(x), x = 2 pi theta / period + phase: an eccentric gear or a bent screw. Or, whatever the load,
-    theta'' += A (sin x + second sin(2 x + phase_2)) / J: teeth that grind.
+    """r = 1 + ripple s, s = sin x + second sin(2 x + phase_2), x = 2 pi theta / period + phase: an eccentric gear, a
+    bent screw, a strain wave. Or, whatever the load, theta'' += A s / J: teeth that grind.
 
     The motor's torque at the rudder is r times, its back-EMF r times the mean ratio's; the change of the reflected
     inertia, and with inductance the current's delay behind the changed back-EMF, are left out. A torque that waves with
@@ -43,7 +43,7 @@ class TransmissionRipple(Transmission):
         Parameter(
             "second",
             "ratio",
-            "second harmonic of that torque over the first",
+            "second harmonic over the first",
             positive=False,
             lower=-2.0,
             upper=2.0,
@@ -68,28 +68,29 @@ class TransmissionRipple(Transmission):
         ]
 
     def grown(self, name, p, scales):
-        """From a plain torque: with a second harmonic, where a whole period is seen: less of five numbers stands for
-        any smooth torque.
+        """From a plain sine: with a second harmonic, where a whole period is seen: less of five numbers stands for any
+        smooth torque.
         """
-        plain = name == self.name and np.isfinite(p[3]) and not np.isfinite(p[4]) and p[1] <= scales.high - scales.low
+        plain = name == self.name and not np.isfinite(p[4]) and p[1] <= scales.high - scales.low
         return [np.array([*p[:4], 0.1, phase]) for phase in (0.0, 0.5 * np.pi)] if plain else []
 
     def constants(self, p, c):
+        second = p[4:] if np.isfinite(p[4]) else (0.0, 0.0)
         if not np.isfinite(p[3]):
-            return np.array([p[0], 2 * np.pi / p[1], p[2], c.a_emf, np.inf])
+            return np.array([p[0], 2 * np.pi / p[1], p[2], *second, c.a_emf, 1.0])
         if np.isfinite(p[0]) and p[0] != 0.0:
             raise InputError(f"{self.name}: ripple and A are both given, one of them was expected")
-        return np.array([p[3], 2 * np.pi / p[1], p[2], *(p[4:] if np.isfinite(p[4]) else (0.0, 0.0))])
+        return np.array([p[3], 2 * np.pi / p[1], p[2], *second, 0.0, 0.0])
 
     @law
     def torque(p, theta, w, j, t):
         x = p[1] * theta + p[2]
-        if p[4] != math.inf:
-            return p[0] * (math.sin(x) + p[3] * math.sin(2.0 * x + p[4]))
+        swing = p[0] * (math.sin(x) + p[3] * math.sin(2.0 * x + p[4]))
+        if p[6] == 0.0:
+            return swing
         if j == 0.0:  # an open circuit
             return 0.0
-        swing = p[0] * math.sin(x)
-        return swing * (j - (1.0 + swing) * p[3] * w)
+        return swing * (j - (1.0 + swing) * p[5] * w)
 
     def describe(self, values):
         if values["A"] == "none":
