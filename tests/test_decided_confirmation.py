@@ -87,6 +87,8 @@ def test_sizes_that_are_unknown_apart_may_be_known_together():
     assert not is_none_together(np.array([1.0, 1.0]), spread)
     assert is_none_together(np.array([1.0, -1.0]), spread)
     assert is_none_together(np.array([0.2, 0.1]), spread)
+    rounded = np.array([[1.0, -1.0 - 1e-15], [-1.0 - 1e-15, 1.0]])  # a sum that is known, but for rounding
+    assert not is_none_together(np.array([0.3, 0.3]), rounded)
 
 
 def test_losses_alone_tell_the_scatter_of_chance():

@@ -133,9 +133,11 @@ def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:
 
 def is_none_together(sizes: np.ndarray, spread: np.ndarray) -> bool:
     """Whether the joint 95 % region of signed sizes (k,) holds none at all: each may be unknown for itself and their
-    sum be known. ``spread`` is their covariance times the squared 95 % quantile of one.
+    sum be known. ``spread`` is their covariance times the squared 95 % quantile of one; rounding may leave it with an
+    eigenvalue below zero, which is taken for a known sum.
     """
-    far = float(sizes @ np.linalg.pinv(spread) @ sizes)
+    least = 1e-9 * np.trace(spread) * np.eye(sizes.size)
+    far = float(sizes @ np.linalg.pinv(spread + least, hermitian=True) @ sizes)
     return not far * chdtri(1, 0.05) > chdtri(sizes.size, 0.05)
 
 

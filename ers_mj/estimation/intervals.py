@@ -65,7 +65,7 @@ def widths_of(spread: np.ndarray) -> np.ndarray:
 def at_given(spread: np.ndarray, asked: Sequence[int], given: Sequence[int]) -> np.ndarray:
     """Spread (n, n) of the n ``asked`` numbers while the ``given`` ones stay where they are."""
     own, held, between = (spread[np.ix_(*ends)] for ends in ((asked, asked), (given, given), (asked, given)))
-    return own - between @ np.linalg.pinv(held, hermitian=True) @ between.T
+    return own - between @ np.linalg.pinv(held, rcond=1e-9, hermitian=True) @ between.T
 
 
 def half_spread(
