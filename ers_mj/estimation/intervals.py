@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.jacobian import central_jacobian
-from ers_mj.estimation.objective import residuals, residuals_in
+from ers_mj.estimation.objective import residuals
 from ers_mj.servo.model import OBSERVER_RATE, STATES, Model
 
 
@@ -115,15 +115,12 @@ def unseen_spread(model: Model, traces: Sequence[Trace], tau: float, jacobian: n
     to make up for them.
 
     Each effect's secant, at a size that would gain DOUBT.unseen_gain beside the model and never larger than its start,
-    shifts the numbers by what a fit makes of it; any effect is as likely as the next, DOUBT.unseen of them act. Of
-    several recordings every second one tells that. The ``jacobian`` is as in ``half_spread``.
+    shifts the numbers by what a fit makes of it; any effect is as likely as the next, DOUBT.unseen of them act. The
+    ``jacobian`` is as in ``half_spread``.
     """
     layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
     jacobian = slopes_of(model, traces) if jacobian is None else jacobian
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
-    asked = range(0, len(traces), 2)
-    rows = np.repeat(np.arange(len(traces)) % 2 == 0, [trace.rows for trace in traces])
-    jacobian, weight, e = jacobian[rows], weight[rows], e[rows]
     hessian = jacobian.T @ (weight[:, None] * jacobian)
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
     shifts = []
@@ -131,7 +128,7 @@ def unseen_spread(model: Model, traces: Sequence[Trace], tau: float, jacobian: n
         found = []
         for start in (starts := effect.starts(model.scales))[:1] + starts[1:][-1:]:
             beside = model.with_effect(effect.name, start)
-            secant = np.concatenate([residuals_in(beside, traces[k], k, OBSERVER_RATE) for k in asked]) - e
+            secant = residuals(beside, traces, OBSERVER_RATE) - e
             if np.all(np.isfinite(secant)):
                 pull = jacobian.T @ (weight * secant)
                 apart = float(secant @ (weight * secant) - pull @ inverse @ pull)
