@@ -166,6 +166,10 @@ class Findings:
         return tuple(self.table["nameless"])
 
     @property
+    def recordings_differ(self) -> bool:
+        return self.table.get("recordings_differ", False)
+
+    @property
     def explained(self) -> float:
         t = self.table
         shares = [rules.share(b**2, a**2, n**2) for b, a, n in t["explained_pooled"]]

@@ -115,7 +115,9 @@ def test_what_differs_between_training_recordings_is_told():
     states = {state["name"]: state["values"] for state in document["record_state"]}
     assert states["gain"] == pytest.approx([1.0, 1.1], abs=0.02)
     assert states["friction_level"] == pytest.approx([1.0, 0.85], abs=0.05)
-    assert document["missing"] == []
+    assert document["verdict"] == "parameters_only" and document["missing"] == []
+    assert "gain and friction level of its own in each recording" in document["sentence"]
+    assert document["fit"]["train_rmse_after_rad"] < 1.1 * NOISE
 
 
 def test_a_true_datasheet_is_consistent():

@@ -22,6 +22,7 @@ class Findings:
     names: tuple = ("supply_sag",)
     sensors: tuple = ()
     suspects: tuple = ()
+    recordings_differ: bool = False
     explained: float = 1.0
     left_before: dict = field(default_factory=lambda: left(0.5))
     left: dict = field(default_factory=left)
@@ -142,3 +143,10 @@ def test_a_rig_that_changed_before_the_held_out_recording_is_told(raw, again, st
     fits = {"heldout_rmse_after_rad": raw, "recalibrated_rmse_after_rad": again}
     told = of_another_day(fits, states, "V", POLICY)
     assert ("gain differs" in told and "0.054 V, not 0.46 V" in told) if said else told == ""
+
+
+def test_recordings_that_differ_are_judged_by_what_memory_tells():
+    """What is held out has a gain to itself, so that its error tells of no physics; that it is large is still said."""
+    case = replace(NONE, recordings_differ=True, free_held=700.0, least_astray=500.0)
+    assert rules.verdict(case) == "parameters_only" and rules.is_more_left(case)
+    assert rules.verdict(replace(case, left=left(0.2))) == "unexplained"

@@ -31,7 +31,9 @@ class Findings(Protocol):
     """What the verdict reads.
 
     ``names`` are the effects of the model, ``sensors`` those that show in the data itself, ``suspects`` the laws
-    without a name that act here; ``explained`` is the share of the squared held-out error that goes with the names,
+    without a name that act here; ``recordings_differ`` says that what is held out has a gain, an offset or a friction
+    level of its own, which nothing else tells; ``explained`` is the share of the squared held-out error that goes with
+    the names,
     ``left_before`` and ``left`` what memory tells without and with them, ``left_elsewhere`` the same in the recordings
     but the worst, ``free_held`` the held-out error after and ``least_astray`` the smallest of a recording
     before, in noise levels; ``datasheet_explains`` whether the datasheet as it stands does.
@@ -43,6 +45,8 @@ class Findings(Protocol):
     def sensors(self) -> Collection[str]: ...
     @property
     def suspects(self) -> Sequence[object]: ...
+    @property
+    def recordings_differ(self) -> bool: ...
     @property
     def explained(self) -> float: ...
     @property
@@ -126,9 +130,18 @@ def verdict(f: Findings, policy: Policy = POLICY) -> str:
     """
     if told_effects(f, policy) or f.sensors:
         return "missing_physics"
-    if f.names or f.suspects or is_more_missing(f, policy) or f.least_astray > policy.astray:
+    if f.names or f.suspects or _is_amiss(f, policy):
         return "unexplained"
     return "consistent" if f.datasheet_explains else "parameters_only"
+
+
+def _is_amiss(f: Findings, policy: Policy) -> bool:
+    """Whether something is missing where nothing is named: by memory alone where the recordings differ, since the error
+    of one that is held out is that of its state then.
+    """
+    if f.recordings_differ:
+        return is_more_than_noise(f.left, None, policy) or f.left_elsewhere > policy.elsewhere
+    return is_more_missing(f, policy) or f.least_astray > policy.astray
 
 
 def is_more_left(f: Findings, policy: Policy = POLICY) -> bool:

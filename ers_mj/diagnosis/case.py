@@ -34,7 +34,7 @@ from ers_mj.selection.stepwise import Selection
 from ers_mj.selection.unknown import Unknown, unknown
 from ers_mj.selection.whiteness import left_by_sensor, left_elsewhere
 from ers_mj.servo.datasheet import Datasheet
-from ers_mj.servo.model import OBSERVER_RATE, STATES, Model
+from ers_mj.servo.model import DRIFTS, OBSERVER_RATE, STATES, Model
 
 
 @dataclass(frozen=True)
@@ -155,17 +155,27 @@ class Case:
         """The effects that may be named: none where the input never changes, which can tell no two of them apart."""
         return () if is_unexcited(self.start.traces) else self.model.names
 
+    @property
+    def recordings_differ(self) -> bool:
+        """Whether each recording that is held out in turn has a state to itself."""
+        return not self.holdout and bool(self.own_states)
+
+    @property
+    def own_states(self) -> list[str]:
+        """What drifts from one training recording to the next."""
+        return [name for name in self.model.states or {} if name in DRIFTS]
+
     @cached_property
     def explained(self) -> float:
         """Share of the squared held-out free-run error above the noise that the named effects take away.
 
-        Where the rig has changed between the days (held-out recordings of their own), raw or recalibrated, whichever
-        tells more. Where stick and slip fork in one recording its free run is lost with any model and swamps the rest:
-        the mean over recordings tells more then.
+        Where the rig has changed between the days (held-out recordings of their own, or such as differ), raw or
+        recalibrated, whichever tells more. Where stick and slip fork in one recording its free run is lost with any
+        model and swamps the rest: the mean over recordings tells more then.
         """
         c = self.confirmed
         noise = math.sqrt(float(np.mean([fold.held_out.sure_noise**2 for fold in c.parts])))
-        ends = [(pooled(c.before), pooled(c.after)), *([self._again] if self.holdout else [])]
+        ends = [(pooled(c.before), pooled(c.after)), *([self._again] if self.holdout or self.recordings_differ else [])]
         shares = [rules.share(before.sure**2, after.sure**2, noise**2) for before, after in ends]
         each = rules.explained_each(self._shown, self.left_before, self.left, self.policy)
         return max(*shares, each)

@@ -22,7 +22,7 @@ from ers_mj.diagnosis.latent_force import latent_forces
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
-from ers_mj.diagnosis.sentences import of_another_day, sentence, shown
+from ers_mj.diagnosis.sentences import of_another_day, of_its_own, sentence, shown
 from ers_mj.diagnosis.told_model import with_diagnosis
 from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
@@ -110,7 +110,8 @@ def _remainder(case: Case) -> dict:
     """What the answer leaves, beside what memory tells of it by sensor."""
     beyond = beyond_training(case.recordings, case.holdout)
     left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
-    told = remainder(case.explained, case.more_is_left, case.free_held, [*beyond, *unknown.sentences(case)])
+    own = of_its_own(case) if case.verdict == "parameters_only" and case.more_is_left else ""
+    told = remainder(case.explained, case.more_is_left, case.free_held, [*beyond, *unknown.sentences(case)], own)
     return {**told, "left_sigma": left_sigma, "tables": unknown.tables(case)}
 
 

@@ -97,6 +97,10 @@ class LoopCase:
         return ()
 
     @property
+    def recordings_differ(self) -> bool:
+        return False
+
+    @property
     def explained(self) -> float:
         c, noise = self.confirmed, self.noise
         return rules.share(c.before.rmse**2, c.after.rmse**2, noise**2)

@@ -23,7 +23,7 @@ from ers_mj.diagnosis.mujoco_check import Rig
 from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.effects.quantities import Symptoms
-from ers_mj.estimation.baseline import baseline, sharpened
+from ers_mj.estimation.baseline import Start, baseline, sharpened
 from ers_mj.estimation.fit import polished
 from ers_mj.estimation.initial_state import without_spikes
 from ers_mj.selection.budget import SEARCH, Budget, Search
@@ -78,10 +78,7 @@ def diagnose(
     known = tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS)
     budget, begun = Budget(start.traces, search=search), None if still else start
     grown = partial(select, jobs=jobs, progress=progress, policy=policy, budget=budget)
-    chosen = grown(start.fit, start.traces, start=begun, exclude=known)
-    start = replace(start, fit=polished(chosen.base, chosen.traces), traces=chosen.traces)
-    best = polished(chosen.chosen, start.traces) if chosen.chosen.model.names else start.fit
-    chosen = replace(chosen, base=start.fit, chosen=best)
+    start, chosen = _polished(start, grown(start.fit, start.traces, start=begun, exclude=known))
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
@@ -96,6 +93,16 @@ def diagnose(
     progress("locating", 0.92)
     given = recordings, list(holdout), datasheet
     return told(Case(*given, start, selection, judged, sensors, suspects, seed, rig, multibody, policy, search), held)
+
+
+def _polished(start: Start, grown: Selection) -> tuple[Start, Selection]:
+    """The baseline and the answer carried on in free run. What differs between recordings alone is no effect: it is the
+    baseline's then.
+    """
+    named = bool(grown.chosen.model.names)
+    base = polished(grown.base if named else grown.chosen, grown.traces)
+    best = polished(grown.chosen, grown.traces) if named else base
+    return replace(start, fit=base, traces=grown.traces), replace(grown, base=base, chosen=best)
 
 
 def _in_mujoco(

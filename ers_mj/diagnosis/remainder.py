@@ -12,13 +12,14 @@ from ers_mj.diagnosis.sentences import shown
 BEYOND = 0.1  # of the training recordings' range, by which a held-out one must leave it to be told
 
 
-def remainder(explained: float, is_left: bool, levels: float, beyond: Sequence[str]) -> dict:
+def remainder(explained: float, is_left: bool, levels: float, beyond: Sequence[str], own: str = "") -> dict:
     """The entry of diagnosis.json: the share that is explained, whether more is missing, the held-out error in noise
-    ``levels``, and the sentences of ``beyond_training``.
+    ``levels``, and the sentences of ``beyond_training``. Where all that is left comes of what a held-out recording has
+    of its ``own``, that is said.
     """
-    words = (
-        "a mismatch is left that nothing named accounts for" if is_left else "nothing beyond the noise is left"
-    )  # fmt: skip
+    words = "a mismatch is left that nothing named accounts for" if is_left else "nothing beyond the noise is left"
+    if own:
+        words = f"what is left is that a recording which is held out has {own} of its own, which nothing else tells"
     sentence = (
         f"{explained:.0%} of the squared held-out error above the noise is explained; {words}: held out the error is"
         f" {levels:.3g} times the noise floor."

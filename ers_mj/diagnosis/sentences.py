@@ -18,6 +18,11 @@ def sentence(case: Case, missing: Sequence[dict], found: Sequence[Place]) -> str
         return CANNOT
     if case.verdict == "consistent":
         return "The datasheet's model explains these recordings within their noise: nothing is missing."
+    if case.verdict == "parameters_only" and case.recordings_differ:
+        return (
+            f"Only the numbers were off: with refitted parameters, and {of_its_own(case)} of its own in each recording,"
+            " the model explains these recordings within their noise."
+        )
     if case.verdict == "parameters_only":
         return (
             "Only the numbers were off: with refitted parameters the model explains these recordings within their"
@@ -32,6 +37,11 @@ def sentence(case: Case, missing: Sequence[dict], found: Sequence[Place]) -> str
         else f" (the best explains {case.explained:.0%} of the held-out error)"
     )
     return f"Something acts here that no effect of the library accounts for{much}; {place}."
+
+
+def of_its_own(case: Case) -> str:
+    """What each recording has to itself where the recordings differ."""
+    return " and ".join(name.replace("_", " ") for name in case.own_states)
 
 
 def of_another_day(fits: Mapping[str, float | None], states: Sequence[Mapping], unit: str, policy: Policy) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from ers_mj.data.prepared import Trace, start_samples, start_seen
 from ers_mj.data.quantisation import thresholds
 from ers_mj.data.sensor_faults import excursions, held_spans
+from ers_mj.estimation.objective import cost_of, is_rough
 from ers_mj.servo.model import OBSERVER_RATE, Model
 
 SPIKE = 3.5, 0.9  # times nine tenths of the changes of a model's error: 8 sigma where that is noise
@@ -70,6 +71,17 @@ def _held(trace: Trace, simulated: np.ndarray) -> list[slice]:
 def with_starts(model: Model, traces: Sequence[Trace]) -> list[Trace]:
     """The traces with their initial states fitted by the model on the first 50 ms or 10 samples of each."""
     return [replace(trace, start=fitted_start(model, trace, k)) for k, trace in enumerate(traces)]
+
+
+def begun_again(model: Model, traces: Sequence[Trace], tau: float, least: float) -> Sequence[Trace]:
+    """The traces as a model begins them, where a former, wrong one has bent where they began: behind a coarse
+    converter, within whose step a model alone tells that, or where C at ``tau`` falls by more than the ``least``.
+    """
+    again = with_starts(model, traces)
+    if is_rough(traces):
+        return again
+    now, before = (cost_of(model, some, OBSERVER_RATE, tau) for some in (again, traces))
+    return again if now < before - least else traces
 
 
 def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, float]:

@@ -17,8 +17,8 @@ from ers_mj.decisions.verdict import is_more_than_noise
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Held, Start
 from ers_mj.estimation.fit import hopped
-from ers_mj.estimation.initial_state import with_starts
-from ers_mj.estimation.objective import Fit, is_rough, tau_of
+from ers_mj.estimation.initial_state import begun_again
+from ers_mj.estimation.objective import Fit, tau_of
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.budget import Budget
 from ers_mj.selection.candidates import candidates
@@ -325,10 +325,8 @@ class _Stepwise:
         self._go_on("drop", pruned(bench, leader.fit, leader.name), leader.fit, "no longer pays beside the newest")
         current, self.rounds = reconsidered(bench, self.current, self.rounds)
         self._go_on("drop", current, self.current, "it was found in a model that the newest had bent")
-        tau, traces = tau_of(self.current.misfit), bench.traces
-        if is_rough(traces):  # within a step a model tells where the rudder began, and a wrong one tells it wrongly
-            traces = with_starts(self.current.model, traces)
-        self.bench = replace(bench, tau=tau, traces=traces)
+        tau, least = tau_of(self.current.misfit), bench.policy.local_minimum
+        self.bench = replace(bench, tau=tau, traces=begun_again(self.current.model, bench.traces, tau, least))
         self.current = self.bench.fit(self.current.model, 20)
         if (other := in_its_place(bench, self.current, before, self.rounds[-1])) is not None:
             self.rounds[-1] = other
