@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ers_mj.plants.checks import turns
+from ers_mj.plants.checks import linear_part, may_turn, turns
 from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.cuts import CUTS
 from ers_mj.plants.events import direction_from_rest
@@ -43,6 +43,7 @@ def slips_on(t, u, enable, load, c, cuts, maps, k, last, x, m, slips, out):
     b_t, b_w, b_j = maps[n, 1, 0], maps[n, 1, 1], maps[n, 1, 2]
     e_t, e_w, e_j = maps[n, 2, 0], maps[n, 2, 1], maps[n, 2, 2]
     tau, a_emf, s, side = c.tau_e, c.a_emf, m.s, m.side
+    constant, stiffness, damping = linear_part(c, m)
     while k < last and _is_usual(t, enable, cuts, k):
         drive, pull = c.b * u[k + 1], load[k]
         x = with_drive(c, x, drive, tau, a_emf)
@@ -59,7 +60,8 @@ def slips_on(t, u, enable, load, c, cuts, maps, k, last, x, m, slips, out):
         within = (slips or w * s > 0) and (theta - c.theta_0) * side >= 0 and theta <= c.upper and theta >= c.lower
         if not within or not is_bounded(z):
             break
-        if abs(w) < 0.2 * abs(x.w) and turns(c, t[k], x, z, m, drive, tau, a_emf, cuts.h0):
+        a = x.j + pull + constant - stiffness * x.theta - damping * x.w
+        if may_turn(x, z, s, a, cuts.h0) and turns(c, t[k], x, z, m, drive, tau, a_emf, cuts.h0):
             break
         k, x = k + 1, z
         written(out, k, c, x)

@@ -34,6 +34,21 @@ def is_still(c, t, x, m, drive, tau, a_emf):
     return abs(x.w) * math.sqrt(c.k_bristle) < small and abs(derivative(c, t, x, m, drive, tau, a_emf).w) < small
 
 
+@inline
+def linear_part(c, m):
+    """(constant, stiffness, damping) of a slipping body's acceleration beside that of its drive and of laws."""
+    a_mech, level = (c.a_mech_plus, c.c_2_plus) if m.s > 0 else (c.a_mech_minus, c.c_2_minus)
+    return c.bias + c.a_1 * c.theta_0 - c.c_1 * m.side - level * m.s, c.a_1, a_mech
+
+
+@inline
+def may_turn(x, z, s, a, h):
+    """Whether ``turns`` is to be asked of a step from x to z: where the speed comes down to a fifth, or is braked so
+    much at first, by the acceleration ``a``, that a straight fall would end within h.
+    """
+    return abs(z.w) < CALM * abs(x.w) or abs(x.w) < -a * s * h
+
+
 @unit(L(C, F, X, X, M, F, F, F, F))
 def turns(c, t, x, z, m, drive, tau, a_emf, h):
     """True where a slipping body may have stopped and gone on within the step from x to z: it brakes first, speeds up

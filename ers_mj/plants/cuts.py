@@ -10,9 +10,9 @@ import numpy as np
 from ers_mj.plants.compiled import compiled, inline
 from ers_mj.plants.state import MODES, VECTOR, F, has_bristle, types
 
-# length of a segment over the electrical time constant where the inductance falls with the current, and most of them in
-# a sample: of a time constant far shorter than that the fall is no more than a share
-FALL_STEP, MOST_FALL = 0.1, 40
+# where the inductance falls with the current: length of a segment over the electrical time constant, and how many there
+# are in a sample at most, since what a far shorter one changes by falling is little
+FALL_STEP = 0.1, 40
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 SLOWEST = 1e-6  # [1/s] rate at least, of a plant without spring and damping
 CREEP_STEP = 0.7  # rate [1/s] of friction that creeps times segment length
@@ -51,7 +51,7 @@ def _longest(c, h0):
     if c.creep > 0:
         step = min(step, CREEP_STEP / c.creep)
     if c.fall > 0 and c.tau_e > 0:
-        step = min(step, max(FALL_STEP * c.tau_e, h0 / MOST_FALL))
+        step = min(step, max(FALL_STEP[0] * c.tau_e, h0 / FALL_STEP[1]))
     if c.two_body > 0:
         stiffness = c.k_twist / (c.rho * (1.0 - c.rho)) if c.rho > 0 else c.k_bristle
         step = min(step, CONTACT_STEP / math.sqrt(stiffness))

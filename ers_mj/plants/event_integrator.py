@@ -14,7 +14,7 @@ import numpy as np
 
 from ers_mj.effects.base import LEAST_IRON
 from ers_mj.plants.calm import is_plain, rests_on, slips_on, written
-from ers_mj.plants.checks import is_calm, is_clean, is_steady, is_still, turns
+from ers_mj.plants.checks import is_calm, is_clean, is_steady, is_still, linear_part, may_turn, turns
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import CUTS, corner_speed, cut, law_step, longest_step
 from ers_mj.plants.events import (
@@ -33,7 +33,7 @@ from ers_mj.plants.events import (
 from ers_mj.plants.flow import is_linear
 from ers_mj.plants.forces import derivative
 from ers_mj.plants.laws import remember
-from ers_mj.plants.maps import MAPS, no_maps, one_body_segment, two_body_segment
+from ers_mj.plants.maps import one_body_segment, two_body_segment
 from ers_mj.plants.modes import corrected, start_mode, start_state
 from ers_mj.plants.series import expand
 from ers_mj.plants.state import (
@@ -58,6 +58,7 @@ from ers_mj.plants.state import (
     types,
     with_drive,
 )
+from ers_mj.plants.stretched import OF_A_SAMPLE, forgotten, is_near, jitters, over_segment, room
 
 RELEASE_LIMIT = 60  # events in one segment after which a body is left stuck
 ROUNDING = 1e-14  # [output unit] by which a position may lie beyond its boundary without an event
@@ -68,30 +69,20 @@ EVENT_BUDGET = 4
 
 class Sample(NamedTuple):
     """What acts from one sample to the next: time [s] of its beginning, length over the usual one, whether it has the
-    usual length and the circuit is closed, known acceleration of the rudder, the same of the next sample, drive of the
-    sample before and of this one as they arrive.
+    usual length or one near it, and the circuit is closed, known acceleration of the rudder, the same of the next
+    sample, drive of the sample before and of this one as they arrive.
     """
 
     k: int
     t: float
     stretch: float
     is_usual: bool
+    is_near: bool
     closed: bool
     load: float
     next_load: float
     before: float
     now: float
-
-
-class Maps(NamedTuple):
-    """Maps over a sample's last segments, its first one, and the whole of it (see maps.no_maps)."""
-
-    late: np.ndarray
-    early: np.ndarray
-    whole: np.ndarray
-
-
-OF_A_SAMPLE = types.NamedUniTuple(MAPS, 3, Maps)
 
 
 @inline
@@ -194,14 +185,21 @@ def _at_rest(c, t, x, m, drive, tau, load, h, is_checked):
 
 
 @inline
+def _acceleration(c, x, m, push):
+    """Of a slipping body under the acceleration ``push`` of laws and of a known load."""
+    constant, stiffness, damping = linear_part(c, m)
+    return x.j + push + constant - stiffness * x.theta - damping * x.w
+
+
+@inline
 def _slipping(e, step, c, t, x, m, drive, tau, a_emf, load, h, extra, slips):
     """(whether one body goes on slipping over h, the state then or as it begins, what laws add then)."""
-    x = with_drive(c, x, drive, tau, a_emf)
+    x, before = with_drive(c, x, drive, tau, a_emf), extra if c.lawful > 0 else 0.0
     z, extra = one_body_segment(e, step, c, t, x, m, drive, tau, a_emf, load, h, extra if tau > 0 else np.nan)
     z = with_drive(c, z, drive, tau, a_emf)
     within = (slips or z.w * m.s > 0) and (z.theta - c.theta_0) * m.side >= 0
     within = within and z.theta <= c.upper and z.theta >= c.lower
-    if within and abs(z.w) < 0.2 * abs(x.w):
+    if within and (before != before or may_turn(x, z, m.s, _acceleration(c, x, m, load + before), h)):
         within = not turns(c, t, x, z, m, drive, tau, a_emf, h)
     return within, z if within else x, extra
 
@@ -278,14 +276,16 @@ def _through_events(c, now, t, x, m, drive, h, h_max, corner):
 def _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, slips):
     """(x, m, extra, resting, number of events) after the segments of a sample, see ``_segment``."""
     start, events = 0.0, 0
+    if now.is_near:
+        forgotten(maps)
     for i in range(cuts.ends.size):
         h, t = (cuts.ends[i] - start) * now.stretch, now.t + start * now.stretch
         start = cuts.ends[i]
         drive = now.now if cuts.fresh[i] == 1 else now.before
         if c.fall > 0 and c.tau_e > 0:
             drive = _fallen(c, t, x, m, drive, h)
-        if now.is_usual and now.closed and m.stop == 0:
-            e, step = (maps.late, cuts.last) if cuts.fresh[i] == 1 else (maps.early, cuts.ends[0])
+        if (now.is_usual or now.is_near) and now.closed and m.stop == 0:
+            e, step = over_segment(maps, c, m, cuts, cuts.fresh[i] == 1, now.is_usual, now.stretch)
             is_last = i == cuts.ends.size - 1
             done, x, extra, resting = _segment(e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips)
             if done:
@@ -301,7 +301,8 @@ def _sample(t, u, enable, load, c, cuts, k):
     """Sample k, which is not the last."""
     is_usual = abs(t[k + 1] - t[k] - cuts.h0) < 1e-6 * cuts.h0
     stretch = 1.0 if is_usual else (t[k + 1] - t[k]) / cuts.h0
-    return Sample(k, t[k], stretch, is_usual, enable[k], load[k], load[k + 1], c.b * u[k], c.b * u[k + 1])
+    near = not is_usual and is_near(c, stretch)
+    return Sample(k, t[k], stretch, is_usual, near, enable[k], load[k], load[k + 1], c.b * u[k], c.b * u[k + 1])
 
 
 @inline
@@ -381,10 +382,8 @@ def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
     """
     c, h0 = plant_in(plant), t[1] - t[0]
     cuts = cut(c, h0, refine)
-    late = no_maps()
-    early = late if cuts.fresh[0] == 1 else no_maps()
     leaps = c.two_body > 0 and not has_bristle(c) and c.harden <= 0 and c.fall <= 0
     leaps = leaps and cuts.ends.size > 1 and cuts.fresh[0] == 1
     leaps = leaps and (c.lawful == 0 or refine * h0 <= law_step(c, c.a_emf))
-    whole = no_maps() if leaps else late
-    return _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, Maps(late, early, whole), leaps, out)
+    maps = room(cuts.fresh[0] != 1, leaps, jitters(t, h0))
+    return _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps, out)

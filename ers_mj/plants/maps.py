@@ -86,13 +86,13 @@ def no_maps():
 
 
 @inline
-def _number(m):
+def number(m):
     """Of the map over a step in the mode m; that over half of it lies MODES_APART further."""
     return 9 * (m.s + 1) + 3 * (m.s_m + 1) + m.twist + 1
 
 
 @inline
-def _make(e, n, c, m, tau, a_emf, step, driven):
+def made(e, n, c, m, tau, a_emf, step, driven):
     """Fill in the map n over a step in the mode m, where it was not made before."""
     if e[n, 0, 0] != e[n, 0, 0]:
         fill_map(e, n, c, Mode(m.s, 0, 0, m.s_m, m.twist), tau, a_emf, step, driven)
@@ -101,8 +101,8 @@ def _make(e, n, c, m, tau, a_emf, step, driven):
 @inline
 def map_of(e, c, m, step):
     """Number of the map over a step of one body in the mode m, made where it was not before."""
-    n = _number(m)
-    _make(e, n, c, m, c.tau_e, c.a_emf, step, False)
+    n = number(m)
+    made(e, n, c, m, c.tau_e, c.a_emf, step, False)
     return n
 
 
@@ -190,11 +190,11 @@ def one_body_segment(e, step, c, t, x, m, drive, tau, a_emf, load, h, extra_now)
     """The state of one body that slips a whole segment later if no event falls into it, and what the laws add there;
     ``extra_now`` is what they add at its beginning (NaN: unknown). ``e`` holds maps over a ``step`` (see no_maps).
     """
-    n = _number(m)
-    _make(e, n, c, m, tau, a_emf, step, False)
+    n = number(m)
+    made(e, n, c, m, tau, a_emf, step, False)
     if c.lawful == 0:
         return _mapped_one(e, n, x, drive, m.side, _constant(load)), np.nan
-    _make(e, n + MODES_APART, c, m, tau, a_emf, step / 2, False)
+    made(e, n + MODES_APART, c, m, tau, a_emf, step / 2, False)
     begin = load + (extra_now if extra_now == extra_now else extra(c, load, t, x, m.s))
     z = _mapped_one(e, n + MODES_APART, x, drive, m.side, _constant(begin))
     middle = load + extra(c, load, t + 0.5 * h, z, m.s)
@@ -236,11 +236,11 @@ def two_body_segment(e, step, c, t, x, m, drive, tau, a_emf, load, h):
         c.bias = bias
         return z
     driven = c.lawful > 0 and not has_bristle(c)
-    n = _number(m)
-    _make(e, n, c, m, tau, a_emf, step, driven)
+    n = number(m)
+    made(e, n, c, m, tau, a_emf, step, driven)
     if (c.lawful == 0 and (has_bristle(c) or c.harden <= 0)) or (has_bristle(c) and m.s == 0):
         return _mapped_two(e, n, x, drive, m.side, _constant(load))
-    _make(e, n + MODES_APART, c, m, tau, a_emf, step / 2, driven)
+    made(e, n + MODES_APART, c, m, tau, a_emf, step / 2, driven)
     if has_bristle(c):
         return _bristle_segment(e, n, c, t, x, m, drive, load, h)
     return _parted_segment(e, n, c, t, x, m, drive, load, h)
