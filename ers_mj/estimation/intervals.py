@@ -1,7 +1,7 @@
 """Intervals that survive model error: a jackknife over recordings and a sandwich over blocks.
 
-What is too small to be found moves the parameters as well, further than the noise does: ``unseen_spread`` tells how
-far.
+What is too small to be found moves the parameters as well, further than the noise does, and so does what is missing:
+``unseen_shifts`` tells how far.
 
 (J^T J)^-1 takes neighbouring residuals for independent; a model error is anything but that. The jackknife sees what
 differs between recordings, but a refit may rest in the local minimum of the cost where it begins, and then says
@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from ers_mj.data.prepared import Blocks, Trace
+from ers_mj.decisions.explained import attainable
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.jacobian import central_jacobian
 from ers_mj.estimation.objective import residuals
@@ -44,12 +45,17 @@ def slopes_of(model: Model, traces: Sequence[Trace]) -> np.ndarray:
     return central_jacobian(model, layout, model.vector(layout), traces, OBSERVER_RATE)
 
 
-def told_spread(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> np.ndarray:
-    """Covariance (k, k) of the model's transformed numbers times the square of its 95 % quantile, as it is told: that
-    of ``half_spread`` and that of ``unseen_spread``. The roots of its diagonal are the half-widths.
+def told_spreads(
+    model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance (k, k) of the model's transformed numbers times the square of its 95 % quantile: that of
+    ``half_spread`` and that of effects which act unseen, and the same as it is told, where these may be as large as
+    what the model leaves. The roots of its diagonal are the half-widths.
     """
-    jacobian = slopes_of(model, traces)
-    return half_spread(model, traces, left_out, tau, jacobian) + unseen_spread(model, traces, tau, jacobian)
+    jacobian, blocks = slopes_of(model, traces), Blocks.of(traces)
+    half, shifts = half_spread(model, traces, left_out, tau, jacobian), unseen_shifts(model, traces, tau, jacobian)
+    left = attainable(blocks.misfit(_left(model, traces)), blocks.counts, tau)
+    return half + spread_by(shifts, DOUBT.unseen_gain), half + spread_by(shifts, max(DOUBT.unseen_gain, left))
 
 
 def half_widths(model: Model, traces: Sequence[Trace], left_out: Sequence[Model], tau: float) -> np.ndarray:
@@ -110,29 +116,49 @@ def _is_in(effect: Effect, model: Model) -> bool:
     return any(model.values[name] > 0 for name in effect.absorbs)
 
 
-def unseen_spread(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray | None = None) -> np.ndarray:
-    """Spread (k, k) by effects of the library that act and are too small to be found: how far the numbers move
-    to make up for them.
+def unseen_spread(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
+    """Spread (k, k) by effects of the library that act and are too small to be found."""
+    return spread_by(unseen_shifts(model, traces, tau, slopes_of(model, traces)), DOUBT.unseen_gain)
 
-    Each effect's secant, at a size that would gain DOUBT.unseen_gain beside the model and never larger than its start,
-    shifts the numbers by what a fit makes of it; any effect is as likely as the next, DOUBT.unseen of them act. The
-    ``jacobian`` is as in ``half_spread``.
+
+@dataclass(frozen=True)
+class Shifts:
+    """How far effects (n,) that are not in a model move its numbers (n, k) at the size of one of their starts, what a
+    fit would gain by each of them there (n,), and how likely each start is beside others (n,).
+    """
+
+    moved: np.ndarray
+    gain: np.ndarray
+    share: np.ndarray
+
+
+def spread_by(shifts: Shifts, gain: float) -> np.ndarray:
+    """Spread (k, k) by effects at a size that would gain so much of C, and never larger than their starts; any is as
+    likely as the next, DOUBT.unseen of them act.
+    """
+    size = np.minimum(1.0, np.sqrt(gain / np.maximum(shifts.gain, 1e-12)))
+    moved = shifts.moved * (size * np.sqrt(shifts.share))[:, None]
+    return 1.96**2 * DOUBT.unseen * moved.T @ moved
+
+
+def unseen_shifts(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray) -> Shifts:
+    """How far the numbers move to make up for effects that act unseen: what a fit makes of each effect's secant. The
+    ``jacobian`` is ``slopes_of`` the model.
     """
     layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
-    jacobian = slopes_of(model, traces) if jacobian is None else jacobian
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     hessian = jacobian.T @ (weight[:, None] * jacobian)
     inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
-    shifts = []
+    found: list[list[tuple[np.ndarray, float]]] = []
     for effect in (e for e in BY_NAME.values() if not (e.name in model.names or e.once or _is_in(e, model))):
-        found = []
+        own = []
         for start in (starts := effect.starts(model.scales))[:1] + starts[1:][-1:]:
-            beside = model.with_effect(effect.name, start)
-            secant = residuals(beside, traces, OBSERVER_RATE) - e
+            secant = residuals(model.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
             if np.all(np.isfinite(secant)):
                 pull = jacobian.T @ (weight * secant)
                 apart = float(secant @ (weight * secant) - pull @ inverse @ pull)
-                found.append(inverse @ pull * min(1.0, np.sqrt(2.0 * DOUBT.unseen_gain / max(apart, 1e-12))))
-        if found:
-            shifts.append(np.mean([np.outer(shift, shift) for shift in found], axis=0))
-    return 1.96**2 * DOUBT.unseen * np.mean(shifts, axis=0) if shifts else np.zeros(2 * (len(layout),))
+                own.append((inverse @ pull, 0.5 * apart))
+        found += [own] if own else []
+    every = [(shift, gain, 1.0 / (len(own) * len(found))) for own in found for shift, gain in own]
+    moved, gains, shares = zip(*every) if every else ((), (), ())
+    return Shifts(np.array(moved).reshape(-1, len(layout)), np.array(gains), np.array(shares))

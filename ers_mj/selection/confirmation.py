@@ -16,7 +16,7 @@ from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit, polished
-from ers_mj.estimation.intervals import at_given, half_widths, told_spread, widths_of
+from ers_mj.estimation.intervals import at_given, half_widths, told_spreads, widths_of
 from ers_mj.estimation.objective import Fit, residuals_in
 from ers_mj.selection.comparison import stands_alone
 from ers_mj.selection.cross_validation import Fold, Score, folds, halves, pooled, recalibrated, refits, scored
@@ -100,7 +100,7 @@ class Court:
     parts: list[Fold] = field(init=False)
     sentence: str = field(init=False)
     _bases: dict[tuple[str, ...], tuple[Fit, list[Model]]] = field(init=False, default_factory=dict)
-    _wide: tuple[Model, np.ndarray] | None = field(init=False, default=None)
+    _wide: tuple[Model, np.ndarray, np.ndarray] | None = field(init=False, default=None)
 
     def __post_init__(self):
         self.parts, self.sentence = folds(self.start.traces, self.held)
@@ -225,20 +225,20 @@ class Court:
         at = [k for k in own if layout[k].name in sizes]
         if not at:
             return False
-        spread = at_given(self.spread(model, after_models), at, [k for k in own if k not in at])
+        spread = at_given(self.spreads(model, after_models)[0], at, [k for k in own if k not in at])
         ends = [layout[k].ends(z[k], width) for k, width in zip(at, widths_of(spread), strict=True)]
         signed = [n for n, k in enumerate(at) if not layout[k].positive]
         return decisions.are_no_sizes(ends, signed, z[at], spread, self.policy)
 
-    def spread(self, model: Model, after_models: Sequence[Model]) -> np.ndarray:
-        """Spread (k, k) of a model's numbers (estimation/intervals.py), the last model's kept; ``after_models`` are its
-        refits to each part, which tell it where each leaves one training recording out.
+    def spreads(self, model: Model, after_models: Sequence[Model]) -> tuple[np.ndarray, np.ndarray]:
+        """Spreads (k, k) of a model's numbers, and as they are told (estimation/intervals.py), the last model's kept;
+        ``after_models`` are its refits to each part, which tell it where each leaves one training recording out.
         """
         if self._wide is None or self._wide[0] is not model:
             left_out = after_models if self.parts[0].training is not None and len(after_models) > 2 else ()
             own = model.of_records(range(len(self.start.traces)))
-            self._wide = model, told_spread(own, self.start.traces, left_out, self.tau)
-        return self._wide[1]
+            self._wide = model, *told_spreads(own, self.start.traces, left_out, self.tau)
+        return self._wide[1:]
 
     def _halved(
         self, model: Model, less: Model, after: Sequence[Score], without: Sequence[Score]
@@ -281,7 +281,7 @@ class Court:
             shown += [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(*ends, cut)]
             sentence += f"; {traces[record].name}, which teaches most of an effect, by halves as well"
         without, p = ({name: getattr(one, of) for name, one in judged.items()} for of in ("without", "p"))
-        widths, measure = widths_of(self.spread(model, after_models)), self.measure
+        widths, measure = widths_of(self.spreads(model, after_models)[1]), self.measure
         return Confirmed(
             base, before, after, without, p, after_models, base_models, self.parts, sentence, shown, widths, measure
         )
