@@ -240,6 +240,14 @@ class Court:
             self._wide = model, *told_spreads(own, self.start.traces, left_out, self.tau)
         return self._wide[1:]
 
+    def widths(self, model: Model, after_models: Sequence[Model]) -> np.ndarray:
+        """95 % half-widths (k,) of a model's numbers as they are told: the plant's own may have been moved by whatever
+        is left; those of an effect are what its being there was asked by.
+        """
+        layout = model.of_records(range(len(self.start.traces))).layout()
+        asked, told = map(widths_of, self.spreads(model, after_models))
+        return np.where([f.owner in BY_NAME for f in layout], asked, told)
+
     def _halved(
         self, model: Model, less: Model, after: Sequence[Score], without: Sequence[Score]
     ) -> tuple[int, list[Score], list[Score]]:
@@ -281,7 +289,7 @@ class Court:
             shown += [(b, a, fold.held_out.sure_noise) for b, a, fold in zip(*ends, cut)]
             sentence += f"; {traces[record].name}, which teaches most of an effect, by halves as well"
         without, p = ({name: getattr(one, of) for name, one in judged.items()} for of in ("without", "p"))
-        widths, measure = widths_of(self.spreads(model, after_models)[1]), self.measure
+        widths, measure = self.widths(model, after_models), self.measure
         return Confirmed(
             base, before, after, without, p, after_models, base_models, self.parts, sentence, shown, widths, measure
         )
