@@ -118,6 +118,8 @@ def test_what_differs_between_training_recordings_is_told():
     assert document["verdict"] == "parameters_only" and document["missing"] == []
     assert "gain and friction level of its own in each recording" in document["sentence"]
     assert document["fit"]["train_rmse_after_rad"] < 1.1 * NOISE
+    low, high = document["parameters"]["b"]["ci95"]
+    assert low < TRUTH["b"] < high < 1.2 * low
 
 
 def test_a_true_datasheet_is_consistent():

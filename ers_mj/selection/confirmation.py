@@ -236,17 +236,16 @@ class Court:
         """
         if self._wide is None or self._wide[0] is not model:
             left_out = after_models if self.parts[0].training is not None and len(after_models) > 2 else ()
-            own = model.of_records(range(len(self.start.traces)))
-            self._wide = model, *told_spreads(own, self.start.traces, left_out, self.tau)
+            self._wide = model, *told_spreads(model, self.start.traces, left_out, self.tau)
         return self._wide[1:]
 
     def widths(self, model: Model, after_models: Sequence[Model]) -> np.ndarray:
         """95 % half-widths (k,) of a model's numbers as they are told: the plant's own may have been moved by whatever
         is left; those of an effect are what its being there was asked by.
         """
-        layout = model.of_records(range(len(self.start.traces))).layout()
         asked, told = map(widths_of, self.spreads(model, after_models))
-        return np.where([f.owner in BY_NAME for f in layout], asked, told)
+        widths = {f.key: (asked if f.owner in BY_NAME else told)[k] for k, f in enumerate(model.layout())}
+        return np.array([widths[f.key] for f in model.of_records(range(len(self.start.traces))).layout()])
 
     def _halved(
         self, model: Model, less: Model, after: Sequence[Score], without: Sequence[Score]
