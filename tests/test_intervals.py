@@ -5,15 +5,18 @@ from dataclasses import replace
 import numpy as np
 from servo import TRUTH, recorded, started
 
-from ers_mj.estimation.intervals import at_given, half_widths, unseen_spread, widths_of
+from ers_mj.estimation.intervals import DOUBT, at_given, half_widths, slopes_of, spread_by, unseen_shifts, widths_of
 
 
 def test_what_is_too_small_to_be_found_widens_the_intervals():
     faint = started(recorded([("quadratic_drag", np.array([0.02, np.inf]))]))
     model, layout = faint.fit.model, faint.fit.model.layout()
-    noise, unseen = half_widths(model, faint.traces, (), 1.0), widths_of(unseen_spread(model, faint.traces, 1.0))
+    noise = half_widths(model, faint.traces, (), 1.0)
+    shifts = unseen_shifts(model, faint.traces, 1.0, slopes_of(model, faint.traces))
+    unseen = widths_of(spread_by(shifts, DOUBT.unseen_gain))
     off = np.abs(model.vector(layout) - replace(model, values={**model.values, **TRUTH}).vector(layout))
     assert np.all(unseen > 0) and np.all(off < 2.0 * np.hypot(noise, unseen))
+    assert np.all(widths_of(spread_by(shifts, 100.0)) > unseen)  # as where much is left
 
 
 def test_what_is_held_widens_nothing():

@@ -33,9 +33,8 @@ class Findings(Protocol):
     ``names`` are the effects of the model, ``sensors`` those that show in the data itself, ``suspects`` the laws
     without a name that act here; ``recordings_differ`` says that what is held out has a gain, an offset or a friction
     level of its own, which nothing else tells; ``explained`` is the share of the squared held-out error that goes with
-    the names,
-    ``left_before`` and ``left`` what memory tells without and with them, ``left_elsewhere`` the same in the recordings
-    but the worst, ``free_held`` the held-out error after and ``least_astray`` the smallest of a recording
+    the names, ``left_before`` and ``left`` what memory tells without and with them, ``left_elsewhere`` the same in the
+    recordings but the worst, ``free_held`` the held-out error after and ``least_astray`` the smallest of a recording
     before, in noise levels; ``datasheet_explains`` whether the datasheet as it stands does.
     """
 

@@ -116,11 +116,6 @@ def _is_in(effect: Effect, model: Model) -> bool:
     return any(model.values[name] > 0 for name in effect.absorbs)
 
 
-def unseen_spread(model: Model, traces: Sequence[Trace], tau: float) -> np.ndarray:
-    """Spread (k, k) by effects of the library that act and are too small to be found."""
-    return spread_by(unseen_shifts(model, traces, tau, slopes_of(model, traces)), DOUBT.unseen_gain)
-
-
 @dataclass(frozen=True)
 class Shifts:
     """How far effects (n,) that are not in a model move its numbers (n, k) at the size of one of their starts, what a
