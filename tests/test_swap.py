@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo import SPARSE, Watched, all_but, alone, bench_of, having, recorded, started
+from servo import SPARSE, TRUTH, Watched, all_but, alone, bench_of, having, recorded, started
 
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import fit
@@ -137,6 +137,17 @@ def test_a_late_reading_without_a_lag_gives_way_to_the_delay_that_it_is():
     assert found.model.names == ("input_delay",) and rounds[0][0].name == "input_delay"
     assert dict(found.model.effects)["input_delay"][0] == pytest.approx(0.006, rel=0.02)
     assert as_what_it_is(bench, found, rounds) is None
+
+
+@pytest.mark.parametrize("law, p, is_flat", [("bias_torque", [6.0], True), ("gravity_imbalance", [5.0, -6.0], False)])
+def test_a_weight_whose_torque_does_not_change_along_the_travel_is_a_constant_torque(law, p, is_flat):
+    free = {**TRUTH, "a_1": 0.0, "c_1": 0.0, "theta_0": 0.0}
+    start = started(recorded([(law, np.array(p))], values=free, names=("multisine", "chirp"), t=SPARSE), values=free)
+    bench, weight = bench_of(start), alone(start, "gravity_imbalance", [0.5, -6.0])
+    other = as_what_it_is(bench, weight.fit, [(weight,)])
+    assert (other is not None) == is_flat
+    if is_flat:
+        assert dict(other[0].model.effects)["bias_torque"][0] == pytest.approx(6.0, rel=0.01)
 
 
 def test_an_effect_ends_in_the_narrowest_form_that_does_as_well():

@@ -12,7 +12,7 @@ from ers_mj.plants.state import MODES, VECTOR, F, has_bristle, types
 
 # where the inductance falls with the current: length of a segment over the electrical time constant, and how many there
 # are in a sample at most, since what a far shorter one changes by falling is little
-FALL_STEP = 0.1, 40
+FALL_STEP = 0.3, 12
 LAW_STEP = 0.12  # mechanical rate [1/s] times segment length under a law
 SLOWEST = 1e-6  # [1/s] rate at least, of a plant without spring and damping
 CREEP_STEP = 0.7  # rate [1/s] of friction that creeps times segment length

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ers_mj.effects.base import LEAST_IRON
 from ers_mj.plants.calm import is_plain, rests_on, slips_on, written
 from ers_mj.plants.checks import is_calm, is_clean, is_steady, is_still, linear_part, may_turn, turns
 from ers_mj.plants.compiled import inline, kernel, unit
@@ -30,8 +29,8 @@ from ers_mj.plants.events import (
     switch,
     violation,
 )
+from ers_mj.plants.falling import charged, fallen
 from ers_mj.plants.flow import is_linear
-from ers_mj.plants.forces import derivative
 from ers_mj.plants.laws import remember
 from ers_mj.plants.maps import one_body_segment, two_body_segment
 from ers_mj.plants.modes import corrected, start_mode, start_state
@@ -50,7 +49,6 @@ from ers_mj.plants.state import (
     State,
     X,
     bends,
-    drive_speed,
     has_bristle,
     is_bounded,
     never_sticks,
@@ -151,26 +149,6 @@ def advance(c, t, x, m, drive, tau, a_emf, dt, h_max, corner):
 
 
 @inline
-def faster(c, j):
-    """How much faster, in shares, a current rises whose inductance falls: the iron keeps LEAST_IRON of it."""
-    return min((c.fall * j) ** 2, 1.0 / LEAST_IRON - 1.0)
-
-
-@unit(F(C, F, X, M, F, F))
-def _fallen(c, t, x, m, drive, h):
-    """The constant drive under which a current whose inductance does not fall comes as far within h as one whose
-    inductance does under ``drive``, with the back-EMF of the segment's middle and what the inductance has fallen to
-    there.
-    """
-    d = derivative(c, t, x, m, drive, c.tau_e, c.a_emf)
-    speed = drive_speed(c, x) + 0.5 * h * drive_speed(c, d)
-    short, rate = x.j - (drive - c.a_emf * speed), h / c.tau_e
-    middle = x.j + short * (math.exp(-0.5 * rate * (1.0 + faster(c, x.j))) - 1.0)
-    kept = math.exp(-rate)
-    return drive + short * (math.exp(-rate * (1.0 + faster(c, middle))) - kept) / (1.0 - kept)
-
-
-@inline
 def _at_rest(c, t, x, m, drive, tau, load, h, is_checked):
     """(whether one body stays at rest over h, the state then; as it begins where it does not). The beginning was
     looked at where ``is_checked``.
@@ -251,7 +229,7 @@ def _segment(e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips)
     if c.two_body > 0:
         done, x = _of_two_bodies(e, step, c, t, x, m, drive, tau, a_emf, load, h)
     elif m.s == 0:
-        done, x = _at_rest(c, t, x, m, drive, tau, load, h, tau > 0 and resting == now.k)
+        done, x = _at_rest(c, t, x, m, drive, tau, load, h, tau > 0 and c.fall <= 0 and resting == now.k)
         if done:
             resting = now.k + 1 if is_last and now.next_load == load else now.k
     else:
@@ -281,17 +259,19 @@ def _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, s
     for i in range(cuts.ends.size):
         h, t = (cuts.ends[i] - start) * now.stretch, now.t + start * now.stretch
         start = cuts.ends[i]
-        drive = now.now if cuts.fresh[i] == 1 else now.before
+        drive, further = now.now if cuts.fresh[i] == 1 else now.before, 0.0
         if c.fall > 0 and c.tau_e > 0:
-            drive = _fallen(c, t, x, m, drive, h)
+            drive, further = fallen(c, t, x, m, drive, h)
         if (now.is_usual or now.is_near) and now.closed and m.stop == 0:
             e, step = over_segment(maps, c, m, cuts, cuts.fresh[i] == 1, now.is_usual, now.stretch)
             is_last = i == cuts.ends.size - 1
             done, x, extra, resting = _segment(e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips)
             if done:
+                x = charged(x, further)
                 continue
         extra = np.nan
         x, m, more = _through_events(c, now, t, x, m, drive, h, h_max, corner)
+        x = charged(x, further)
         events += more
     return x, m, extra, resting, events
 

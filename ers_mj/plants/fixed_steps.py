@@ -18,7 +18,7 @@ import numpy as np
 from ers_mj.plants.bristle import bent, bristle_damping
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import split_delay
-from ers_mj.plants.event_integrator import faster
+from ers_mj.plants.falling import faster
 from ers_mj.plants.forces import LEAST_LEVEL, PAIR, motor_level, stop_at
 from ers_mj.plants.laws import drive_torque, friction_level, remember, total_torque
 from ers_mj.plants.state import READ, READ_BOOL, TABLE, VECTOR, C, F, L, N, is_bounded, plant_in, types

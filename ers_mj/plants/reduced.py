@@ -19,14 +19,9 @@ from ers_mj.plants.state import N_CONSTANTS
 from ers_mj.plants.tangents import NUDGE, prepare, tangent
 
 EVENT = 1.1  # [us] that an event takes
-PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT = (
-    150,
-    400,
-    800,
-    2000,
-    60,
-)  # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on
-# a bristle, of both; of a tangent
+# [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on a bristle, of both; of a
+# tangent; and how much more where the inductance falls with the current
+PLAIN, LAW, TWO_BODIES, FIXED_STEPS, TANGENT, FALLING = 150, 400, 800, 2000, 60, 1500
 
 
 def lumped(values: Mapping[str, float]) -> Coefficients:
@@ -310,7 +305,9 @@ class ReducedModel:
         """[us] that a simulated second takes."""
         if self.bends and self.has_motor_side:
             return FIXED_STEPS
-        return TWO_BODIES if self.coupled else LAW if self._lowered[1].pushes else PLAIN
+        price = TWO_BODIES if self.coupled else LAW if self._lowered[1].pushes else PLAIN
+        c = self._with_effects
+        return price + (FALLING if c.fall > 0 and c.tau_e > 0 else 0)
 
     def count_outputs(self, t: np.ndarray, followed: bool, beyond: int) -> None:
         """Count what ``priced`` along t (N,) would have simulated, as an observer where ``followed``."""

@@ -189,15 +189,18 @@ def narrowed(bench: Bench, current: Fit) -> Fit:
 
 def as_what_it_is(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate, ...]]) -> Grown | None:
     """The model with the effect itself in the place of one whose numbers are a form of it (see Effect.really), and the
-    rounds led by it, where that is as good; None where nothing is.
+    rounds led by it, where that is as good, or better where it is one that does not change along the travel (see
+    Effect.curves); None where nothing is.
     """
     for name in current.model.names:
-        other, without = really(name, current), current.model.without_effect(name)
+        without, flat = current.model.without_effect(name), BY_NAME[name].curves
+        is_it, other = really(name, current) != name, really(name, current)
+        other = other if is_it or not flat else flat
         if other in current.model.names:
             continue
         begun = (without.with_effect(other, start) for start in BY_NAME[other].starts(without.scales))
         found = min((bench.fit(model, 20) for model in begun), key=bench.priced, default=None)
-        if found is None or bench.priced(found) > bench.priced(current) + bench.policy.tie:
+        if found is None or bench.priced(found) > bench.priced(current) + (bench.policy.tie if is_it else 0.0):
             continue
         one = bench.judged(other, found, bench.fit(without, 20))
         return found, [
