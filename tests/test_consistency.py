@@ -119,6 +119,17 @@ def test_of_held_samples_the_fresh_ones_count(drive, put, period):
     np.testing.assert_array_equal(record.u, drive["u_V"][::period])
 
 
+@pytest.mark.parametrize("lost", [True, False])
+def test_held_samples_keep_step_with_the_clock_where_rows_are_lost_or_blank(drive, put, lost):
+    fresh = 2 * (np.arange(N) // 2)
+    theta, is_there = drive["theta_rad"][fresh], np.random.default_rng(1).random(N) > 0.01
+    left = np.flatnonzero(is_there) if lost else np.arange(N)
+    table = drive | {"theta_rad": np.where(is_there | lost, theta, np.nan)}
+    record = read_recording(put({name: x[left] for name, x in table.items()}))
+    assert "held" in kinds(record)
+    np.testing.assert_array_equal(record.t[record.valid], drive["t_s"][is_there & (fresh == np.arange(N))])
+
+
 def test_a_clock_of_its_own_refreshes_a_column_out_of_step(drive, put):
     taken = np.floor(np.arange(N) / 5.3) * 5.3
     theta = np.interp(taken, np.arange(N), drive["theta_rad"] + 1e-3 * np.sin(np.arange(N)))

@@ -62,3 +62,11 @@ def test_a_rudder_that_is_thrown_from_rest_had_no_speed():
         ]
     )  # noise levels
     assert start_seen(t, 1.36e-4 * through_a_shaft, 1.36e-4) == (0.0, 0.0)
+
+
+def test_few_samples_of_a_fast_motion_do_not_refuse_rest():
+    """A throttle thrown from rest, its angle refreshed every 20 ms: no polynomial comes near."""
+    t = 0.02 * np.arange(8)
+    thrown = np.array([0.2562, 0.4258, 0.6724, 0.7906, 0.8065, 0.8055, 0.8051, 0.8050])  # rad
+    assert start_seen(t, thrown, 8e-4) == (0.0, 0.0)
+    assert start_seen(t, 0.2562 + 5.0 * t + 0.02 * np.sin(300.0 * t), 8e-4)[0] > 3.0

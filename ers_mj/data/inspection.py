@@ -155,7 +155,7 @@ def _channel(name: str, x: np.ndarray, record: Recorded) -> Channel:
     x = np.asarray(x, float)
     known = x[np.isfinite(x)]
     step = float(np.median(np.diff(record.t)))
-    rows = fresh_rows(x)
+    rows = fresh_rows(x, record.t)
     held = float(np.median(np.diff(rows))) if rows is not None else 1.0
     quantum = record.quantum if x is record.y else (converter_step(known) if known.size else 0.0)
     ends = sum(s.stop - s.start for s in held_spans(x) if x[s.start] in (np.min(known), np.max(known)))

@@ -286,6 +286,7 @@ def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float
     Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no
     more than their noise; the best one where none does. A speed against which the very first samples go, or the whole
     head without one sample that goes along, is none: it is how a polynomial meets a rudder that is thrown from rest.
+    Where none meets the samples, as few of a fast motion, rest is allowed if one without a speed is hardly worse.
     """
     known = np.isfinite(y)
     return _start_seen((t[known] - t[0]).tobytes(), y[known].tobytes(), sigma)
@@ -297,17 +298,21 @@ def _start_seen(times: bytes, outputs: bytes, sigma: float) -> tuple[float, floa
     t, y = np.frombuffer(times), np.frombuffer(outputs)
     if t.size < BEGINNING.fewest_seen:
         return 0.0, 0.0
-    found = []
+    found, at_rest = [], []
     for n in {max(t.size // part, BEGINNING.fewest_seen) for part in (1, 2, 4, 8)}:
         for degree in range(1, min(n - 3, 6)):
             design = np.vander(t[:n] / t[n - 1], degree + 1, increasing=True)
             coefficient, *_ = np.linalg.lstsq(design, y[:n], rcond=None)
             missed = math.sqrt(float(np.sum((y[:n] - design @ coefficient) ** 2)) / (n - degree - 1)) / sigma
             reach = BEGINNING.sure * max(missed, 1.0) * sigma * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+            still, *_ = np.linalg.lstsq(rest := np.delete(design, 1, axis=1), y[:n], rcond=None)
+            at_rest.append(math.sqrt(float(np.sum((y[:n] - rest @ still) ** 2)) / (n - degree)) / sigma)
             found.append(
                 (missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1])
             )
-    enough = max(1.0, min(missed for missed, *_ in found))
+    enough = max(1.0, best := min(missed for missed, *_ in found))
+    if best > BEGINNING.sure and min(at_rest) < BEGINNING.sure * best:
+        return 0.0, 0.0
     low, high = (
         pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:])
     )

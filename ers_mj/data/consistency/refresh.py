@@ -34,7 +34,7 @@ def held(sheet: Sheet) -> Found:
     its own fresh rows.
     """
     faults = []
-    rows = fresh_rows(sheet.y)
+    rows = fresh_rows(sheet.y, sheet.t)
     if rows is not None:
         period, step = float(np.median(np.diff(rows))), float(np.median(np.diff(sheet.t)))
         column = sheet.labels["y"]
@@ -50,7 +50,7 @@ def held(sheet: Sheet) -> Found:
         faults.append(sheet.fault("held", "y", np.setdiff1d(np.arange(sheet.t.size), rows), sentence))
         sheet = _thinned(sheet, rows)
     for field in ("omega", "current", "theta_m", "second"):
-        if field not in sheet.fields or (own := fresh_rows(sheet.fields[field])) is None:
+        if field not in sheet.fields or (own := fresh_rows(sheet.fields[field], sheet.t)) is None:
             continue
         stale = np.ones(sheet.t.size, bool)
         stale[own] = False
@@ -61,25 +61,34 @@ def held(sheet: Sheet) -> Found:
     return sheet, faults
 
 
-def fresh_rows(x: np.ndarray) -> np.ndarray | None:
-    """The rows in which x (N,) is measured anew; None where it may be so in every row."""
+def fresh_rows(x: np.ndarray, t: np.ndarray) -> np.ndarray | None:
+    """The rows in which x (N,) at the times t (N,) is measured anew; None where it may be so in every row."""
     known = np.flatnonzero(np.isfinite(x))
     change = np.diff(x[known])
     at = known[1:][change != 0.0]
-    if at.size < REFRESH.fewest or 2 * at.size > known.size:
+    ticks = _ticks(t)
+    if at.size < REFRESH.fewest or 2 * at.size > ticks[-1] + 1:
         return None
     finest = 1e-6 * float(np.ptp(x[known]))
     if np.unique(np.rint(np.abs(change[change != 0.0]) / finest)).size < REFRESH.sizes:
         return None
-    return _beating(at) if (rows := _locked(at, x.size)) is None else rows
+    return _beating(at) if (rows := _locked(at, ticks)) is None else rows
 
 
-def _locked(at: np.ndarray, count: int) -> np.ndarray | None:
-    """Every so many rows, where the changes keep step with the log."""
-    for n in range(min(REFRESH.longest, count // REFRESH.fewest), 1, -1):
-        phases = np.bincount(at % n)
+def _ticks(t: np.ndarray) -> np.ndarray:
+    """Which tick of the log's clock each of the times t (N,) is, those of lost rows counted."""
+    step = float(np.median(np.diff(t)))
+    near = np.cumsum(np.maximum(np.rint(np.diff(t, prepend=t[0] - step) / step), 1.0))
+    step = float(np.polyfit(near, t, 1)[0])
+    return np.rint((t - t[0]) / step).astype(int)
+
+
+def _locked(at: np.ndarray, ticks: np.ndarray) -> np.ndarray | None:
+    """The rows of every so many ticks (N,), where the changes keep step with the log."""
+    for n in range(min(REFRESH.longest, ticks.size // REFRESH.fewest), 1, -1):
+        phases = np.bincount(ticks[at] % n)
         if np.max(phases) >= REFRESH.locked * at.size:
-            return np.arange(int(np.argmax(phases)), count, n)
+            return np.flatnonzero(ticks % n == int(np.argmax(phases)))
     return None
 
 
