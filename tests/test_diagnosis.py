@@ -16,6 +16,7 @@ from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.model_file import write_model
 
 T = np.arange(0.0, 3.0, 2e-3)
+COARSE = T[::4]  # where the point of a test needs no more
 INPUT = ("multisine", "steps")
 TRUTH = {
     "a_1": 25.0,
@@ -31,14 +32,14 @@ NOISE = 1.5e-4
 ONE = replace(POLICY, most_effects=1)  # where one round of the selection tells what is tested
 
 
-def recordings(effects=(), sensor=lambda y: y):
+def recordings(effects=(), sensor=lambda y: y, t=T):
     """Recordings of a servo that is not quite Table 1's."""
     out = []
     for k, name in enumerate(INPUT):
-        u = np.round(INPUTS[name](T), 4)
-        y = ReducedModel(lumped(TRUTH), effects).simulate(T, u).measured
-        y = sensor(y + NOISE * np.random.default_rng(k).standard_normal(T.size))
-        out.append(from_arrays(T, u, y, name=f"{name}.csv"))
+        u = np.round(INPUTS[name](t), 4)
+        y = ReducedModel(lumped(TRUTH), effects).simulate(t, u).measured
+        y = sensor(y + NOISE * np.random.default_rng(k).standard_normal(t.size))
+        out.append(from_arrays(t, u, y, name=f"{name}.csv"))
     return out
 
 
@@ -107,10 +108,11 @@ def test_a_servo_with_other_numbers_is_not_missing_physics():
 
 def test_what_differs_between_training_recordings_is_told():
     """A gain and a friction of another day, which no model of both recordings has."""
-    first, second = recordings()
+    t = np.arange(0.0, 3.0, 5e-3)
+    first, second = recordings(t=t)
     changed = TRUTH | {"b": 1.1 * TRUTH["b"], "c_2": 0.85 * TRUTH["c_2"]}
-    y = ReducedModel(lumped(changed)).simulate(T, second.u).measured
-    second = replace(second, y=y + NOISE * np.random.default_rng(5).standard_normal(T.size))
+    y = ReducedModel(lumped(changed)).simulate(t, second.u).measured
+    second = replace(second, y=y + NOISE * np.random.default_rng(5).standard_normal(t.size))
     document = diagnose([first, second], read_datasheet("table1"), jobs=2).document
     states = {state["name"]: state["values"] for state in document["record_state"]}
     assert states["gain"] == pytest.approx([1.0, 1.1], abs=0.02)
@@ -144,7 +146,7 @@ def test_a_stand_in_is_not_named_where_a_law_without_a_name_explains_more(dead_z
     """A motor whose iron saturates is no sagging supply, which takes two thirds of it; a dead zone is no form of such a
     law.
     """
-    iron = recordings([("torque_saturation", np.array([0.15, 24.0]))])
+    iron = recordings([("torque_saturation", np.array([0.15, 24.0]))], t=T[:1000])
     document = diagnose(iron, read_datasheet("table1"), policy=ONE).document
     assert (document["verdict"], document["missing"]) == ("unexplained", [])
     assert [s["effect"] for s in document["suspects"][:2]] == ["torque_saturation", "supply_sag"]
@@ -157,14 +159,14 @@ def test_a_stand_in_is_not_named_where_a_law_without_a_name_explains_more(dead_z
 
 
 def test_without_a_datasheet_everything_is_identified():
-    document = diagnose(recordings(), None).document
+    document = diagnose(recordings(t=COARSE), None).document
     assert document["verdict"] != "consistent"
     assert document["parameters"]["b"]["value"] == pytest.approx(TRUTH["b"], rel=0.1)
 
 
 def acting(*per_record):
     """Recordings in each of which other effects act."""
-    return [recordings(effects)[k] for k, effects in enumerate(per_record)]
+    return [recordings(effects, t=COARSE)[k] for k, effects in enumerate(per_record)]
 
 
 def test_a_gust_has_a_phase_of_its_own_in_every_recording():
