@@ -57,7 +57,9 @@ def _serve() -> None:
     import atexit
     import traceback
 
-    import numba  # noqa: F401  what all of them have
+    import numba  # what all of them have
+
+    numba.njit("f8(f8)")(lambda x: x)  # with what numba loads when it first compiles
 
     for line in sys.stdin:
         if (child := os.fork()) == 0:

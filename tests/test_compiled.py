@@ -48,22 +48,26 @@ def home(tmp_path):
     return tmp_path
 
 
-def run(home, program, **more):
-    """What a process of its own says, and what it complains of: a fresh one where numba is told to be otherwise."""
-    environment = {
-        **os.environ,
-        "XDG_CACHE_HOME": str(home / "cache"),
-        "PYTHONPATH": f"{ROOT}{os.pathsep}{home}",
-        **more,
-    }
+WITHOUT_JIT = {"NUMBA_DISABLE_JIT": "1"}
+
+
+def process(folder, program, **more):
+    """(exit status, what it says, what it complains of) of a process of its own: a fresh one where numba is told to be
+    otherwise.
+    """
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{folder}", **more}
     program = textwrap.dedent(program)
     if any(name.startswith("NUMBA") for name in more):
         done = subprocess.run(
-            [sys.executable, "-c", program], env=environment, cwd=home, capture_output=True, text=True
+            [sys.executable, "-c", program], env=environment, cwd=folder, capture_output=True, text=True
         )
-        status, told, said = done.returncode, done.stdout, done.stderr
-    else:
-        status, told, said = warm().run(program, home, environment)
+        return done.returncode, done.stdout, done.stderr
+    return warm().run(program, folder, environment)
+
+
+def run(home, program, **more):
+    """What a process with a cache of its own says, and what it complains of."""
+    status, told, said = process(home, program, XDG_CACHE_HOME=str(home / "cache"), **more)
     assert status == 0, said
     return told.strip(), said
 
@@ -95,7 +99,7 @@ ASK = "import small; print(small.highest(5.0))"
 
 def test_units_call_each_other_and_the_plain_functions_agree(home):
     write(home, "K * x + 1.0")
-    assert run(home, ASK)[0] == run(home, ASK, NUMBA_DISABLE_JIT="1")[0] == "42.0"
+    assert run(home, ASK)[0] == run(home, ASK, **WITHOUT_JIT)[0] == "42.0"
     assert len(kept(home)) == 3
     before = kept(home)
     assert run(home, ASK)[0] == "42.0" and kept(home) == before
@@ -136,9 +140,9 @@ def test_the_importing_of_plants_compiles_nothing(home):
 
 def test_an_error_of_a_unit_comes_up(home):
     write(home, "1.0 / (x - 5.0)")
-    for jit in ("0", "1"):
+    for more in ({}, WITHOUT_JIT):
         ask = f"import small\ntry:\n    {ASK.split('; ')[1]}\nexcept ZeroDivisionError:\n    print('raised')"
-        assert run(home, ask, NUMBA_DISABLE_JIT=jit)[0] == "raised"
+        assert run(home, ask, **more)[0] == "raised"
 
 
 LAW = """
@@ -160,25 +164,21 @@ t = np.linspace(0.0, {end}, 20)
 """
 
 
-@pytest.mark.parametrize("jit", ["0", "1"])
-def test_a_law_that_fails_says_so(jit):
+@pytest.mark.parametrize("more", [{}, WITHOUT_JIT], ids=["compiled", "plain"])
+def test_a_law_that_fails_says_so(tmp_path, more):
     program = LAW.format(law="1.0 / (p[0] - 1.0)", end=0.1) + "model.simulate(t, np.ones(20))"
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_DISABLE_JIT": jit}
-    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
-    assert done.returncode != 0 and "ZeroDivisionError" in done.stderr
+    status, _, said = process(tmp_path, program, **more)
+    assert status != 0 and "ZeroDivisionError" in said
 
 
-def test_an_edited_law_is_run_and_leaves_the_kernels_as_they_are():
-    answers, said = {}, []
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+def test_an_edited_law_is_run_and_leaves_the_kernels_as_they_are(tmp_path):
+    answers, heard = {}, []
     for law in ("-p[0] * w", "-2.0 * p[0] * w", "-p[0] * w"):
         program = LAW.format(law=law, end=0.1) + "print(model.simulate(t, np.ones(20)).theta[-1].hex())"
-        done = subprocess.run(
-            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
-        )
-        assert answers.setdefault(law, done.stdout) == done.stdout
-        said.append(done.stderr)
-    assert not any("compiling" in text for text in said[1:])  # the first one may find an empty cache
+        status, told, said = process(tmp_path, program)
+        assert status == 0 and answers.setdefault(law, told) == told
+        heard.append(said)
+    assert not any("compiling" in text for text in heard[1:])  # the first one may find an empty cache
     assert len(set(answers.values())) == 2
 
 
@@ -195,14 +195,12 @@ def test_a_model_goes_to_another_process_without_an_address(tmp_path):
         "import pickle, numpy as np\nmodel = pickle.load(open('model.pickle', 'rb'))\n"
         "print(model.simulate(np.linspace(0.0, 0.1, 50), np.ones(50)).theta.tobytes().hex())"
     )
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", program], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert bytes.fromhex(done.stdout) == here.tobytes()
+    status, told, said = process(tmp_path, program)
+    assert status == 0, said
+    assert bytes.fromhex(told) == here.tobytes()
 
 
-def test_what_is_compiled_without_jit_moves_alike():
+def test_what_is_compiled_without_jit_moves_alike(tmp_path):
     program = """
     import numpy as np
     from ers_mj.plants.reduced import ReducedModel, lumped
@@ -212,15 +210,9 @@ def test_what_is_compiled_without_jit_moves_alike():
     for effects in ([], [("stribeck", np.array(stribeck))], [("backlash", np.array(backlash))]):
         print(ReducedModel(c, effects).simulate(t, 3.0 * np.sin(40.0 * t)).theta.tobytes().hex())
     """
-    told = []
-    for jit in ("0", "1"):
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_DISABLE_JIT": jit}
-        done = subprocess.run(
-            [sys.executable, "-c", textwrap.dedent(program)], env=environment, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        told.append(done.stdout)
-    assert told[0] == told[1]
+    (status, compiled, said), (_, plain, _) = (process(tmp_path, program, **more) for more in ({}, WITHOUT_JIT))
+    assert status == 0, said
+    assert compiled == plain
 
 
 def test_a_fingerprint_tells_code_and_numbers_but_no_place():
