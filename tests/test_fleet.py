@@ -4,6 +4,7 @@ stopped.
 
 import csv
 import json
+import math
 import os
 import subprocess
 import sys
@@ -23,15 +24,18 @@ from ers_mj.workers.hiring import crew
 ROOT = Path(__file__).resolve().parents[1]
 
 
+DECAY = math.exp(-40.0 / 100.0)  # of the speed in a sample
+
+
 def record(path, seed, samples=110):
-    """A servo under steps at 100 Hz, with noise."""
+    """A servo of 60 rad/s^2/V and 40 1/s under steps at 100 Hz, with noise."""
     random, rows = np.random.default_rng(seed), ["t_s,u_V,theta_rad"]
     theta = omega = 0.0
     for k in range(samples):
         u = 4.0 * ((k // 20) % 2) - 2.0
         rows.append(f"{k / 100:.2f},{u},{theta + 1e-4 * random.standard_normal():.6f}")
-        omega += 0.01 * (60.0 * u - 40.0 * omega)
-        theta += 0.01 * omega
+        theta += 0.01 * 1.5 * u + (omega - 1.5 * u) * (1.0 - DECAY) / 40.0
+        omega = 1.5 * u + (omega - 1.5 * u) * DECAY
     path.write_text("\n".join(rows) + "\n")
 
 
