@@ -36,7 +36,7 @@ def arrays(input: str = "multisine", seed: int = 0) -> dict:
 def found():
     """A quick diagnosis of a drive that swallows 0.3 V."""
     told = []
-    runs = [ers.from_arrays(**arrays(), name="a"), ers.from_arrays(**arrays("steps", 1), name="b")]
+    runs = [ers.from_arrays(**arrays(), name="a"), ers.from_arrays(**arrays("ramp", 1), name="b")]
     result = ers.diagnose(runs, "table1", quick=True, progress=lambda text, share: told.append(share))
     assert told and all(0 <= share <= 1 for share in told)
     return result
@@ -111,7 +111,7 @@ def test_ten_lines_from_arrays_to_margins_and_mujoco(found, monkeypatch, capsys)
     monkeypatch.setattr(ers, "diagnose", lambda *args, **options: asked.append((args, options)) or found)
     a = arrays()
     exec(
-        TEN_LINES, {"t": a["t"], "theta": a["theta_rad"], "u": a["u_V"], "other": ers.from_arrays(**arrays("steps", 1))}
+        TEN_LINES, {"t": a["t"], "theta": a["theta_rad"], "u": a["u_V"], "other": ers.from_arrays(**arrays("ramp", 1))}
     )
     out = capsys.readouterr().out
     assert "missing_physics ('drive_dead_zone',)" in out and "margins" in out and "actuators" in out

@@ -116,10 +116,10 @@ def test_bristles_too_stiff_for_the_step_are_stepped_finer(bare):
 
 
 def test_what_is_concealed_leaves_what_was_drawn_and_the_seed_alone_draws_it():
-    files, truth = world.make(Plan(0, "single", ("stribeck",), "direct", 0), 5)
+    files, truth = world.make(Plan(0, "single", ("stribeck",), "screw", 0), 5)
     (effect,) = truth["effects"]
     assert truth["visibility_after_refit_sigma"] == pytest.approx(effect["target_sigma"], rel=0.5)
-    assert world.make(Plan(17, "single", ("stribeck",), "direct", 0), 5)[0] == files
+    assert world.make(Plan(17, "single", ("stribeck",), "screw", 0), 5)[0] == files
 
 
 # -- what is handed out ----------------------------------------------------------------------------------------------
