@@ -39,11 +39,11 @@ RUN = (
 
 @pytest.fixture(autouse=True)
 def brief(monkeypatch, request):
-    """Half of the excitation: through rest and friction both ways, and steps to one side; all of it where stops are
-    met, which that half hardly does.
+    """Less of the excitation: through rest and friction both ways, and steps to one side; all of it where stops are
+    met, which that part hardly does.
     """
     if "stops" not in request.node.name:
-        monkeypatch.setattr(trying, "DURATION", 2.0)
+        monkeypatch.setattr(trying, "DURATION", 1.3)
 
 
 def module(path):

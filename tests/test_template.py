@@ -16,7 +16,9 @@ import numpy as np
 from test_diagnosis import recordings
 from ers_mj.servo.datasheet import read_datasheet
 from ers_mj.diagnosis.pipeline import diagnose
-document = diagnose(recordings([("eddy_brake", np.array([30.0, 2.0]))]), read_datasheet("table1")).document
+from ers_mj.selection.budget import QUICK
+found = recordings([("eddy_brake", np.array([30.0, 2.0]))])
+document = diagnose(found, read_datasheet("table1"), search=QUICK).document
 print(document["missing"][0]["effect"], document["missing"][0]["parameters"]["w_0"]["value"])
 """
 
