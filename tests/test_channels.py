@@ -17,6 +17,7 @@ from ers_mj.estimation.objective import residuals
 from ers_mj.plants.inputs import INPUTS
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.selection.bench import Bench
+from ers_mj.selection.budget import QUICK
 from ers_mj.selection.candidates import candidates
 from ers_mj.selection.posterior import probabilities
 from ers_mj.servo.datasheet import read_datasheet
@@ -111,7 +112,9 @@ def sagging(told):
 
 
 def test_a_measured_supply_is_what_the_motor_sees():
-    document = diagnose(sagging(lambda u, vin: (u, vin)), read_datasheet("table1"), jobs=1, policy=ONE).document
+    search = replace(QUICK, in_mujoco=True)
+    given = sagging(lambda u, vin: (u, vin)), read_datasheet("table1")
+    document = diagnose(*given, jobs=1, policy=ONE, search=search).document
     (found,) = document["missing"]
     assert found["effect"] == "supply_sag" and found["subsystem"] == "drive" and "measured changes" in found["sentence"]
     assert found["parameters"]["measured"]["value"] == pytest.approx(1.0, abs=0.1)

@@ -15,6 +15,7 @@ import ers_mj as ers
 from ers_mj import cli
 from ers_mj.diagnosis import pipeline
 from ers_mj.effects import EFFECTS
+from ers_mj.experiment_design import optimal_input
 from ers_mj.selection.budget import QUICK
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -92,6 +93,9 @@ def bench(found, tmp_path, monkeypatch):
     shutil.copy(DEMO / "datasheet.toml", tmp_path / "servo.toml")
     monkeypatch.setattr(pipeline, "diagnose", lambda *_, **__: found)
     monkeypatch.setattr("ers_mj.view.frames.frames_of", lambda *_: None)  # pictures: tests/test_view.py
+    monkeypatch.setattr(
+        optimal_input, "EFFORT", optimal_input.Effort(refits=2, rounds=1, checked=2)
+    )  # test_experiment.py
     monkeypatch.chdir(tmp_path)
     ers.Diagnosis(found).model.save(tmp_path / "ers-out" / "model.toml")
     return tmp_path

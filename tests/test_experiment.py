@@ -19,7 +19,7 @@ SHEET = read_datasheet("table1")
 HOME, TRAVEL, U_MAX = SHEET.parameters["theta_0"], math.radians(60), 24.0
 
 
-def rig(current=0.02, duration=3.0):
+def rig(current=0.02, duration=2.0):
     return Rig.of(HOME, U_MAX, TRAVEL, duration, 500.0, math.radians(0.01), current)
 
 
@@ -57,7 +57,7 @@ def test_refits_keep_the_promise(for_b):
 def test_information_grows_with_time_and_falls_with_noise():
     """Twice the noise, four times less information; what is known beforehand stays negligible."""
     quiet = Question.of(SHEET, rig(None), ("c_2",), inductance=False)
-    loud = Question.of(SHEET, Rig.of(HOME, U_MAX, TRAVEL, 3.0, 500.0, math.radians(0.02)), ("c_2",), inductance=False)
+    loud = Question.of(SHEET, Rig.of(HOME, U_MAX, TRAVEL, 2.0, 500.0, math.radians(0.02)), ("c_2",), inductance=False)
     u = np.clip(experiment.INPUTS["multisine"](quiet.rig.t), -U_MAX, U_MAX)
     assert loud.plan(u).spread["c_2"] / quiet.plan(u).spread["c_2"] == pytest.approx(2.0, rel=0.25)
 

@@ -17,7 +17,7 @@ from ers_mj.servo.datasheet import read_datasheet
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "analysis"))
 SHEET = read_datasheet("table1")
-T = np.arange(0.0, 1.5, 1e-3)
+T = np.arange(0.0, 1.1, 1e-3)
 EQ_5 = lumped(SHEET.to_lumped() | {"tau_e": 0.0})
 EQ_1 = lumped(SHEET.to_lumped())
 

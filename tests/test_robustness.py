@@ -147,7 +147,7 @@ def test_nothing_stays_of_a_trial_that_is_stopped_at_once(tmp_path, monkeypatch)
 
 def test_killed_it_goes_on_to_the_same_bytes(tmp_path, capsys):
     """kill -9 as soon as a servo is finished."""
-    asked, out, whole = [*FEW[:-1], "--rate-hz", "2000", "--plants", "3", "--out"], tmp_path / "out", tmp_path / "whole"
+    asked, out, whole = [*FEW[:-1], "--rate-hz", "1000", "--out"], tmp_path / "out", tmp_path / "whole"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     command, quiet = [sys.executable, "-m", "ers_mj", *asked, str(out)], subprocess.DEVNULL
     begun = subprocess.Popen(command, env=environment, stdout=quiet, stderr=quiet)
