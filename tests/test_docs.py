@@ -93,9 +93,8 @@ def bench(found, tmp_path, monkeypatch):
     shutil.copy(DEMO / "datasheet.toml", tmp_path / "servo.toml")
     monkeypatch.setattr(pipeline, "diagnose", lambda *_, **__: found)
     monkeypatch.setattr("ers_mj.view.frames.frames_of", lambda *_: None)  # pictures: tests/test_view.py
-    monkeypatch.setattr(
-        optimal_input, "EFFORT", optimal_input.Effort(refits=2, rounds=1, checked=2)
-    )  # test_experiment.py
+    little = optimal_input.Effort(refits=2, rounds=1, checked=2)  # more of it: tests/test_experiment.py
+    monkeypatch.setattr(optimal_input, "EFFORT", little)
     monkeypatch.chdir(tmp_path)
     ers.Diagnosis(found).model.save(tmp_path / "ers-out" / "model.toml")
     return tmp_path

@@ -16,7 +16,7 @@ from ers_mj.selection.budget import QUICK, SEARCH
 
 RATE = 500.0
 T = np.arange(1500) / RATE
-DEAD = [("drive_dead_zone", {"d": 0.3})]
+DEAD = [("drive_dead_zone", {"d": 0.5})]
 
 
 SCREW = {
@@ -28,13 +28,13 @@ SCREW = {
 
 def arrays(input: str = "multisine", seed: int = 0) -> dict:
     """What a user has after a run: arrays."""
-    run = ers.simulate("table1", input, duration=3.0, rate_hz=RATE, effects=DEAD, noise=1.5e-4, seed=seed)
+    run = ers.simulate("table1", input, duration=2.0, rate_hz=RATE, effects=DEAD, noise=1.5e-4, seed=seed)
     return {"t": run.t, "u_V": run.u, "theta_rad": run.theta}
 
 
 @pytest.fixture(scope="module")
 def found():
-    """A quick diagnosis of a drive that swallows 0.3 V."""
+    """A quick diagnosis of a drive that swallows 0.5 V."""
     told = []
     runs = [ers.from_arrays(**arrays(), name="a"), ers.from_arrays(**arrays("ramp", 1), name="b")]
     result = ers.diagnose(runs, "table1", quick=True, progress=lambda text, share: told.append(share))
@@ -152,7 +152,7 @@ def test_a_table_needs_pandas_and_says_so(found, monkeypatch):
 def test_a_table_is_a_data_frame(found):
     pytest.importorskip("pandas")
     frame = found.to_frame()
-    assert frame[frame.owner == "drive_dead_zone"].value.iloc[0] == pytest.approx(0.3, abs=0.02)
+    assert frame[frame.owner == "drive_dead_zone"].value.iloc[0] == pytest.approx(0.5, abs=0.02)
     again = ers.from_arrays(ers.simulate(input="steps", duration=2.0).to_frame())
     assert again.t.size == 2000
 
