@@ -188,8 +188,8 @@ class Question:
         z = self.model.vector(layout)
         jacobian = jacobian_of(run_of(self.model, [trace], OBSERVER_RATE), [trace], OBSERVER_RATE, by_tangents=False)
         for _ in range(COUNTING.secants):
-            size, axes = np.linalg.eigh(inverse(self._trimmed(self._blocks(jacobian))))
-            reach = axes * np.sqrt(size)
+            curvature, axes = np.linalg.eigh(self._trimmed(self._blocks(jacobian)))
+            reach = axes / np.sqrt(np.maximum(curvature, 0.0) + VAGUE**-2)
             ends = [
                 [
                     np.nan_to_num(
