@@ -130,6 +130,18 @@ def test_held_samples_keep_step_with_the_clock_where_rows_are_lost_or_blank(driv
     np.testing.assert_array_equal(record.t[record.valid], drive["t_s"][is_there & (fresh == np.arange(N))])
 
 
+def test_between_held_samples_an_input_that_never_rests_is_kept():
+    """The mean of an input over a hold moves the motor as fast, and elsewhere."""
+    t = STEP * np.arange(N)
+    u = 5.0 * np.sin(9.0 * t) + 3.0 * np.sin(23.0 * t)
+    theta = motor(u)
+    record = from_arrays(t, u, theta[4 * (np.arange(N) // 4)])
+    assert kinds(record) == ["held"]
+    np.testing.assert_array_equal(record.u, u)
+    np.testing.assert_array_equal(np.flatnonzero(record.valid), np.arange(0, N, 4))
+    np.testing.assert_array_equal(record.y[record.valid], theta[::4])
+
+
 def test_a_clock_of_its_own_refreshes_a_column_out_of_step(drive, put):
     taken = np.floor(np.arange(N) / 5.3) * 5.3
     theta = np.interp(taken, np.arange(N), drive["theta_rad"] + 1e-3 * np.sin(np.arange(N)))

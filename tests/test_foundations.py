@@ -31,14 +31,14 @@ PULL = np.array([40.0, 8.0])
 NOISE = 3e-4
 
 
-def swung(k, laws=(), values=ARM, pull=PULL, sense=1.0):
+def swung(k, laws=(), values=ARM, pull=PULL, sense=1.0, held=1):
     """An arm that is pushed about, with gravity, as a recording of its angle."""
     f = (0.23, 0.61, 1.1)[k % 3]
     u = 2.6 * np.sin(2 * np.pi * f * T + k) + 1.4 * np.sign(np.sin(2 * np.pi * 0.31 * T + 2 * k))
     plant = ReducedModel(lumped(values), [("gravity_imbalance", pull), *laws])
     y = plant.simulate(T, u, (-math.atan2(pull[1], pull[0]), 0.0)).measured
     y = y + NOISE * np.random.default_rng(k).standard_normal(T.size)
-    return trace_of(from_arrays(T, sense * u, y, name=f"arm {k}"), None)
+    return trace_of(from_arrays(T, sense * u, y[held * (np.arange(T.size) // held)], name=f"arm {k}"), None)
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +63,13 @@ def test_an_arm_is_a_rival_of_the_springs(arm):
     bench = Bench(arm.traces, tau_of(arm.fit.misfit))
     _, _, one = held_instead(bench, arm.fit, arm.held)
     assert one is not None and one.gain > 10.0
+
+
+def test_what_a_sensor_holds_between_its_readings_bends_nothing(arm):
+    """Read anew at every fifth sample, under an input that never rests: the same arm, down to its noise."""
+    slow = baseline([swung(k, held=5) for k in range(3)], None, True).held.fit
+    assert np.allclose(slow.model.effects[0][1], PULL, rtol=0.001, atol=0.01)
+    assert slow.cost / slow.misfit.size < arm.held.fit.cost / arm.held.fit.misfit.size - 0.3
 
 
 def test_where_a_spring_is_the_better_one_it_stays():

@@ -26,6 +26,7 @@ from ers_mj.decisions.thresholds import POLICY
 from ers_mj.errors import InputError
 
 BLOCK = 0.25  # [s]
+REFRESHED = 0.75  # share of valid samples below which those between them may be a slower sensor's
 START = 0.05  # [s] of a record that its initial state is taken from, or BEGINNING.samples, whichever is longer
 
 
@@ -99,6 +100,22 @@ class Trace:
     def sample_time(self) -> float:
         """Median step [s]."""
         return float(np.median(np.diff(self.t)))
+
+    @cached_property
+    def refresh(self) -> int:
+        """Samples for each that the sensor saw, where it is refreshed more slowly than the log; else 1."""
+        return seen_every(self.valid)
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """The samples that a sensor refreshed more slowly saw; all of them where it is not."""
+        return np.flatnonzero(self.valid) if self.refresh > 1 else np.arange(self.t.size)
+
+    @cached_property
+    def beginning(self) -> int:
+        """Number of samples that an initial state is taken from: 50 ms or 10 that were seen, whichever is longer."""
+        n = start_samples(self.t)
+        return n if self.refresh == 1 else max(n, int(self.known[: BEGINNING.samples][-1]) + 1)
 
     @cached_property
     def blocks(self) -> Blocks:
@@ -184,7 +201,9 @@ class Trace:
 
     @cached_property
     def followed(self) -> np.ndarray:
-        """What an observer may follow (N,), NaN where nothing."""
+        """What an observer may follow (N,), NaN where nothing; what a slower sensor passed between its readings."""
+        if self.refresh > 1:
+            return np.interp(self.t, self.t[self.known], self.y[self.known])
         return self.y if self.converter is None else self.converter.path(self.t, self.y)
 
     @property
@@ -224,17 +243,32 @@ def trace_of(recording: Recording, inertia: float | None) -> Trace:
         )
     load = -recording.load / inertia if recording.load is not None and inertia else None
     y, sigma = recording.y, noise_sigma(recording.y[recording.valid], recording.quantum)
-    stuck: list[slice] = []
-    for found in (frozen_spans(y, recording.quantum), unmoved_spans(y, recording.quantum, sigma)):
-        stuck += [s for s in found if not at_extreme(y, s) and not _meets(s, stuck)]
-    for found in (leapt_spans(y, recording.quantum, sigma), repeated_spans(y, recording.quantum)):
-        stuck += [s for s in found if not _meets(s, stuck)]
-    lost = (*spikes(np.where(recording.valid, y, np.nan), sigma), *stuck)
+    seen = np.flatnonzero(recording.valid) if seen_every(recording.valid) > 1 else np.arange(y.size)
+    lost = [
+        slice(int(seen[s.start]), int(seen[s.stop - 1]) + 1)
+        for s in _lost(np.where(recording.valid, y, np.nan)[seen], y[seen], recording.quantum, sigma)
+    ]
     signals = Signals(recording.t, recording.u, y, recording.valid, recording.enable, load)
     trace = make_trace(recording.name, signals, sigma, recording.quantum)
     trace = trace.without(lost)
     channels, supply = channels_of(recording, trace.valid), supply_of(recording)
     return replace(trace, start=_started(trace), input_kind=recording.input_kind, channels=channels, supply=supply)
+
+
+def _lost(y: np.ndarray, read: np.ndarray, quantum: float, sigma: float) -> list[slice]:
+    """Spans of an output y (N,) in which the sensor shows a spike or hangs; ``read`` with what is masked in it."""
+    stuck: list[slice] = []
+    for found in (frozen_spans(read, quantum), unmoved_spans(read, quantum, sigma)):
+        stuck += [s for s in found if not at_extreme(read, s) and not _meets(s, stuck)]
+    for found in (leapt_spans(read, quantum, sigma), repeated_spans(read, quantum)):
+        stuck += [s for s in found if not _meets(s, stuck)]
+    return [*spikes(y, sigma), *stuck]
+
+
+def seen_every(valid: np.ndarray) -> int:
+    """Samples for each valid one (N,), where a sensor is refreshed more slowly than the log; else 1."""
+    seen = np.flatnonzero(valid)
+    return int(np.median(np.diff(seen))) if 1 < seen.size < REFRESHED * valid.size else 1
 
 
 def _meets(span: slice, others: Sequence[slice]) -> bool:
@@ -267,7 +301,7 @@ def make_trace(
 
 
 def _started(trace: Trace) -> tuple[float, float]:
-    n = start_samples(trace.t)
+    n = trace.beginning
     low, high = start_seen(trace.t[:n], trace.y[:n], trace.sigma)
     y = trace.y[:n][trace.valid[:n]]
     still = y[: int(np.argmax(np.append(np.abs(y - y[0]) > 3.0 * trace.sigma, True)))] if y.size else np.zeros(1)

@@ -36,7 +36,8 @@ def _view(case: Case, base: Model, model: Model, trace: Trace, record: int, is_h
     named = {name for name, _ in model.effects_of(record)}.intersection(case.told_effects)
     without = {name: run(model.without_effect(name), trace, record) for name in case.told_effects if name in named}
     runs = run(base, trace, record), run(model, trace, record)
-    return RecordView(trace.name, is_held_out, trace.t, trace.u, trace.y, *runs, without=without)
+    y = trace.y if trace.refresh == 1 else trace.followed
+    return RecordView(trace.name, is_held_out, trace.t, trace.u, y, *runs, without=without)
 
 
 def ladder(case: Case) -> Iterator[Rung]:

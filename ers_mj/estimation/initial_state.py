@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.data.prepared import Trace, start_samples, start_seen
+from ers_mj.data.prepared import Trace, start_seen
 from ers_mj.data.quantisation import thresholds
 from ers_mj.data.sensor_faults import excursions, held_spans
 from ers_mj.estimation.objective import cost_of, is_rough
@@ -92,7 +92,7 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
     """
     if trace.converter is not None:
         return _start_within(model, trace, record)
-    n = start_samples(trace.t)
+    n = trace.beginning
     head = trace.part(0, n, trace.start)
 
     def misses(x):
@@ -129,7 +129,7 @@ def _start_within(model: Model, trace: Trace, record: int) -> tuple[float, float
     head = trace.part(
         0,
         max(
-            start_samples(trace.t),
+            trace.beginning,
             int(np.searchsorted(trace.t, trace.t[passed[0]] + SIGNS.moved)) if passed.size else 0,
         ),
     )

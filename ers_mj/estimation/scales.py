@@ -14,8 +14,13 @@ def scales_of(traces: Sequence[Trace], values: Mapping[str, float], is_angle: bo
     """Typical sizes in these recordings."""
     y = np.concatenate([t.y[t.valid] for t in traces])
     low, high = float(y.min()), float(y.max())
-    lags = [max(1, round(0.02 / t.sample_time)) for t in traces]
-    speeds = np.concatenate([np.abs(t.y[k:] - t.y[:-k]) / (k * t.sample_time) for t, k in zip(traces, lags)])
+    lags = [max(1, round(0.02 / (t.refresh * t.sample_time))) for t in traces]
+    speeds = np.concatenate(
+        [
+            np.abs(t.y[t.known][k:] - t.y[t.known][:-k]) / (k * t.refresh * t.sample_time)
+            for t, k in zip(traces, lags, strict=True)
+        ]
+    )
     peak = max(float(np.max(np.abs(t.u))) for t in traces)
     supplies = [t.supply for t in traces if t.supply is not None]
     return Scales(

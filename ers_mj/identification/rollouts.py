@@ -47,10 +47,17 @@ def rollouts(jobs: int, is_angle: bool = True, timestep: float = TIMESTEP) -> Si
 def _motions(plants: Sequence[MechanicalPlant], trace: Trace, rate: float, jobs: int) -> list[Motion]:
     if len(plants) > 1 and trace.is_uniform and trace.enable is None and trace.load is None and rate == 0.0:
         return simulate_many(plants, trace.t, trace.u, jobs, start=trace.start)
-    gain, every = observer_gain(rate, trace.sample_time)
+    gain, every = observer_gain(rate, trace.sample_time, trace.refresh)
     return [
         plant.simulate(
-            trace.t, trace.u, trace.start, enable=trace.enable, load=trace.load, y=trace.y, gain=gain, every=every
+            trace.t,
+            trace.u,
+            trace.start,
+            enable=trace.enable,
+            load=trace.load,
+            y=trace.y if trace.refresh == 1 else trace.followed,
+            gain=gain,
+            every=every,
         )
         for plant in plants
     ]

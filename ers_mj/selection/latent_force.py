@@ -32,8 +32,9 @@ AROUND = Around()
 
 
 def span_of(trace: Trace) -> int:
-    """Samples of a span."""
-    return max(2, min(SPAN, int(LONGEST / trace.sample_time)))
+    """Samples of a span, so many that its ends may all be seen."""
+    n = max(2, min(SPAN, int(LONGEST / trace.sample_time)))
+    return trace.refresh * max(2, n // trace.refresh) if trace.refresh > 1 else n
 
 
 def asked_for(
@@ -44,8 +45,10 @@ def asked_for(
     """
     n = span_of(trace)
     begins = np.arange(max(first, n), min(last or trace.t.size, trace.t.size) - n - 1)
-    begins = begins[:: max(n, begins.size // most)]
-    begins = np.array([k for k in begins if trace.valid[k - n : k + n + 1].all()], int)
+    begins = begins[np.isin(begins, trace.known)]
+    begins = begins[:: max(n // trace.refresh, begins.size // most, 1)]
+    needed = np.arange(-n, n + 1, trace.refresh)
+    begins = np.array([k for k in begins if trace.valid[k + needed].all()], int)
     speed = (trace.y[begins + n] - trace.y[begins - n]) / (trace.t[begins + n] - trace.t[begins - n])
     asked = [_asked(model, trace, int(k), n, float(w), record) for k, w in zip(begins, speed, strict=True)]
     return begins, speed, np.array(asked)

@@ -27,11 +27,11 @@ PER_INERTIA = ("a_1", "a_2", "b", "c_1", "c_2")  # what falls as the inertia gro
 TORQUES = ("torque", "damping", "stiffness", "drag", "cubic")  # kinds of an effect's numbers that do
 
 
-def observer_gain(rate: float, sample_time: float) -> tuple[float, int]:
+def observer_gain(rate: float, sample_time: float, refresh: int = 1) -> tuple[float, int]:
     """(gain, every) of the observer that follows a measurement at this rate [1/s]: one sample in ``every`` is followed
-    by the share ``gain``.
+    by the share ``gain``, of those that a sensor which is refreshed more slowly saw.
     """
-    every = max(1, round(OBSERVER_STEP / sample_time))
+    every = refresh * max(1, round(OBSERVER_STEP / (refresh * sample_time)))
     return 1.0 - math.exp(-rate * every * sample_time), every
 
 
@@ -324,7 +324,7 @@ class Model:
         trace's own if None.
         """
         (gain, every), shift, plant = (
-            observer_gain(rate, trace.sample_time),
+            observer_gain(rate, trace.sample_time, trace.refresh),
             self.offset(record),
             self.plant(record, trace.supply),
         )

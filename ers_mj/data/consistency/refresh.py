@@ -116,10 +116,14 @@ def _edges(u: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def _thinned(sheet: Sheet, rows: np.ndarray) -> Sheet:
-    """The fresh rows, and those of a few edges of the input, under its mean up to the next row."""
+    """The fresh rows, and those of a few edges of the input, under its mean up to the next row; where the input of a
+    motor changes more often all rows from the first fresh one on, without the repeats: the mean moves it elsewhere.
+    """
     kept = np.union1d(rows, _edges(sheet.u, rows))
+    if sheet.kind != "position" and np.count_nonzero(np.diff(sheet.u)) > REFRESH.most_edges * rows.size:
+        kept = np.arange(rows[0], sheet.t.size)
     width = np.diff(sheet.t, append=2 * sheet.t[-1] - sheet.t[-2])
-    last = rows[-1] + 1
+    last = kept[-1] + 1
     total, time = (np.add.reduceat(a[:last], kept) for a in (sheet.u * width, width))
     flat = np.maximum.reduceat(sheet.u[:last], kept) == np.minimum.reduceat(sheet.u[:last], kept)
     mean = np.where(flat, sheet.u[kept], total / time)
