@@ -163,7 +163,16 @@ def test_an_arm_that_hangs_is_run_freely_and_one_that_swings_over_in_windows(arm
     assert measure_of(held, [low]).name == "free_run"
     over = replace(swung(0), y=4.0 * np.sin(T))
     assert measure_of(held, [over]).name == "windows"
-    assert measure_of(held.without_effect("gravity_imbalance"), [low]).name == "windows"
+    bare = held.without_effect("gravity_imbalance")
+    assert measure_of(bare, [low]).name == "windows"
+    for a_1, c_1, theta_0, name in (
+        (20.0, 0.0, 0.0, "free_run"),
+        (0.01, 0.0, 0.0, "windows"),  # friction leaves it anywhere
+        (0.0, 1.0, 0.0, "free_run"),
+        (0.0, 1.0, 9.0, "windows"),  # beyond the travel a preload is a constant torque
+    ):
+        sprung = replace(bare, values={**bare.values, "a_1": a_1, "c_1": c_1, "theta_0": theta_0})
+        assert measure_of(sprung, [low]).name == name
 
 
 def test_windows_leave_the_noise_where_the_model_is_right():

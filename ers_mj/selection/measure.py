@@ -18,6 +18,8 @@ from ers_mj.servo.model import OBSERVER_RATE, Model
 class Windows:
     """Where a run is measured in windows, how long they are, and how the state of one is fitted."""
 
+    held: float = 0.1  # share of the friction, by which a spring's torque must change along the travel to hold it
+    edge: float = 0.02  # of the travel, beyond which a preload's place is outside
     upright: float = 0.35  # [rad] from where gravity pulls the other way, within which no free run follows an arm
     length: float = 2.0  # [s] of a window,
     fewest: int = 100  # and samples that it holds at least
@@ -56,9 +58,21 @@ FREE_RUN = Measure()
 
 def measure_of(model: Model, traces: Sequence[Trace]) -> Measure:
     """What such a plant can hold: a free run where a spring, a preload or gravity that hangs brings it back."""
-    if model.values["a_1"] > 0 or model.values["c_1"] > 0 or _hangs(model, traces):
+    if _springs_back(model, traces) or _hangs(model, traces):
         return FREE_RUN
     return Measure(max(WINDOWS.length, WINDOWS.fewest * float(max(trace.sample_time for trace in traces))))
+
+
+def _springs_back(model: Model, traces: Sequence[Trace]) -> bool:
+    """Whether the torque of a spring and of a preload changes along the travel by so much of the friction that this
+    does not leave the output anywhere; a preload that the travel has on one side is a constant torque.
+    """
+    v, y = model.values, np.concatenate([trace.y[trace.valid] for trace in traces])
+    low, high = float(y.min()), float(y.max())
+    edge = WINDOWS.edge * (high - low)
+    is_within = low - edge <= v["theta_0"] <= high + edge
+    torque = v["a_1"] * (high - low) + 2.0 * v["c_1"] * is_within
+    return torque > WINDOWS.held * v["c_2"]
 
 
 def _hangs(model: Model, traces: Sequence[Trace]) -> bool:
