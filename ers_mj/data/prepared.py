@@ -26,7 +26,6 @@ from ers_mj.decisions.thresholds import POLICY
 from ers_mj.errors import InputError
 
 BLOCK = 0.25  # [s]
-REFRESHED = 0.75  # share of valid samples below which those between them may be a slower sensor's
 START = 0.05  # [s] of a record that its initial state is taken from, or BEGINNING.samples, whichever is longer
 
 
@@ -265,10 +264,12 @@ def _lost(y: np.ndarray, read: np.ndarray, quantum: float, sigma: float) -> list
     return [*spikes(y, sigma), *stuck]
 
 
-def seen_every(valid: np.ndarray) -> int:
-    """Samples for each valid one (N,), where a sensor is refreshed more slowly than the log; else 1."""
+def seen_every(valid: np.ndarray, most: float = 0.75) -> int:
+    """Samples for each valid one (N,), where a sensor is refreshed more slowly than the log, so that it saw no more
+    than ``most`` of them; else 1.
+    """
     seen = np.flatnonzero(valid)
-    return int(np.median(np.diff(seen))) if 1 < seen.size < REFRESHED * valid.size else 1
+    return int(np.median(np.diff(seen))) if 1 < seen.size < most * valid.size else 1
 
 
 def _meets(span: slice, others: Sequence[slice]) -> bool:

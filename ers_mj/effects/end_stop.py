@@ -4,8 +4,6 @@ import numpy as np
 
 from ers_mj.effects.base import Load, Parameter
 
-INSET = 0.0005  # of the travel, how far within what was reached a contact begins: further within a fit runs outwards
-
 
 class EndStop(Load):
     """Stiff spring-dampers beyond ``lower`` and ``upper``; their natural frequency is f_stop (against J)."""
@@ -24,7 +22,7 @@ class EndStop(Load):
     tries, tangible = 3, False
 
     def starts(self, scales):
-        inset = INSET * (scales.high - scales.low)
+        inset = 0.0005 * (scales.high - scales.low)  # from further within what was reached a fit runs outwards
         low, high = scales.low + inset, scales.high - inset
         frequency = min(100.0, 0.2 / scales.sample_time)
         ends = ((low, np.inf), (-np.inf, high), (low, high))
