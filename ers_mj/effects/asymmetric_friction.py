@@ -26,7 +26,7 @@ class AsymmetricFriction(Friction):
         Parameter("dF", "torque", "half the difference of Coulomb friction, up minus down", positive=False),
         Parameter("dB", "damping", "half the difference of viscous friction, up minus down", positive=False),
         Parameter(
-            "rest", "ratio", "share of dF where motion begins", positive=False, lower=0.0, upper=1.0, absent=np.inf
+            "rest", "ratio", "share of dF where motion begins", positive=False, lower=0.01, upper=1.0, absent=np.inf
         ),
         Parameter("v_a", "speed", "speed at which it has become dF", absent=np.inf),
     )
