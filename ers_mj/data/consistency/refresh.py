@@ -23,15 +23,15 @@ class Refresh:
     longest: int = 500  # rows
     least: int = 100  # values that must be left
     edge: float = 0.05  # of its range, by which an input must change to be kept as an edge
-    most_edges: float = 0.2  # of the fresh rows; of more edges the mean between fresh rows is taken
+    most_edges: float = 0.2  # of the fresh rows; of a position command with more the mean between them is taken
 
 
 REFRESH = Refresh()
 
 
 def held(sheet: Sheet) -> Found:
-    """Keep the rows in which the output is fresh, under the mean of the input in between; a sensor beside it counts in
-    its own fresh rows.
+    """Keep the output where it is fresh, and of the other rows what the input needs (see ``_thinned``); a sensor beside
+    it counts in its own fresh rows.
     """
     faults = []
     rows = fresh_rows(sheet.y, sheet.t)
