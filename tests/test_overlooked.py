@@ -28,7 +28,7 @@ def test_the_kin_of_a_law_that_leads_is_refitted_though_its_secant_promises_noth
 
 def test_a_stop_that_is_touched_once_is_no_impulse():
     """Only the steps reach it, and the rudder sticks there. Where its secant, taken from a stop too early, promises
-    nothing, an impulse explains as much.
+    nothing, an impulse explains as much. One touch tells where the stop is less well than how far the rudder came.
     """
     values = {**TRUTH, "c_2": 60.0}
     free = {name: ReducedModel(lumped(values)).simulate(SPARSE, INPUTS[name](SPARSE)).theta for name in NAMES}
@@ -41,7 +41,7 @@ def test_a_stop_that_is_touched_once_is_no_impulse():
     assert refits.won(impulse) > refits.bench.policy.least_gain
     refit_the_overlooked(refits, best, NOTHING, {}, 3.0)
     assert refits.total(best["end_stop"]) < refits.total(impulse)
-    assert dict(best["end_stop"].model.effects)["end_stop"][1] == pytest.approx(upper, abs=1e-3)
+    assert dict(best["end_stop"].model.effects)["end_stop"][1] == pytest.approx(upper, abs=2e-3)
 
 
 def test_nothing_is_looked_for_beside_what_gains_little(pushed):
