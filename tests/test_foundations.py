@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from servo import SPARSE, TRUTH, recorded, started
 
 from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.baseline import baseline
+from ers_mj.estimation.baseline import Start, baseline, unsprung
 from ers_mj.estimation.fit import fit
 from ers_mj.estimation.initial_guess import guesses
 from ers_mj.estimation.objective import run_of, tau_of
@@ -78,6 +79,18 @@ def test_where_a_spring_is_the_better_one_it_stays():
     assert start.fit.model.values["a_1"] == pytest.approx(40.0, rel=0.02)
     if start.held is not None:
         assert held_instead(Bench(start.traces, 1.0), start.fit, start.held)[2] is None
+
+
+@pytest.mark.parametrize("place, stays", [(9.0, False), (0.1, True)])
+def test_a_preload_that_has_the_whole_travel_on_one_side_is_a_constant_torque(place, stays):
+    """It is no spring then, and what it stood for is to be named."""
+    free = {**TRUTH, "a_1": 0.0, "c_1": 0.0, "theta_0": 0.0}
+    traces = recorded([("bias_torque", np.array([6.0]))], values=free, names=("multisine", "chirp"), t=SPARSE)
+    model = started(traces, values=free).fit.model
+    values = {**model.values, "c_1": 6.0, "theta_0": place}
+    start = Start(fit(replace(model, values=values, free=("a_2", "b", "c_2", "c_1")), traces), traces)
+    found = unsprung(start, 1).fit.model.values
+    assert (found["c_1"] > 0) == stays and found["b"] == pytest.approx(TRUTH["b"], rel=0.05)
 
 
 @pytest.mark.parametrize("sheet", [None, {"a_2": 4.4, "b": 13.0, "c_2": 3.3}])

@@ -85,8 +85,31 @@ def baseline(traces: Sequence[Trace], datasheet: Datasheet | None, is_angle: boo
             "no motion that the reduced model can make resembles these recordings: check units and signs of input and"
             " output"
         )
+    found = found if found.is_spring_known else unsprung(found, jobs)
     held = found.held and replace(found.held, fit=_sized(found.held.fit, found.held.traces, datasheet))
     return replace(found, fit=_sized(found.fit, found.traces, datasheet), held=held)
+
+
+def unsprung(start: Start, jobs: int) -> Start:
+    """The start without a spring that has the whole travel on one side, where a constant torque does as well: that one
+    is missing physics, to be named.
+    """
+    model, tau = start.fit.model, tau_of(start.fit.misfit)
+    scales, values = model.scales, {**model.values, "a_1": 0.0, "c_1": 0.0}
+    away = model.values["theta_0"] - 0.5 * (scales.low + scales.high)
+    if values == model.values or abs(away) <= 0.5 * (scales.high - scales.low):
+        return start
+    torque = model.values["a_1"] * away + math.copysign(model.values["c_1"], away)
+    plain = replace(model, values=values, free=free_in(values, start.traces))
+    for name in {effect.curves for effect in HOLDING.values()}:
+        pushed = fit(plain.with_effect(name, np.array([torque])), start.traces, tau=tau)
+        if (
+            pushed.cost + POLICY.parameter_price * pushed.size
+            <= start.fit.cost + POLICY.parameter_price * start.fit.size
+        ):
+            found, traces, others = _refined(plain, start.traces, jobs)
+            return replace(start, fit=found, traces=traces, anchors=(dict(pushed.model.values), *others))
+    return start
 
 
 def _sized(found: Fit, traces: Sequence[Trace], datasheet: Datasheet | None) -> Fit:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import Along
 from ers_mj.estimation.objective import Fit, is_rough
@@ -198,7 +200,8 @@ def as_what_it_is(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate, 
         other = other if is_it or not flat else flat
         if other in current.model.names:
             continue
-        begun = (without.with_effect(other, start) for start in BY_NAME[other].starts(without.scales))
+        starts = BY_NAME[other].starts(without.scales) if is_it else [_at_the_middle(name, current.model)]
+        begun = (without.with_effect(other, start) for start in starts)
         found = min((bench.fit(model, 20) for model in begun), key=bench.priced, default=None)
         if found is None or bench.priced(found) > bench.priced(current) + (bench.policy.tie if is_it else 0.0):
             continue
@@ -208,6 +211,12 @@ def as_what_it_is(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate, 
             for ranked in rounds
         ]
     return None
+
+
+def _at_the_middle(name: str, model: Model) -> np.ndarray:
+    """The torque (1,) that an effect makes at the middle of the travel."""
+    middle = np.array([0.5 * (model.scales.low + model.scales.high)])
+    return BY_NAME[name].columns(middle) @ dict(model.effects)[name]
 
 
 def in_its_place(bench: Bench, current: Fit, before: Fit, ranked: Sequence[Candidate]) -> tuple[Candidate, ...] | None:
