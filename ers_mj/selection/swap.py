@@ -195,15 +195,13 @@ def as_what_it_is(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate, 
     Effect.curves); None where nothing is.
     """
     for name in current.model.names:
-        without, flat = current.model.without_effect(name), BY_NAME[name].curves
-        is_it, other = really(name, current) != name, really(name, current)
-        other = other if is_it or not flat else flat
+        other, starts, worse = _what_it_is(bench, current, name)
         if other in current.model.names:
             continue
-        starts = BY_NAME[other].starts(without.scales) if is_it else [_at_the_middle(name, current.model)]
+        without = current.model.without_effect(name)
         begun = (without.with_effect(other, start) for start in starts)
         found = min((bench.fit(model, 20) for model in begun), key=bench.priced, default=None)
-        if found is None or bench.priced(found) > bench.priced(current) + (bench.policy.tie if is_it else 0.0):
+        if found is None or bench.priced(found) > bench.priced(current) + worse:
             continue
         one = bench.judged(other, found, bench.fit(without, 20))
         return found, [
@@ -211,6 +209,15 @@ def as_what_it_is(bench: Bench, current: Fit, rounds: Sequence[tuple[Candidate, 
             for ranked in rounds
         ]
     return None
+
+
+def _what_it_is(bench: Bench, current: Fit, name: str) -> tuple[str, Sequence[np.ndarray], float]:
+    """(the effect of which a named one may be a form, where that begins, by how much it may cost more)."""
+    if (other := really(name, current)) != name:
+        return other, BY_NAME[other].starts(current.model.scales), bench.policy.tie
+    if flat := BY_NAME[name].curves:
+        return flat, [_at_the_middle(name, current.model)], 0.0
+    return name, (), 0.0
 
 
 def _at_the_middle(name: str, model: Model) -> np.ndarray:
