@@ -31,13 +31,15 @@ def views(case: Case, samples: Samples) -> list[RecordView]:
 
 
 def _view(case: Case, base: Model, model: Model, trace: Trace, record: int, is_held_out: bool) -> RecordView:
-    """One recording beside the runs of both models, and of the second without each of the effects that are named."""
-    run = case.confirmed.measure.run
+    """One recording beside the runs of both models, and of the second without each of the effects that are named, where
+    the sensor may have seen it.
+    """
+    run = lambda model, trace, record: case.confirmed.measure.run(model, trace, record)[trace.known]
     named = {name for name, _ in model.effects_of(record)}.intersection(case.told_effects)
     without = {name: run(model.without_effect(name), trace, record) for name in case.told_effects if name in named}
     runs = run(base, trace, record), run(model, trace, record)
-    y = trace.y if trace.refresh == 1 else trace.followed
-    return RecordView(trace.name, is_held_out, trace.t, trace.u, y, *runs, without=without)
+    t, u, y = (x[trace.known] for x in (trace.t, trace.u, trace.y))
+    return RecordView(trace.name, is_held_out, t, u, y, *runs, without=without)
 
 
 def ladder(case: Case) -> Iterator[Rung]:
