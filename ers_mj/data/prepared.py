@@ -201,9 +201,9 @@ class Trace:
     @cached_property
     def followed(self) -> np.ndarray:
         """What an observer may follow (N,), NaN where nothing; what a slower sensor passed between its readings."""
-        if self.refresh > 1:
-            return np.interp(self.t, self.t[self.known], self.y[self.known])
-        return self.y if self.converter is None else self.converter.path(self.t, self.y)
+        t, y = self.t[self.known], self.y[self.known]
+        passed = y if self.converter is None else self.converter.path(t, y)
+        return passed if self.refresh == 1 else np.interp(self.t, t, passed)
 
     @property
     def sure_noise(self) -> float:

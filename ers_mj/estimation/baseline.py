@@ -103,10 +103,8 @@ def unsprung(start: Start, jobs: int) -> Start:
     plain = replace(model, values=values, free=free_in(values, start.traces))
     for name in {effect.curves for effect in HOLDING.values()}:
         pushed = fit(plain.with_effect(name, np.array([torque])), start.traces, tau=tau)
-        if (
-            pushed.cost + POLICY.parameter_price * pushed.size
-            <= start.fit.cost + POLICY.parameter_price * start.fit.size
-        ):
+        priced, before = (explained.cost(f.misfit, tau) + POLICY.parameter_price * f.size for f in (pushed, start.fit))
+        if priced <= before:
             found, traces, others = _refined(plain, start.traces, jobs)
             return replace(start, fit=found, traces=traces, anchors=(dict(pushed.model.values), *others))
     return start

@@ -260,7 +260,7 @@ def _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, s
         h, t = (cuts.ends[i] - start) * now.stretch, now.t + start * now.stretch
         start = cuts.ends[i]
         drive, further = now.now if cuts.fresh[i] == 1 else now.before, 0.0
-        if c.fall > 0 and c.tau_e > 0:
+        if c.fall > 0 and c.tau_e > 0 and now.closed:
             drive, further = fallen(c, t, x, m, drive, h)
         if (now.is_usual or now.is_near) and now.closed and m.stop == 0:
             e, step = over_segment(maps, c, m, cuts, cuts.fresh[i] == 1, now.is_usual, now.stretch)

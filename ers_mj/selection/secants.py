@@ -110,7 +110,7 @@ class View:
         friction that follows the current the first order tells nothing at such samples.)
         """
         strides = [max(1, int(SPARSE / t.sample_time + 0.01)) if t.is_uniform else 1 for t in self.traces]
-        strides = [trace.refresh * max(1, n // trace.refresh) for n, trace in zip(strides, self.traces, strict=True)]
+        strides = [max(1, n - n % trace.refresh) for n, trace in zip(strides, self.traces, strict=True)]
         if max(strides) == 1:
             return self
         begins = np.cumsum([0, *(trace.rows for trace in self.traces)])
