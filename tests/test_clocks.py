@@ -52,3 +52,29 @@ def test_a_falling_inductance_far_shorter_than_a_sample_is_near_one_that_is_gone
     t = np.arange(0.0, 1.0, 1e-3)
     u = INPUTS["multisine"](t)
     assert np.max(np.abs(plant.simulate(t, u).theta - plant.simulate(t, u, refine=4).theta)) < 2e-5
+
+
+LEANING = {
+    "nothing else": [],
+    "a law": [("stribeck", {"dF_s": 60.0, "v_s": 0.5})],
+    "a law and a delay": [("stribeck", {"dF_s": 60.0, "v_s": 0.5}), ("input_delay", {"T_d": 0.006})],
+    "a push that comes and goes": [("periodic_gust", {"A": 40.0, "f": 3.0})],
+}
+
+
+@pytest.mark.parametrize("inductance", [5e-3, 0.0])
+@pytest.mark.parametrize("beside", LEANING)
+def test_a_body_that_leans_on_a_stop_through_long_samples_is_followed(beside, inductance):
+    """At rest it takes a whole sample at once; each sample parted, its segments go through it."""
+    t = np.arange(0.0, 8.0, 0.02)
+    u = 12.0 * np.sign(np.sin(2.0 * t)) * (1.0 + 0.3 * np.sin(9.0 * t))
+    stops = ("end_stop", {"lower": 0.1, "upper": 0.5, "f_stop": 40.0, "zeta": 0.5})
+    effects = [
+        (n, np.array([v.get(p.name, p.absent) for p in BY_NAME[n].parameters])) for n, v in [stops, *LEANING[beside]]
+    ]
+    plant = ReducedModel(lumped({**SERVO, "tau_e": inductance, "emf_share": 0.94}), effects)
+    fine, held = parted(t, u, 0.3)
+    motion, truth = plant.simulate(t, u), plant.simulate(fine, held)
+    at_rest = np.mean((motion.omega == 0.0) & ((motion.theta < 0.1) | (motion.theta > 0.5)))
+    assert np.max(np.abs(motion.theta - truth.theta[::2])) < 2e-5
+    assert at_rest > 0.2

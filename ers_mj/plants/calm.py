@@ -12,6 +12,7 @@ from ers_mj.plants.checks import linear_part, may_turn, turns
 from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.cuts import CUTS
 from ers_mj.plants.events import direction_from_rest
+from ers_mj.plants.forces import stop_force
 from ers_mj.plants.maps import CONSTANT, DRIVE, MAPS, ON_RUDDER, SIDE, map_of
 from ers_mj.plants.state import READ, READ_BOOL, TABLE, C, L, M, N, State, X, has_bristle, is_bounded, types, with_drive
 
@@ -76,12 +77,12 @@ def _is_held(c, j, push, up, down):
 
 @unit(types.Tuple((N, X))(READ, READ, READ_BOOL, READ, C, CUTS, N, N, X, M, TABLE))
 def rests_on(t, u, enable, load, c, cuts, k, last, x, m, out):
-    """The same of a body at rest."""
+    """The same of a body at rest, be it against a stop."""
     tau, up, down = c.tau_e, c.c_2_plus, c.c_2_minus
     if m.side == 0:
         up, down = up + c.c_1, down + c.c_1
     kept = math.exp(-cuts.h0 / tau) if tau > 0 else 0.0
-    spring = c.a_1 * (c.theta_0 - x.theta)
+    spring = c.a_1 * (c.theta_0 - x.theta) + stop_force(c, m.stop, x.theta, 0.0)
     while k < last and _is_usual(t, enable, cuts, k):
         drive, push = c.b * u[k + 1], c.bias + load[k] + spring - c.c_1 * m.side
         j = x.j if tau > 0 else drive

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ers_mj.plants.compiled import inline, unit
-from ers_mj.plants.events import breakaway, violation
+from ers_mj.plants.events import STOP, breakaway, violation
 from ers_mj.plants.forces import derivative
 from ers_mj.plants.state import C, F, L, M, X, has_bristle, never_sticks
 
@@ -76,6 +76,12 @@ def is_clean(c, t, x, z, m, tau, load, h):
         clean = clean and breakaway(c, t, x, m) <= 0
     c.bias = bias
     return clean
+
+
+@inline
+def is_free(c, t, x, m):
+    """Whether no stop moves: none is touched, or one body at rest leans on it."""
+    return m.stop == 0 or (m.s == 0 and c.two_body <= 0 and violation(STOP, c, t, x, m) <= 0.0)
 
 
 @inline

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ers_mj.plants.calm import is_plain, rests_on, slips_on, written
-from ers_mj.plants.checks import is_calm, is_clean, is_steady, is_still, linear_part, may_turn, turns
+from ers_mj.plants.checks import is_calm, is_clean, is_free, is_steady, is_still, linear_part, may_turn, turns
 from ers_mj.plants.compiled import inline, kernel, unit
 from ers_mj.plants.cuts import CUTS, corner_speed, cut, law_step, longest_step
 from ers_mj.plants.events import (
@@ -221,6 +221,22 @@ def _leap(maps, c, now, h, x, m):
 
 
 @inline
+def _rest(c, now, cuts, x, m, resting):
+    """(whether one body at rest stays there over a whole sample that is cut into segments, the state then or as it
+    begins, the sample that begins in a rest which was checked).
+    """
+    tau, changes = c.tau_e, cuts.fresh[0] != 1 and now.before != now.now
+    moves = tau > 0 and (changes or c.fall > 0 or c.lawful > 0)  # what pulls need not be the most at an end then
+    if m.s != 0 or c.two_body > 0 or moves or not (now.closed and is_free(c, now.t, x, m)):
+        return False, x, resting
+    h = cuts.h0 * now.stretch
+    if changes and not _at_rest(c, now.t, x, m, now.before, tau, now.load, h, False)[0]:
+        return False, x, resting
+    done, x = _at_rest(c, now.t, x, m, now.now, tau, now.load, h, tau > 0 and resting == now.k)
+    return done, x, now.k + 1 if done and now.next_load == now.load else resting
+
+
+@inline
 def _segment(e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips):
     """Over a segment of length h from t, as if nothing happened: (whether that is so, the state then or as it begins,
     what laws add then, the sample that begins in a rest which was checked).
@@ -262,7 +278,7 @@ def _through_segments(maps, c, now, cuts, x, m, h_max, corner, extra, resting, s
         drive, further = now.now if cuts.fresh[i] == 1 else now.before, 0.0
         if c.fall > 0 and c.tau_e > 0 and now.closed:
             drive, further = fallen(c, t, x, m, drive, h)
-        if (now.is_usual or now.is_near) and now.closed and m.stop == 0:
+        if (now.is_usual or now.is_near) and now.closed and is_free(c, t, x, m):
             e, step = over_segment(maps, c, m, cuts, cuts.fresh[i] == 1, now.is_usual, now.stretch)
             is_last = i == cuts.ends.size - 1
             done, x, extra, resting = _segment(e, step, c, now, is_last, t, x, m, drive, h, extra, resting, slips)
@@ -329,13 +345,15 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
         if _is_followed(y, gain, every, k):
             resting, extra = -1, np.nan
             x, m = corrected(c, t[k], x, m, gain * (y[k] - x.theta))
-        if plain and m.stop == 0:
+        if plain and is_free(c, t[k], x, m):
             calm, x = _calm(t, u, enable, load, c, cuts, maps.late, k, _until(k, n, gain, every), x, m, slips, out)
             if calm > k:
                 resting, extra, k = -1, np.nan, calm
                 continue
         now = _sample(t, u, enable, load, c, cuts, k)
         done, x = _leap(maps, c, now, cuts.h0, x, m) if leaps else (False, x)
+        if not done and cuts.ends.size > 1:
+            done, x, resting = _rest(c, now, cuts, x, m, resting)
         if not done:
             x, m, extra, resting, events = _through_segments(
                 maps, c, now, cuts, x, m, h_max, corner, extra, resting, slips

@@ -86,11 +86,11 @@ class Stepper:
 
     def _sort_laws(self) -> None:
         """What the laws compute, by kind, each with constants of its own."""
-        laws = [(law, law.p.copy(), law.at_motor and self.c.has_motor_side) for law in self.laws]
-        self.torques = [(law.torque, p, own) for law, p, own in laws if law.torque]
-        self.frictions = [(law.friction, p) for law, p, _ in laws if law.friction]
-        self.inertias = [(law.inertia, p) for law, p, _ in laws if law.inertia and not self.c.has_motor_side]
-        self.memories = [(law.memory, p, own) for law, p, own in laws if law.memory]
+        laws = [(law, law.p.tolist(), law.at_motor and self.c.has_motor_side) for law in self.laws]
+        self.torques = [(_plain(law.torque), p, own) for law, p, own in laws if law.torque]
+        self.frictions = [(_plain(law.friction), p) for law, p, _ in laws if law.friction]
+        self.inertias = [(_plain(law.inertia), p) for law, p, _ in laws if law.inertia and not self.c.has_motor_side]
+        self.memories = [(_plain(law.memory), p, own) for law, p, own in laws if law.memory]
 
     def _address(self, joint: str) -> int:
         return int(self.model.jnt_qposadr[self.model.joint(joint).id])
@@ -247,6 +247,13 @@ class Stepper:
         if abs(share) < 1e-9:
             return level / self.c.dahl
         return level * share / (1.0 - math.copysign(abs(1.0 - share) ** self.c.dahl, 1.0 - share))
+
+
+def _plain(law: Callable) -> Callable:
+    """A law as Python has it: called from Python it is as fast as compiled (0.2 to 3.7 us beside 0.4 to 1.8), and
+    nothing is compiled (0.1 to 0.4 s).
+    """
+    return getattr(law, "py_func", law)
 
 
 def delayed(t: np.ndarray, u: np.ndarray, delay: float, before: float) -> Late:
