@@ -118,11 +118,11 @@ class Pair:
         return self.p <= policy.largest_p and lost >= (1.0 + policy.pays) * left
 
 
-def table_pays(pairs: Sequence[Pair], noise: float, policy: Policy = POLICY) -> bool:
-    """Whether a table of what is unknown is kept: held-out data, as it is or recalibrated, asks for it, and neither way
-    loses more than what blocks confirm may.
+def table_pays(pairs: Sequence[Pair], trained: Pair, noise: float, policy: Policy = POLICY) -> bool:
+    """Whether a table of what is unknown is kept: held-out data, as it is or recalibrated, asks for it, and neither
+    that nor what it was fitted to (``trained``) loses more than what blocks confirm may.
     """
-    worse = (pair.with_it > policy.worse * pair.without for pair in pairs)
+    worse = (pair.with_it > policy.worse * pair.without for pair in (*pairs, trained))
     return any(pair.is_worth(noise, policy) for pair in pairs) and not any(worse)
 
 

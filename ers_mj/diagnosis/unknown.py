@@ -11,6 +11,7 @@ from ers_mj.effects import BY_NAME
 from ers_mj.estimation.intervals import half_widths
 from ers_mj.selection.cross_validation import pooled, scored
 from ers_mj.selection.measure import FREE_RUN
+from ers_mj.servo.model import Model
 from ers_mj.servo.simulation import PER_INERTIA, unit_of
 
 
@@ -22,16 +23,21 @@ def in_readers_units(case: Case, name: str, values: np.ndarray) -> dict[str, flo
 
 
 def tables(case: Case) -> list[dict]:
-    """The tables with their 95 % bands, the rest of the model held: a level of friction may stand in either."""
+    """The tables with their 95 % bands, the rest of the model and the other tables held: a level of friction may stand
+    in any of them.
+    """
     if case.unknown is None:
         return []
-    found, kept = case.unknown.model, [name for name, _ in case.unknown.tables]
-    others = tuple(held for name in found.names if name not in kept for held in (name, f"{name}, local"))
+    return [_table(case, name, values, _bands(case, case.unknown.model, name)) for name, values in case.unknown.tables]
+
+
+def _bands(case: Case, found: Model, table: str) -> dict:
+    """The 95 % band of each entry of a table, all else of the model held."""
+    others = tuple(held for name in found.names if name != table for held in (name, f"{name}, local"))
     model = replace(found, free=(), frozen=others, states=None)
     layout = model.layout()
     widths = half_widths(model, case.start.traces, (), case.selection.tau)
-    bands = {(f.owner, f.name): f.ends(q, w) for f, q, w in zip(layout, model.vector(layout), widths, strict=True)}
-    return [_table(case, name, values, bands) for name, values in case.unknown.tables]
+    return {(f.owner, f.name): f.ends(q, w) for f, q, w in zip(layout, model.vector(layout), widths, strict=True)}
 
 
 def _table(case: Case, name: str, values: np.ndarray, bands: dict) -> dict:
@@ -61,9 +67,9 @@ def fits(case: Case) -> dict[str, float | None]:
     found = case.unknown
     if found is None:
         return {}
-    c, traces = case.confirmed, list(enumerate(case.start.traces))
+    c = case.confirmed
     out: dict[str, float | None] = {
-        "train_rmse_with_tables_rad": pooled([scored(found.model, t, k, measure=c.measure) for k, t in traces]).rmse,
+        "train_rmse_with_tables_rad": found.trained.rmse,
         "heldout_rmse_with_tables_rad": found.held.rmse,
         "heldout_mae_with_tables_rad": found.held.mae,
         "recalibrated_rmse_with_tables_rad": found.again.rmse,

@@ -29,12 +29,13 @@ STEPS = 15  # of a refit with a table
 
 @dataclass(frozen=True)
 class Unknown:
-    """The answer with tables beside it, fitted to all training recordings; its models of each fold, and their held-out
-    scores as they are and recalibrated.
+    """The answer with tables beside it, fitted to all training recordings, and its score there; its models of each
+    fold, and their held-out scores as they are and recalibrated.
     """
 
     model: Model
     models: list[Model]
+    trained: Score
     held: Score
     again: Score
 
@@ -64,8 +65,10 @@ def unknown(
     with_it = refits(found.model, parts, tau, 1)
     held, again = (_held(some, parts, measure) for some in (with_it, models))
     pairs = [Pair(a.rmse, b.rmse, _chance(a, b, policy)) for a, b in zip(held, again, strict=True)]
+    trained, before = (_trained(model, traces, measure) for model in (found.model, answer))
     noise = math.sqrt(float(np.mean([fold.held_out.sigma**2 for fold in parts])))
-    return Unknown(found.model, with_it, *held) if table_pays(pairs, noise, policy) else None
+    pays = table_pays(pairs, Pair(trained.rmse, before.rmse, 1.0), noise, policy)
+    return Unknown(found.model, with_it, trained, *held) if pays else None
 
 
 def _grown(current: Fit, traces: Sequence[Trace], tau: float) -> Fit:
@@ -79,6 +82,11 @@ def _grown(current: Fit, traces: Sequence[Trace], tau: float) -> Fit:
             break
         current = best
     return current
+
+
+def _trained(model: Model, traces: Sequence[Trace], measure: Measure) -> Score:
+    """The score on what the model was fitted to."""
+    return pooled([scored(model, trace, k, measure=measure) for k, trace in enumerate(traces)])
 
 
 def _held(models: Sequence[Model], parts: Sequence[Fold], measure: Measure) -> tuple[Score, Score]:
