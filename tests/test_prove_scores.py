@@ -152,10 +152,60 @@ def test_what_is_concealed_in_a_record():
 
 
 def test_every_rig_is_diagnosed_as_it_is_first():
-    plans = real.plans(18, 1)
+    plans = real.plans(len(real.COVERAGE), 1)
     assert [(p.rig, p.label) for p in plans[:3]] == [(rig, None) for rig in real.RIGS] and {
         (p.rig, p.label) for p in plans
     } == set(real.COVERAGE)
+
+
+class Gentle:
+    """A rig whose own model a play moves by a tenth of its half-width, and which leaves 0.1."""
+
+    error = 0.1
+
+    def visibility(self, touched):
+        return 4.0
+
+    def moved(self, effect, values):
+        assert effect == "backlash"
+        return [np.full(300, 0.1 * values["gap"])]
+
+
+def test_what_is_half_simulated_moves_a_record_by_a_share_of_its_travel(monkeypatch, tmp_path):
+    t = np.arange(300) * 0.01
+    record = {"t_s": t, "u_V": np.sin(t), "theta_rad": np.sin(t)}
+    monkeypatch.setattr(real, "_records", lambda *_: [record])
+    plan = real.RealPlan(4, "sts3215", "backlash")
+    files, truth = real.make(plan, tmp_path, 3, lambda rig: Gentle())
+    moved = np.loadtxt(files["rec1.csv"].splitlines(), delimiter=",", skiprows=1)[:, 2] - record["theta_rad"]
+    assert np.allclose(moved, 0.1 * truth["effects"][0]["strength"], atol=1e-9)
+    assert 0.5 * real.HALVES.share[0] < truth["size"] / np.ptp(record["theta_rad"]) < 1.5 * real.HALVES.share[1]
+    assert truth["kind"] == real.PARTLY and truth["visibility_after_refit_sigma"] == 4.0
+    untouched, alone = real.make(real.RealPlan(0, "sts3215", None), tmp_path, 3, None)
+    assert alone["kind"] == real.UNTOUCHED and untouched == real.files_of("sts3215", tmp_path, 3)
+
+
+def test_first_or_second_counts_without_the_rig_s_own_names():
+    rows = []
+    for kind, labels, named, left in (
+        ("untouched", [], ["end_stop", "asymmetric_friction"], None),
+        ("single", ["input_delay"], ["end_stop", "asymmetric_friction", "stribeck", "sensor_lag"], 3.5),
+        ("single", ["backlash"], ["stribeck", "presliding", "backlash"], 8.0),
+        ("single", ["sensor_dropout"], [], 0.5),
+        (real.PARTLY, ["backlash"], ["backlash"], 5.0),
+    ):
+        truth, answer = truth_and_answer(kind, labels, named)
+        truth |= {"rig": "throttle", "visibility_after_refit_sigma": left}
+        rows.append(
+            scoring.row_of(
+                truth | {"effects": [{"label": x, "strength": 0.1, "shape": {"form": ""}} for x in labels]}, answer
+            )
+        )
+    results = real.scored_real(rows)
+    assert results["foremost_visible"] == (1, 2) and results["foremost_visible_half_simulated"] == (1, 1)
+    assert results["counts"]["single"] == 3 and [x["concealed"] for x in results["half_simulated"]] == ["backlash"]
+    page = proof_report.proof_page(results | {"failures": []}, rows, {})
+    assert "named first or second, the rig&#x27;s own set aside, in 1 of 2" in page.replace("'", "&#x27;")
 
 
 def test_a_rig_as_it_is_raises_no_false_alarm():

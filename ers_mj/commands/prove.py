@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from collections.abc import Mapping
 from contextlib import closing
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -124,17 +126,15 @@ def _tasks(arguments: argparse.Namespace) -> tuple[list[Task], dict]:
     from ers_mj.workers.base import Task
 
     if arguments.real is not None:
+        from ers_mj.door.own_answer import OwnAnswer
         from ers_mj.proving import real
 
-        plans = real.plans(arguments.cases or len(real.COVERAGE), arguments.seed)
-        real.refuse_missing(Path(arguments.real), plans)
-        tasks = [Task(plan.name, real.make, (plan, Path(arguments.real).absolute(), arguments.seed)) for plan in plans]
-        return tasks, {
-            "kind": "real",
-            "seed": arguments.seed,
-            "cases": len(plans),
-            "folder": str(Path(arguments.real).absolute()),
-        }
+        folder, seed = Path(arguments.real).absolute(), arguments.seed
+        plans = real.plans(arguments.cases or len(real.COVERAGE), seed)
+        real.refuse_missing(folder, plans)
+        own = cache(lambda rig: OwnAnswer(real.files_of(rig, folder, seed)))
+        tasks = [Task(plan.name, real.make, (plan, folder, seed, own)) for plan in plans]
+        return tasks, {"kind": "real", "seed": seed, "cases": len(plans), "folder": str(folder)}
     from ers_mj.proving import world
 
     families = world.chosen(arguments.families and [name.strip() for name in arguments.families.split(",")])
@@ -218,14 +218,24 @@ def _told_confusion(confusion: dict) -> list[str]:
 
 def _told_real(results: dict) -> list[str]:
     """What was concealed in real records and found again beside what the rigs have of their own."""
-    from ers_mj.report.proof_report import again
 
     lines = ["", bold("the rigs as they are")]
     lines += [f"  {rig:12} {', '.join(names) or 'nothing'}" for rig, names in results["own"].items()]
     lines += ["", bold("concealed in them")]
-    for x in results["concealed_in_real"]:
-        lines.append(
-            f"  {x['rig']:12} {x['concealed']:22} {x['strength']:<10.3g} {again(x):7}"
-            f" {', '.join(x['named']) or 'nothing'}"
-        )
+    lines += [_told_again(x) for x in results["concealed_in_real"]]
+    lines += ["", bold("half simulated: put into them by the rig's own best model")]
+    lines += [_told_again(x) for x in results["half_simulated"]]
+    for told, key in (("in real records", "foremost_visible"), ("half simulated", "foremost_visible_half_simulated")):
+        k, n = results[key]
+        lines.append(f"first or second beside the rig's own, of those that leave 3 times its error, {told}: {k} of {n}")
     return lines
+
+
+def _told_again(x: Mapping) -> str:
+    from ers_mj.report.proof_report import again
+
+    left = f"{x['visibility']:.3g} x"
+    return (
+        f"  {x['rig']:12} {x['concealed']:24} {x['strength']:<10.3g} leaves {left:9} {again(x):7}"
+        f" {', '.join(x['named']) or 'nothing'}"
+    )

@@ -74,16 +74,16 @@ def diagnose(
     progress("fitting the baseline", 0.03)
     start = sharpened(baseline(traces, datasheet, first.output_unit == "rad", jobs), travel)
     still = is_unexcited(start.traces)  # nothing can be told then, and nothing is named
-    sensors = {} if still else symptoms(recordings, start.traces, travel, policy)
-    known = tuple(BY_NAME) if still else (*_ordinary(start.fit.model, policy), *SUSPECTS)
+    barred = _barred(still, start.fit.model, policy, search)
+    sensors = symptoms(recordings, start.traces, travel, policy, barred)
     budget, begun = Budget(start.traces, search=search), None if still else start
     grown = partial(select, jobs=jobs, progress=progress, policy=policy, budget=budget)
-    start, chosen = _polished(start, grown(start.fit, start.traces, start=begun, exclude=known))
+    start, chosen = _polished(start, grown(start.fit, start.traces, start=begun, exclude=barred))
     progress("judging on held-out data", 0.75)
     held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
     suspects: tuple[Candidate, ...] = ()
-    if not still:
+    if not still and search.among is None:
         named, suspects = without_confounders(selection, start.traces, jobs, policy, search)
         if named is not selection:
             selection, judged = confirmed(start, named, held, jobs, policy)
@@ -114,6 +114,15 @@ def _in_mujoco(
     return before, rig.rmse(judged.models, judged.parts, jobs) if selection.chosen.model.effects else before
 
 
+def _barred(still: bool, model: Model, policy: Policy, search: Search) -> tuple[str, ...]:
+    """Effects that are not tried: all where nothing moves, those that are none here, and all but those ``among`` which
+    it is searched.
+    """
+    among = BY_NAME if search.among is None else search.among
+    others = [name for name in BY_NAME if still or name not in among]
+    return tuple(dict.fromkeys((*_ordinary(model, policy), *SUSPECTS, *others)))
+
+
 def _ordinary(model: Model, policy: Policy) -> list[str]:
     """Effects that are none here: a winding whose inductance a datasheet gives has it, as long as it is not about twice
     that.
@@ -125,9 +134,11 @@ def _ordinary(model: Model, policy: Policy) -> list[str]:
 
 
 def symptoms(
-    recordings: Sequence[Recording], traces: Sequence[Trace], travel: float, policy: Policy
+    recordings: Sequence[Recording], traces: Sequence[Trace], travel: float, policy: Policy, barred: Sequence[str]
 ) -> dict[str, np.ndarray]:
-    """Sensor effects that show in the data itself, with their parameters (see Effect.symptom)."""
+    """Sensor effects that show in the data itself, but for those ``barred``, with their parameters (see
+    Effect.symptom).
+    """
     seen = Symptoms(
         dropouts=np.array([(s.stop - s.start) * t.sample_time for t in traces for s in t.lost]),
         seconds=sum(float(t.t[-1] - t.t[0]) for t in traces),
@@ -135,7 +146,7 @@ def symptoms(
         travel=travel,
         is_angle=recordings[0].output_unit == "rad",
     )
-    found = ((effect.name, effect.symptom(seen, policy)) for effect in BY_NAME.values())
+    found = ((name, effect.symptom(seen, policy)) for name, effect in BY_NAME.items() if name not in barred)
     return {name: values for name, values in found if values is not None}
 
 

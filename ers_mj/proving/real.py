@@ -3,15 +3,18 @@ from).
 
 What is done to the untouched records of a rig, by a sealed seed: the command acts later than it says (input_delay),
 the reading lags (sensor_lag), is rounded down (sensor_quantisation) or held for a while (sensor_dropout), or a constant
-part of the command goes unrecorded, which is a constant torque (bias_torque). Each rig is also diagnosed as it is: what
-is named there is its own.
+part of the command goes unrecorded, which is a constant torque (bias_torque). A play, a friction that grows with the
+load and a limit of the input cannot be put into a record: they move it by the difference that they make in the rig's
+own best model, which is half simulated and is counted apart. Each rig is also diagnosed as it is: what is named there
+is its own, and how much more than its own error a record leaves that was touched is its visibility.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pyarrow.csv
@@ -28,14 +31,45 @@ FILES = {
     "sts3215": ("runs.parquet", "runs_index.csv"),
 }
 EFFECTS = ("input_delay", "sensor_lag", "sensor_quantisation", "sensor_dropout", "bias_torque")
-COVERAGE = [(rig, name) for rig in RIGS for name in (None, *EFFECTS)]
+SEEN = ("sensor_quantisation", "sensor_dropout")  # in the data itself, where no model is fitted to them
+HALF_SIMULATED = {"backlash": "gap", "load_dependent_friction": "mu", "voltage_saturation": "u_max"}  # by their size
+COVERAGE = [(rig, name) for rig in RIGS for name in (None, *EFFECTS, *HALF_SIMULATED)]
 LATE = {
     "emps": (0.002, 0.03),
     "throttle": (0.02, 0.1),
     "sts3215": (0.02, 0.1),
 }  # [s] delay or lag, a few samples and more
 UNTOUCHED = "untouched"  # the kind of a case that is a rig as it is: what is named there is no false positive
+PARTLY = "half simulated"  # of one into which the difference between two simulations is put
 ALSO = ("torque_enable", "vin_V", "pulse_V")  # columns handed on as they are
+
+
+@dataclass(frozen=True)
+class Halves:
+    """What is half simulated moves the output by an rms of ``share`` of the travel, as near as one of so many ``sizes``
+    comes to it; what is found is counted from the visibility ``seen`` on, as all that is put into real records.
+    """
+
+    share: tuple[float, float] = (0.02, 0.1)
+    sizes: int = 12
+    seen: float = 3.0
+
+
+HALVES = Halves()
+
+
+class Own(Protocol):
+    """A rig's own best answer (see door/own_answer.py)."""
+
+    @property
+    def error(self) -> float:
+        """The held-out error that it leaves [output unit]."""
+
+    def visibility(self, touched: Mapping[str, str]) -> float:
+        """What touched records leave beyond that, over it."""
+
+    def moved(self, effect: str, values: Mapping[str, float]) -> list[np.ndarray]:
+        """By how much an effect moves the output of its model (N,) in each record."""
 
 
 @dataclass(frozen=True)
@@ -72,41 +106,81 @@ def refuse_missing(folder: Path, chosen: Sequence[RealPlan]) -> None:
                 )
 
 
-def make(plan: RealPlan, folder: Path, seed: int) -> tuple[dict[str, str], dict]:
-    """({file name: text}, the truth) of one case."""
+def make(plan: RealPlan, folder: Path, seed: int, own: Callable[[str], Own]) -> tuple[dict[str, str], dict]:
+    """({file name: text}, the truth) of one case; ``own`` gives a rig's own answer."""
     rng = np.random.default_rng([seed, 3, plan.index])
     records = _records(folder, plan.rig, np.random.default_rng([seed, 4]))
+    truth = {
+        "case": plan.name,
+        "kind": UNTOUCHED,
+        "labels": [plan.label] if plan.label else [],
+        "rig": plan.rig,
+        "effects": [],
+        "size": None,
+        "size_unit": RIGS[plan.rig][1].rpartition("_")[2],
+        "visibility_after_refit_sigma": None,
+        "seed": [seed, plan.index],
+    }
+    if plan.label is None:
+        return _files(records), truth
+    answer = own(plan.rig)
+    touched, moved, shape = _touched(rng, plan, records, answer)
+    files, size = _files(touched), float(np.sqrt(np.nanmean(np.concatenate(moved) ** 2)))
+    return files, truth | {
+        "kind": PARTLY if plan.label in HALF_SIMULATED else "single",
+        "effects": [{"label": plan.label, **shape}],
+        "size": size or None,
+        "visibility_after_refit_sigma": size / answer.error if plan.label in SEEN else answer.visibility(files),
+    }
+
+
+def files_of(rig: str, folder: Path, seed: int) -> dict[str, str]:
+    """{file name: text} of the records of a rig as they are."""
+    return _files(_records(folder, rig, np.random.default_rng([seed, 4])))
+
+
+def _files(records: Sequence[Mapping[str, np.ndarray]]) -> dict[str, str]:
+    return {f"rec{k + 1}.csv": _csv(record) for k, record in enumerate(records)}
+
+
+def _touched(
+    rng: np.random.Generator, plan: RealPlan, records: Sequence[dict], own: Own
+) -> tuple[list[dict], list[np.ndarray], dict]:
+    """(the records with the effect, how far it moved each output (N,), its strength and shape)."""
     u, y = RIGS[plan.rig]
-    strength = draw(rng, plan, records, u, y)
-    touched, moved = [], []
+    if plan.label in HALF_SIMULATED:
+        strength, moved = _half_simulated(rng, plan.label, records, own, u, y)
+        touched = [record | {y: record[y] + by} for record, by in zip(records, moved, strict=True)]
+        return touched, moved, {"strength": strength, "shape": {"form": "the rig's own model's"}}
+    strength, touched, moved = draw(rng, plan, records, u, y), [], []
     for record in records:
         new, change = conceal(rng, record, plan.label, strength, u, y)
         touched.append(new)
         moved.append(change)
-    size = None if plan.label in (None, "bias_torque") else float(np.sqrt(np.nanmean(np.concatenate(moved) ** 2)))
-    effects = (
-        [
-            {
-                "label": plan.label,
-                "strength": strength,
-                "shape": {"form": "rounded down" if plan.label == "sensor_quantisation" else ""},
-            }
-        ]
-        if plan.label
-        else []
-    )
-    truth = {
-        "case": plan.name,
-        "kind": "single" if plan.label else UNTOUCHED,
-        "labels": [plan.label] if plan.label else [],
-        "rig": plan.rig,
-        "effects": effects,
-        "size": size,
-        "size_unit": y.rpartition("_")[2],
-        "visibility_after_refit_sigma": None,
-        "seed": [seed, plan.index],
-    }
-    return {f"rec{k + 1}.csv": _csv(record) for k, record in enumerate(touched)}, truth
+    form = "rounded down" if plan.label == "sensor_quantisation" else ""
+    return touched, moved, {"strength": strength, "shape": {"form": form}}
+
+
+def _half_simulated(
+    rng: np.random.Generator, label: str, records: Sequence[Mapping], own: Own, u: str, y: str
+) -> tuple[float, list[np.ndarray]]:
+    """(strength, how far it moves each output (N,)) of an effect in the rig's own model, as near as one of its sizes
+    comes to a drawn share of the travel.
+    """
+    travel = float(np.nanmax([np.nanmax(r[y]) - np.nanmin(r[y]) for r in records]))
+    largest = float(np.nanmax([np.nanmax(np.abs(r[u])) for r in records]))
+    low, high = {
+        "backlash": (0.002 * travel, 0.2 * travel),
+        "load_dependent_friction": (0.01, 0.8),
+        "voltage_saturation": (0.1 * largest, 0.95 * largest),
+    }[label]
+    wanted, best = travel * between(rng, *HALVES.share), (np.inf, low, [np.zeros(r[y].size) for r in records])
+    for strength in np.geomspace(low, high, HALVES.sizes).tolist():
+        moved = own.moved(label, {HALF_SIMULATED[label]: strength})
+        size = float(np.sqrt(np.nanmean(np.concatenate(moved) ** 2)))
+        if size > 0:
+            best = min(best, (abs(np.log(size / wanted)), strength, moved), key=lambda one: one[0])
+    return best[1], best[2]
 
 
 def _records(folder: Path, rig: str, rng: np.random.Generator) -> list[dict[str, np.ndarray]]:
@@ -214,7 +288,10 @@ def scored_real(rows: Sequence[dict]) -> dict:
     """
     own = {r["rig"]: r for r in rows if r["kind"] == UNTOUCHED}
     singles = [r for r in rows if r["kind"] == "single"]
-    told = [_beside_its_own(r, own.get(r["rig"], {"named": [], "floor": None})) for r in singles]
+    told, partly = (
+        [_beside_its_own(r, own.get(r["rig"], {"named": []})) for r in rows if r["kind"] == kind]
+        for kind in ("single", PARTLY)
+    )
     fresh = [x for x in told if not x["was_its_own"]]
     return {
         **scored(singles),
@@ -223,28 +300,41 @@ def scored_real(rows: Sequence[dict]) -> dict:
         "found": _share_found(told),
         "found_new": _share_found(fresh),
         "found_new_of": len(fresh),
+        "foremost_visible": _foremost_visible(told),
+        "foremost_visible_half_simulated": _foremost_visible(partly),
         "own": {rig: r["named"] for rig, r in own.items()},
         "concealed_in_real": told,
+        "half_simulated": partly,
     }
 
 
 def _beside_its_own(row: Mapping, alone: Mapping) -> dict:
     """What is told of one effect in a rig, beside the answer to the rig ``alone``."""
-    its_own, named = {class_of(n) for n in alone["named"]}, {class_of(n) for n in row["named"]}
+    its_own, named = {class_of(n) for n in alone["named"]}, [class_of(n) for n in row["named"]]
     wanted = class_of(row["labels"][0])
+    new = list(dict.fromkeys(c for c in named if c == wanted or c not in its_own))
     return {
         "case": row["case"],
         "rig": row["rig"],
         "concealed": row["labels"][0],
         "strength": row["strength"],
-        "size_over_floor": row["size"] / alone["floor"] if row["size"] and alone["floor"] else None,
+        "visibility": row["visibility"],
         "named": row["named"],
         "found": wanted in named,
+        "is_foremost": wanted in new[:2],
         "was_its_own": wanted in its_own,
         "own_kept": sum(c in named for c in its_own),
         "own": len(its_own),
         "others": sorted(n for n in row["named"] if class_of(n) not in its_own | {wanted}),
     }
+
+
+def _foremost_visible(told: Sequence[Mapping]) -> tuple[int, int]:
+    """(how many are named first or second, the rig's own set aside, of how many) of those that can be seen beside
+    the rig's own error.
+    """
+    visible = [x["is_foremost"] for x in told if x["visibility"] >= HALVES.seen]
+    return sum(visible), len(visible)
 
 
 def _share_found(told: Sequence[Mapping]) -> float | None:

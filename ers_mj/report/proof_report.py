@@ -167,25 +167,42 @@ def again(x: Mapping) -> str:
 
 
 def _real(results: Mapping) -> str:
+    own = "; ".join(f"{rig}: {', '.join(names) or NOTHING}" for rig, names in results.get("own", {}).items())
+    if not own:
+        return ""
+    tables = [
+        f"<p>{told} and leaves three times the rig's own error: named first or second, the rig's own set aside, in"
+        f" {results[count][0]} of {results[count][1]}.</p>" + _again(results[rows])
+        for told, count, rows in (
+            ("What was put into the records themselves", "foremost_visible", "concealed_in_real"),
+            (
+                "What was put into them by the difference that it makes in the rig's own best model",
+                "foremost_visible_half_simulated",
+                "half_simulated",
+            ),
+        )
+    ]
+    return f"<p>{page.named(own)}</p>" + "".join(tables)
+
+
+def _again(told: Sequence[Mapping]) -> str:
+    """A row for each effect that was concealed in real records."""
     rows = [
         (
             (
                 page.text(x["rig"]),
                 page.named(x["concealed"]),
                 digits(x["strength"]),
+                digits(x["visibility"]),
                 again(x),
                 page.named(" + ".join(x["named"]) or NOTHING),
             ),
             "",
         )
-        for x in results.get("concealed_in_real", [])
+        for x in told
     ]
-    own = "; ".join(f"{rig}: {', '.join(names) or NOTHING}" for rig, names in results.get("own", {}).items())
-    return (
-        f"<p>{page.named(own)}</p>" + page.table(["rig", "concealed", ">strength (SI)", "found", "named"], rows)
-        if rows or own
-        else ""
-    )
+    head = ["rig", "concealed", ">strength (SI)", ">left / its own error", "found", "named"]
+    return page.table(head, rows) if rows else ""
 
 
 def _cases(rows: Sequence[Mapping]) -> str:

@@ -107,6 +107,8 @@ class Search:
     in_mujoco: bool = True
     tabled: bool = True
     advised: bool = True
+    # The effects among which it is searched (None: all).
+    among: tuple[str, ...] | None = None
 
     def left_out(self, is_cut_short: bool = False) -> tuple[tuple[str, str], ...]:
         """The parts of a diagnosis that this search leaves out against the usual one, each with a sentence.
