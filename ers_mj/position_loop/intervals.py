@@ -1,4 +1,6 @@
-"""Intervals of a loop's numbers and of what only a sum or a ratio of them can tell: a sandwich over blocks."""
+"""Intervals of a loop's numbers and of what only a sum or a ratio of them can tell: a sandwich over blocks, and how far
+effects move the numbers that act unseen, or are what is left.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +14,7 @@ from scipy.special import stdtrit
 from ers_mj.position_loop import beside
 from ers_mj.position_loop.fit import Data, Fit, fitted, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
+from ers_mj.position_loop.terms import terms
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,7 @@ class Doubt:
     told: float = 0.7  # half width of a logarithm up to which a number is told
     inexact: float = 0.0025  # standard deviation of what firmware and simulation do in steps: relative,
     clock: float = 0.00075  # [s] and in time
+    unseen: float = 2.0  # gain of an effect that is not found
 
 
 DOUBT = Doubt()
@@ -70,6 +74,7 @@ class Intervals:
         spread += inverse * float(np.mean(e * e))
         if len(left_out) >= DOUBT.fewest and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
+        spread += _unseen(model, data, e, j, inverse)
         steps = [_inexact(f, q, rate, model["K"]) for f, q in zip(layout, model.vector(layout), strict=True)]
         spread += np.diag(np.square(steps))
         return Intervals(model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
@@ -138,6 +143,25 @@ def _inexact(f: Free, z: float, rate: float, K: float) -> float:
         return DOUBT.clock / f.size
     relative = math.hypot(DOUBT.inexact, 0.5 * rate * DOUBT.clock) if f.name in RATES else DOUBT.inexact
     return relative * (1.0 if f.positive else abs(z))
+
+
+def _unseen(model: LoopModel, data: Data, e: np.ndarray, j: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+    """Covariance (k, k) by effects that the model lacks: what a fit of its numbers makes of the errors that each adds
+    from its first and last start, scaled to where it would take away what an effect may that is not found, or all that
+    is left beyond the noise, if that is more; never beyond the start. Any is as likely as the next.
+    """
+    cost = 0.5 * float(e @ e)
+    gone = max(cost * -math.expm1(-2.0 * DOUBT.unseen / data.blocks), cost - 0.5 * e.size)
+    error = math.sqrt(2.0 * cost / e.size) * max(run.sigma for run in data.runs)
+    found: list[list[np.ndarray]] = []
+    for term in terms(model, data.runs, error):
+        secants = [data.residuals(start) - e for start in (term.starts[:1] + term.starts[1:][-1:])]
+        pulls = [(inverse @ (j.T @ s), s) for s in secants if np.all(np.isfinite(s))]
+        apart = [0.5 * float(s @ s - (j @ shift) @ s) for shift, s in pulls]
+        own = [shift * min(1.0, math.sqrt(gone / max(a, 1e-12))) for (shift, _), a in zip(pulls, apart, strict=True)]
+        found += [own] if own else []
+    moved = [shift / math.sqrt(len(own) * len(found)) for own in found for shift in own]
+    return np.array(moved).reshape(-1, j.shape[1]).T @ np.array(moved).reshape(-1, j.shape[1])
 
 
 def _jackknife(model: LoopModel, layout: Sequence[Free], left_out: Sequence[LoopModel]) -> np.ndarray:
