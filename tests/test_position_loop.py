@@ -41,8 +41,8 @@ def run_of(t: np.ndarray, r: np.ndarray, start: float = 0.0) -> Run:
     return Run("run", t, np.ascontiguousarray(r, float), r, yes, yes, 1e-4, 0.0, (start, 0.0), float(r[0]))
 
 
-def recorded(values: dict, seeds=(1, 2), noise: float = 3e-4, effects=(), side: str = "load"):
-    model, out = LoopModel(values, (), effects, side), []
+def recorded(values: dict, seeds=(1, 2), noise: float = 3e-4, effects=(), side: str = "load", fresh: bool = False):
+    model, out = LoopModel(values, (), effects, side, fresh=fresh), []
     for seed in seeds:
         t, r = steps_of(seed)
         y = model.predicted(run_of(t, r)) + noise * np.random.default_rng(seed + 50).standard_normal(t.size)
@@ -194,6 +194,17 @@ def test_a_limit_and_gravity_are_named_and_nothing_else():
     assert document["fit"]["measure"] == "free_run"
     assert list(told.without) == named
     assert all(np.std(told.measured - alone) > np.std(told.measured - told.after) for alone in told.without.values())
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_an_integral_holds_the_servo_where_a_recording_begins_or_is_empty_there(fresh):
+    """Under a weight that friction holds at rest; a shaft made up for it."""
+    weight = ((GravityImbalance.name, np.array([12.0, -6.0])),)
+    given = recorded({**LIMITED, "I": 700.0}, effects=weight, fresh=fresh)
+    found = diagnose(given, None, jobs=2).document
+    assert {m["effect"] for m in found["missing"]} == {GravityImbalance.name, VoltageSaturation.name, InputDelay.name}
+    assert found["fit"]["heldout_rmse_after_rad"] < 1.2 * found["fit"]["noise_floor_rad"]
+    assert found["parameters"]["I"]["value"] == pytest.approx(700.0, rel=0.05)
 
 
 def test_a_recorded_duty_tells_the_input_gain_and_gains_differ_between_recordings():

@@ -183,7 +183,7 @@ def _creep(c: Coefficients, constants: dict[str, np.ndarray]) -> dict[str, float
 
 def _loop_numbers(loop: LoopNumbers | None, c: Coefficients) -> dict[str, float]:
     q = loop or LoopNumbers(K=0.0)
-    given = {k: v for k, v in q._asdict().items() if k not in ("tau", "creep", "heavy")}
+    given = {k: v for k, v in q._asdict().items() if k not in ("tau", "creep", "heavy", "fresh")}
     slow = {"creep": q.creep, "heavy": q.heavy} if loop else {}
     return given | slow | {"looped": float(loop is not None)}
 

@@ -54,7 +54,7 @@ class LoopNumbers(NamedTuple):
     factor below breakaway (infinite: friction holds) and ``heavy`` how much slower the body answers there (MuJoCo's
     constraint: 10), as ``buried`` within a stop (20); ``share`` the motor's of the inertia, behind which a gear rubs;
     ``grease`` [1/s] what drags the load along within a play; ``at_motor`` 1 where the loop's sensor sits on the
-    motor's side, ``log_at_motor`` the recording's.
+    motor's side, ``log_at_motor`` the recording's; ``fresh`` 1 where the integral is empty at the beginning.
     """
 
     K: float
@@ -77,6 +77,7 @@ class LoopNumbers(NamedTuple):
     grease: float = 0.0
     at_motor: float = 0.0
     log_at_motor: float = 0.0
+    fresh: float = 0.0
 
 
 LOOP = np.dtype((np.record, np.dtype([(name, np.float64) for name in LoopNumbers._fields], align=True)))
@@ -339,10 +340,10 @@ def _late_drive(q, past, k, h):
 
 @inline
 def _started(c, q, theta, w, r):
-    """The state at the beginning: both bodies together, an integral that holds it there."""
+    """The state at the beginning: both bodies together, an integral that holds it there, or a ``fresh`` one."""
     hold = _held(c, theta, 0.0, 0.0, 0.0)
     v = q.K * (r - theta)
-    xi = _limited(q, -hold) - v if q.I > 0.0 else 0.0
+    xi = _limited(q, -hold) - v if q.I > 0.0 and q.fresh == 0.0 else 0.0
     return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0, 0.0)
 
 

@@ -92,7 +92,8 @@ class Free:
 class LoopModel:
     """Values of LETTERS (those that are not there are absent), those that are ``free``, effects (name, parameters) with
     laws of their own, and the side on which loop and log sit (see SIDES). The firmware's gain register multiplies the
-    error alone, or of a ``whole`` loop its integral and the damping as well.
+    error alone, or of a ``whole`` loop its integral and the damping as well. The integral holds the servo where a
+    recording begins, or is empty there (``fresh``).
     """
 
     values: Mapping[str, float]
@@ -100,6 +101,7 @@ class LoopModel:
     effects: tuple[tuple[str, np.ndarray], ...] = ()
     side: str = "load"
     whole: bool = False
+    fresh: bool = False
     scales: Scales = field(default=None, repr=False)  # type: ignore[assignment]  # one that is only simulated has none
 
     def __getitem__(self, letter: str) -> float:
@@ -221,6 +223,7 @@ class LoopModel:
             grease=v["grease"],
             at_motor=float(self.side != "load"),
             log_at_motor=float(self.side == "motor"),
+            fresh=float(self.fresh),
         )
         return loop, laid_out(*lowered(*self.plant_of(run)))
 
@@ -270,7 +273,7 @@ class LoopModel:
 
 def only_letters(model: LoopModel, letters: tuple[str, ...]) -> LoopModel:
     """The model of which these letters alone are fitted, and no effect's numbers."""
-    return _OnlyLetters(model.values, letters, model.effects, model.side, model.whole, model.scales)
+    return _OnlyLetters(model.values, letters, model.effects, model.side, model.whole, model.fresh, model.scales)
 
 
 class _OnlyLetters(LoopModel):

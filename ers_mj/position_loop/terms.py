@@ -41,6 +41,7 @@ LAWS = (
 )  # fmt: skip
 
 
+EMPTY = (False, True)  # whether an integral is where a recording begins
 OWN = {
     INTEGRAL: ("I",),
     DERIVATIVE: ("D", "lag_s"),
@@ -168,7 +169,7 @@ def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
     """What the firmware itself may do."""
     drive = model.scales.drive or 4.0 * model.scales.acceleration
     found = [
-        Term(INTEGRAL, tuple(model.having(I=x * model["K"]) for x in SIZES.integrals)),
+        Term(INTEGRAL, tuple(replace(model.having(I=x * model["K"]), fresh=f) for x in SIZES.integrals for f in EMPTY)),
         Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds)),
         Term(InputDelay.name, (model.having(tau_s=0.01),)),
         Term(WITHIN, delayed_within(model)),
