@@ -39,6 +39,7 @@ from ers_mj.position_loop.terms import (
     stops,
     terms,
     top_speed,
+    ways_round,
     without,
 )
 from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
@@ -183,20 +184,15 @@ class Selector:
         return self.unburdened(within if gain(found, within) > self.policy.loop_place else found)
 
     def _firmware(self, fit: Fit) -> Fit:
-        """The fit, or a better one of the same loop in another firmware: the speed that it damps lags behind; its
-        integral is empty where a recording begins; its gain register multiplies the other parts of the loop, too, which
-        only records at several gains tell.
+        """The fit, or a better one of the same loop in another firmware: the damped speed lags behind; the integral is
+        empty at the beginning; the gain register multiplies all of the loop, which only several gains tell.
         """
         if "D" in fit.model.free and "lag_s" not in fit.model.free:
             late = self._whole(best(lagging(fit.model), self.screen, EFFORT.full))
             damps = late.model["D"] > self.policy.loop_damping * late.model["a_2"]
             fit = late if gain(fit, late) > 0.0 or (damps and late.cost < fit.cost) else fit
-        if "I" in fit.model.free:
-            other = fitted(replace(fit.model, fresh=not fit.model.fresh), self.data, EFFORT.full)
-            fit = min(fit, other, key=lambda one: one.cost)
-        if any(run.gain != self.runs[0].gain for run in self.runs) and {"D", "I"} & set(fit.model.free):
-            other = fitted(replace(fit.model, whole=not fit.model.whole), self.data, EFFORT.full)
-            fit = min(fit, other, key=lambda one: one.cost)
+        for turned in ways_round(fit.model, self.runs):
+            fit = min(fit, fitted(turned(fit.model), self.data, EFFORT.full), key=lambda one: one.cost)
         return fit
 
     def aligned(self, base: Fit) -> Fit:

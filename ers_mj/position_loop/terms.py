@@ -7,7 +7,7 @@ A limit or an effect is begun from a start of its own; where one changes what th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -197,6 +197,16 @@ def _asleep(model: LoopModel) -> Iterator[LoopModel]:
     for size in SIZES.bands:
         yield model.having(band=size * model["c_2"] / model["K"])
         yield model.having(idle=size * model["c_2"])
+
+
+def ways_round(model: LoopModel, runs: Sequence[Run]) -> list[Callable[[LoopModel], LoopModel]]:
+    """What else the firmware may do with an integral where a recording begins, and with its gain register."""
+    found = []
+    if "I" in model.free:
+        found.append(lambda model: replace(model, fresh=not model.fresh))
+    if any(run.gain != runs[0].gain for run in runs) and {"D", "I"} & set(model.free):
+        found.append(lambda model: replace(model, whole=not model.whole))
+    return found
 
 
 def lagging(model: LoopModel) -> tuple[LoopModel, ...]:
