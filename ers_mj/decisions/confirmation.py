@@ -120,10 +120,10 @@ class Pair:
 
 def table_pays(pairs: Sequence[Pair], trained: Pair, noise: float, policy: Policy = POLICY) -> bool:
     """Whether a table of what is unknown is kept: held-out data, as it is or recalibrated, asks for it, and neither
-    that nor what it was fitted to (``trained``) loses more than what blocks confirm may.
+    that nor what it was fitted to (``trained``) is better by as much without it.
     """
-    worse = (pair.with_it > policy.worse * pair.without for pair in (*pairs, trained))
-    return any(pair.is_worth(noise, policy) for pair in pairs) and not any(worse)
+    without = (Pair(pair.without, pair.with_it, 0.0) for pair in (*pairs, trained))
+    return any(pair.is_worth(noise, policy) for pair in pairs) and not any(x.is_worth(noise, policy) for x in without)
 
 
 def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:
