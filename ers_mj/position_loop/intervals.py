@@ -1,5 +1,5 @@
-"""Intervals of a loop's numbers and of what only a sum or a ratio of them can tell: a sandwich over blocks, and how far
-effects move the numbers that act unseen, or are what is left.
+"""Intervals of a loop's numbers and of what only a sum or a ratio of them can tell: a sandwich over blocks, how far
+effects move the numbers that act unseen, or are what is left, and the likeliest that was not taken.
 """
 
 from __future__ import annotations
@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
+from ers_mj.decisions.thresholds import Policy
 from ers_mj.position_loop import beside
-from ers_mj.position_loop.fit import Data, Fit, fitted, jacobian
+from ers_mj.position_loop.fit import Data, Fit, best, fitted, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
-from ers_mj.position_loop.terms import terms
+from ers_mj.position_loop.selection import Selection
+from ers_mj.position_loop.terms import is_there, lagging, terms
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,7 @@ class Doubt:
     inexact: float = 0.0025  # standard deviation of what firmware and simulation do in steps: relative,
     clock: float = 0.00075  # [s] and in time
     unseen: float = 2.0  # gain of an effect that is not found
+    lagged: int = 12  # steps of a refit with a late speed
 
 
 DOUBT = Doubt()
@@ -56,8 +59,12 @@ class Intervals:
     factor: float
 
     @staticmethod
-    def of(fit: Fit, data: Data, left_out: Sequence[LoopModel] = ()) -> Intervals:
-        """``left_out`` are refits without each recording in turn; three or more widen what scatters between them."""
+    def of(
+        fit: Fit, data: Data, left_out: Sequence[LoopModel] = (), rivals: Sequence[tuple[float, LoopModel]] = ()
+    ) -> Intervals:
+        """``left_out`` are refits without each recording in turn; three or more widen what scatters between them.
+        ``rivals`` are refits with something that was not taken, each with how likely it acts nevertheless.
+        """
         model = fit.model
         if "L" in model.free and "D" not in model.free:  # a term that was left out leaves doubt in what it moves
             model = fitted(model.having(D=0.0), data, 8).model
@@ -74,6 +81,7 @@ class Intervals:
         spread += inverse * float(np.mean(e * e))
         if len(left_out) >= DOUBT.fewest and set(left_out[0].free) == set(fit.model.free):
             spread += _jackknife(fit.model, layout, left_out)
+        spread += _beside_rivals(fit.model, layout, [*rivals, *_with_lag(fit.model, data)])
         spread += _unseen(model, data, e, j, inverse)
         steps = [_inexact(f, q, rate, model["K"]) for f, q in zip(layout, model.vector(layout), strict=True)]
         spread += np.diag(np.square(steps))
@@ -143,6 +151,42 @@ def _inexact(f: Free, z: float, rate: float, K: float) -> float:
         return DOUBT.clock / f.size
     relative = math.hypot(DOUBT.inexact, 0.5 * rate * DOUBT.clock) if f.name in RATES else DOUBT.inexact
     return relative * (1.0 if f.positive else abs(z))
+
+
+def passed_over(selection: Selection, policy: Policy) -> list[tuple[float, LoopModel]]:
+    """The answer with the likeliest candidate that was not taken in the end, and how likely that acts: its share of the
+    gain that is asked for.
+    """
+    last = selection.rounds[-1] if selection.rounds else ()
+    asked = [c for c in last if c.gain > 0.0 and not is_there(selection.chosen.model, c.name)]
+    return [(min(1.0, c.gain / policy.loop_gain), c.fit.model) for c in sorted(asked, key=lambda c: -c.gain)[:1]]
+
+
+def _with_lag(model: LoopModel, data: Data) -> list[tuple[float, LoopModel]]:
+    """A loop whose damping has the speed late, which its firmware is sure to do by a little."""
+    if "D" not in model.free or "lag_s" in model.free:
+        return []
+    return [(1.0, best(lagging(model), data, DOUBT.lagged).model)]
+
+
+def _beside_rivals(model: LoopModel, layout: Sequence[Free], rivals: Sequence[tuple[float, LoopModel]]) -> np.ndarray:
+    """Covariance by how far rivals move the numbers."""
+    own, spread = _at(model), np.zeros((len(layout), len(layout)))
+    for likely, rival in rivals:
+        its = _at(rival)
+        moved = np.array([its[key] - own[key] if key in its and key in own else 0.0 for key in map(_key, layout)])
+        spread += likely * np.outer(moved, moved)
+    return spread
+
+
+def _key(free: Free) -> tuple[str, str]:
+    return free.owner, free.name
+
+
+def _at(model: LoopModel) -> dict[tuple[str, str], float]:
+    """The transformed numbers of a model."""
+    layout = model.layout()
+    return dict(zip(map(_key, layout), model.vector(layout).tolist(), strict=True))
 
 
 def _unseen(model: LoopModel, data: Data, e: np.ndarray, j: np.ndarray, inverse: np.ndarray) -> np.ndarray:
