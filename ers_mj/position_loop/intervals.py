@@ -191,18 +191,22 @@ def _at(model: LoopModel) -> dict[tuple[str, str], float]:
 
 def _unseen(model: LoopModel, data: Data, e: np.ndarray, j: np.ndarray, inverse: np.ndarray) -> np.ndarray:
     """Covariance (k, k) by effects that the model lacks: what a fit of its numbers makes of the errors that each adds
-    from its first and last start, scaled to where it would take away what an effect may that is not found, or all that
-    is left beyond the noise, if that is more; never beyond the start. Any is as likely as the next.
+    from its first and last start, scaled to where it would take away what an effect may that is not found, or what it
+    takes of what is left, if that is more; never beyond the start. Any is as likely as the next.
     """
     cost = 0.5 * float(e @ e)
-    gone = max(cost * -math.expm1(-2.0 * DOUBT.unseen / data.blocks), cost - 0.5 * e.size)
+    hidden = cost * -math.expm1(-2.0 * DOUBT.unseen / data.blocks)
     error = math.sqrt(2.0 * cost / e.size) * max(run.sigma for run in data.runs)
     found: list[list[np.ndarray]] = []
     for term in terms(model, data.runs, error):
-        secants = [data.residuals(start) - e for start in (term.starts[:1] + term.starts[1:][-1:])]
-        pulls = [(inverse @ (j.T @ s), s) for s in secants if np.all(np.isfinite(s))]
-        apart = [0.5 * float(s @ s - (j @ shift) @ s) for shift, s in pulls]
-        own = [shift * min(1.0, math.sqrt(gone / max(a, 1e-12))) for (shift, _), a in zip(pulls, apart, strict=True)]
+        own = []
+        for start in term.starts[:1] + term.starts[1:][-1:]:
+            secant = data.residuals(start) - e
+            if np.all(np.isfinite(secant)):
+                shift = inverse @ (j.T @ secant)
+                apart = secant - j @ shift
+                most = max(0.5 * float(apart @ apart), 1e-12)
+                own.append(shift * min(1.0, math.sqrt(max(hidden, 0.25 * float(e @ apart) ** 2 / most) / most)))
         found += [own] if own else []
     moved = [shift / math.sqrt(len(own) * len(found)) for own in found for shift in own]
     return np.array(moved).reshape(-1, j.shape[1]).T @ np.array(moved).reshape(-1, j.shape[1])
