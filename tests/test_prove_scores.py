@@ -192,7 +192,7 @@ def test_first_or_second_counts_without_the_rig_s_own_names():
         ("single", ["input_delay"], ["end_stop", "asymmetric_friction", "stribeck", "sensor_lag"], 3.5),
         ("single", ["backlash"], ["stribeck", "presliding", "backlash"], 8.0),
         ("single", ["sensor_dropout"], [], 0.5),
-        (real.PARTLY, ["backlash"], ["backlash"], 5.0),
+        (real.PARTLY, ["voltage_saturation"], ["current_limit"], 5.0),
     ):
         truth, answer = truth_and_answer(kind, labels, named)
         truth |= {"rig": "throttle", "visibility_after_refit_sigma": left}
@@ -203,7 +203,9 @@ def test_first_or_second_counts_without_the_rig_s_own_names():
         )
     results = real.scored_real(rows)
     assert results["foremost_visible"] == (1, 2) and results["foremost_visible_half_simulated"] == (1, 1)
-    assert results["counts"]["single"] == 3 and [x["concealed"] for x in results["half_simulated"]] == ["backlash"]
+    assert results["counts"]["single"] == 3 and [x["concealed"] for x in results["half_simulated"]] == [
+        "voltage_saturation"
+    ]
     page = proof_report.proof_page(results | {"failures": []}, rows, {})
     assert "named first or second, the rig&#x27;s own set aside, in 1 of 2" in page.replace("'", "&#x27;")
 

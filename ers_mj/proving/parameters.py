@@ -56,10 +56,10 @@ def _compared(owner: str, name: str, true: float, entry: Mapping) -> list[dict]:
 
 def meant(effect: Mapping, truth: Mapping) -> dict[str, float]:
     """The answer's names of this effect's parameters -> what they should be; empty where the form leaves no single
-    meaning.
+    meaning, and of a real rig, whose own numbers nobody knows.
     """
     s, shape, p = effect["strength"], effect["shape"], truth.get("true_parameters") or {}
-    if s is None:
+    if s is None or truth.get("rig"):
         return {}
     if "units" in truth:
         return _in_units(effect, truth) if shape["own_form"] else {}
