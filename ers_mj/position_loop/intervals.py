@@ -1,5 +1,5 @@
 """Intervals of a loop's numbers and of what only a sum or a ratio of them can tell: a sandwich over blocks, how far
-effects move the numbers that act unseen, or are what is left, and the likeliest that was not taken.
+effects move the numbers that act unseen, as large as what is left supports, and the likeliest that was not taken.
 """
 
 from __future__ import annotations

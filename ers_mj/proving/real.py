@@ -295,6 +295,7 @@ def scored_real(rows: Sequence[dict]) -> dict:
     fresh = [x for x in told if not x["was_its_own"]]
     return {
         **scored(singles),
+        "accuracy": [],  # of the first name, where the rig's own stands
         "cases": len(rows),
         "untouched": len(own),
         "found": _share_found(told),
