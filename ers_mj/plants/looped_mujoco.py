@@ -37,15 +37,10 @@ class LoopedPlant:
     loop: LoopNumbers
 
     def __post_init__(self):
-        """A gear behind the motor's share of the inertia rubs by what it carries (see plants/position_loop.py): what
-        damps one body acts before it.
-        """
+        """A gear behind the motor's share of the inertia rubs by what it carries (see plants/position_loop.py)."""
         if any(name == LoadDependentFriction.name for name, _ in self.plant.effects):
             effects = [(name, _carried(name, values, self.loop.share)) for name, values in self.plant.effects]
-            c = self.plant.coefficients
-            if not c.has_motor_side and c.a_mech_plus == c.a_mech_minus:
-                c = c._replace(a_emf=c.a_emf + c.a_mech_plus, a_mech_plus=0.0, a_mech_minus=0.0)
-            object.__setattr__(self, "plant", replace(self.plant, coefficients=c, effects=effects))
+            object.__setattr__(self, "plant", replace(self.plant, effects=effects))
 
     @property
     def model(self) -> mujoco.MjModel:

@@ -190,6 +190,13 @@ def _level(c, theta, w, carried):
 
 
 @inline
+def _carried(c, q, drive, w_m, push):
+    """The torque on the gear: the motor's, back-EMF and all, and what the load holds, each by the other's inertia."""
+    motor = min(max(drive - c.a_emf * w_m, -q.most), q.most)
+    return (1.0 - q.share) * motor - q.share * push
+
+
+@inline
 def _held(c, theta, w, drive, t):
     """What springs and laws of effects make of a load there."""
     hold = c.bias + c.a_1 * (c.theta_0 - theta)
@@ -273,7 +280,7 @@ def _one_body(c, q, t, x, r, fresh, late, h):
     if wall != 0.0 and held * wall < 0.0:
         w = _slipped(1.0, push - wall + drive, a - d_wall + c.a_emf, level, q.creep, q.heavy, x.w, h)
     xi = _integrated(q, x.xi, v, e, h)
-    carried = (1.0 - q.share) * (w - x.w) / h - push
+    carried = _carried(c, q, drive, 0.5 * (x.w + w), push)
     theta += 0.5 * h * w
     z = bent(c, z, w, firm, h) if has_bristle(c) else z
     return Moving(theta, w, theta, w, xi, _damped(q, slow, w, h)[1], x.r, _limited(q, v), carried, z)
@@ -290,7 +297,7 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
     touch, d = _touched(c, q, theta_m - theta, x.w_m - x.w)
     a = (1.0 - c.beta) * (c.a_mech_plus if x.w > 0.0 else c.a_mech_minus) + d_wall
     a_m = c.beta * (c.a_mech_plus if x.w_m > 0.0 else c.a_mech_minus) + c.a_emf
-    level, level_m = (1.0 - c.phi) * _level(c, theta, x.w, x.drive), c.phi * _level(c, theta, x.w_m, x.drive)
+    level, level_m = (1.0 - c.phi) * _level(c, theta, x.w, x.carried), c.phi * _level(c, theta, x.w_m, x.carried)
     D, slow = _damped(q, x.slow, seen, h)
     asked = q.K * _pushed(q, e) + x.xi - (q.D - D) * slow
     w, w_m = x.w, x.w_m
@@ -312,9 +319,10 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
             asks = fresh * _limited(q, v) + late + between
             w_m = _slipped(c.rho, asks, a_m + d, level_m, q.creep, q.heavy, x.w_m, h)
     xi = _integrated(q, x.xi, v, e, h)
+    carried = _carried(c, q, fresh * _limited(q, v) + late, 0.5 * (x.w_m + w_m), push + wall)
     slow = _damped(q, slow, w_m if q.at_motor > 0.0 else w, h)[1]
     theta, theta_m = theta + 0.5 * h * w, theta_m + 0.5 * h * w_m
-    return Moving(theta, w, theta_m, w_m, xi, slow, x.r, _limited(q, v), touch, x.z)
+    return Moving(theta, w, theta_m, w_m, xi, slow, x.r, _limited(q, v), carried, x.z)
 
 
 @inline

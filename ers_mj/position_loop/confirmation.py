@@ -17,7 +17,7 @@ from ers_mj.position_loop.fit import Data, Fit, fitted, gain
 from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run
 from ers_mj.position_loop.selection import Left, Selection, Selector
-from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, is_there, together, without
+from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, parts, without
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class Split:
     parts: int = 3  # of every one of a few recordings, left out in turn
     most_folds: int = 6  # of more recordings several are left out at once
     steps: int = 12  # of a refit to the rest
+    others: int = 3  # terms that are tried in the place of what was refused
 
 
 SPLIT = Split()
@@ -50,12 +51,13 @@ class Fold:
 @dataclass(frozen=True)
 class Score:
     """Errors of free runs on held-out samples: rmse and mae [output unit], mean squared error of each block (B,) in
-    noise variances.
+    noise variances, and the root mean squared one of each run (R,) [output unit].
     """
 
     rmse: float
     mae: float
     misfit: np.ndarray
+    each: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ def _some(runs: Iterable[Run]) -> tuple[Run, ...]:
 
 def scored(models: Sequence[LoopModel], folds: Sequence[Fold]) -> Score:
     """The held-out score of a model of each fold."""
-    errors, misfit = [], []
+    errors, misfit, each = [], [], []
     for model, fold in zip(models, folds, strict=True):
         for run in fold.held:
             e = (run.y - model.predicted(run))[run.scored]
@@ -109,9 +111,10 @@ def scored(models: Sequence[LoopModel], folds: Sequence[Fold]) -> Score:
             counts = np.bincount(block - block[0])
             sums = np.bincount(block - block[0], (e / run.sigma) ** 2)
             errors.append(e)
+            each.append(math.sqrt(float(np.mean(e**2))))
             misfit.append(sums[counts > 0] / counts[counts > 0])
     e = np.concatenate(errors)
-    return Score(math.sqrt(float(np.mean(e**2))), float(np.mean(np.abs(e))), np.concatenate(misfit))
+    return Score(math.sqrt(float(np.mean(e**2))), float(np.mean(np.abs(e))), np.concatenate(misfit), np.array(each))
 
 
 def bare_fit(selector: Selector, selection: Selection) -> Fit:
@@ -140,27 +143,24 @@ def confirmed(
 ) -> tuple[Selection, Confirmed]:
     """The selection without what held-out data does not confirm, and what it says of the rest.
 
-    Of several terms that went each is tried once more beside what stayed: another may have stood in its place.
+    Where something was refused, what takes its place is looked for among everything else.
     """
     folds, sentence = folds_of(selector.runs, held)
-    first = selection
+    refused: set[frozenset[str]] = set()
+    tried = 0
     while True:
         found = _judged(selector, selection, folds, sentence, policy)
         doubtful = _doubtful(found, selection, selector.runs, policy)
-        if not doubtful:
-            break
-        weakest = min(doubtful, key=lambda x: x.gain)
-        lesser = fitted(weakest.fit.model, selector.data)
-        selection = selector.pruned(replace(selection, chosen=lesser, left=()))
-    gone = [x for x in first.named if not is_there(selection.chosen.model, x.name)]
-    for name in [x.name for x in sorted(gone, key=lambda x: -x.gain)] if len(gone) > 1 else ():
-        again = selector.grown(selection, together(selection.chosen.model, first.chosen.model, name))
-        if again is None or not is_there(again.chosen.model, name):
+        if doubtful:
+            refused.add(frozenset(parts(selection.chosen.model)))
+            weakest = min(doubtful, key=lambda x: x.gain)
+            lesser = fitted(weakest.fit.model, selector.data)
+            selection = selector.pruned(replace(selection, chosen=lesser, left=()))
             continue
-        told = _judged(selector, again, folds, sentence, policy)
-        if not _doubtful(told, again, selector.runs, policy):
-            selection, found = again, told
-    return selection, found
+        more = selector.another(selection, refused) if refused and tried < SPLIT.others else None
+        if more is None:
+            return selection, found
+        selection, tried = more, tried + 1
 
 
 def _doubtful(found: Confirmed, selection: Selection, runs: Sequence[Run], policy: Policy) -> list[Left]:
@@ -193,7 +193,8 @@ def _holds(found: Confirmed, name: str, runs: Sequence[Run], policy: Policy) -> 
     noise = math.sqrt(float(np.mean([run.sigma**2 for run in runs])))
     ratio = after.rmse / max(less.rmse, 1e-300)
     costs = cost(after.misfit, 1.0), cost(less.misfit, 1.0)
-    held = HeldOut(found.p_values[name], (after.rmse, less.rmse), noise, costs, ratio, math.log(ratio))
+    log_ratio = float(np.mean(np.log(np.maximum(after.each, 1e-300) / np.maximum(less.each, 1e-300))))
+    held = HeldOut(found.p_values[name], (after.rmse, less.rmse), noise, costs, ratio, log_ratio)
     return is_confirmed(held, lambda: None, policy) and pays(held, lambda: None, policy)
 
 

@@ -49,6 +49,7 @@ LETTERS: Mapping[str, Letter] = {
     "buried": Letter("-", 1.0, lower=1.0, upper=30.0),
     "share": Letter("-", 0.5, positive=False, upper=0.97, size=0.3),
     "grease": Letter("1/s", lower=1e-4),
+    "rubbed": Letter("-", 1.0, positive=False, upper=1.0, size=0.3),  # share of the damping that is no back-EMF
     "rotor": Letter("-", lower=1e-6, upper=1e6),
     "a_1": Letter("1/s^2", positive=False, lower=-math.inf, size=20.0),
     "a_2": Letter("1/s", lower=1e-4),
@@ -230,12 +231,13 @@ class LoopModel:
     def plant_of(self, run: Run) -> tuple[Coefficients, list[tuple[str, np.ndarray]]]:
         """The plant behind the loop in one run: coefficients of an input of 1 acceleration, and the effects in it."""
         light = self.lightness(run)
-        damping, parted = self["a_2"] * light, any(BY_NAME[n].subsystem == "transmission" for n in self.names)
-        c = Coefficients(  # of two bodies the motor is damped
+        damping = self["a_2"] * light
+        mechanical = damping * self["rubbed"]
+        c = Coefficients(
             a_1=self["a_1"] * light,
-            a_mech_plus=0.0 if parted else damping,
-            a_mech_minus=0.0 if parted else damping,
-            a_emf=damping if parted else 0.0,
+            a_mech_plus=mechanical,
+            a_mech_minus=mechanical,
+            a_emf=damping - mechanical,
             c_2_plus=self["c_2"] * light,
             c_2_minus=self["c_2"] * light,
             bias=self["hold"] * light,

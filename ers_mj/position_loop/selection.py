@@ -6,7 +6,7 @@ closed form -> base (gain, limit, latency, load) -> compare all candidates -> ad
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,35 +14,33 @@ from functools import partial
 import numpy as np
 
 from ers_mj.decisions.thresholds import POLICY, Policy
-from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.input_delay import InputDelay
 from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.effects.voltage_saturation import VoltageSaturation
+from ers_mj.position_loop.closed_form import ClosedForms
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain, jacobian
 from ers_mj.position_loop.model import LoopModel, only_letters
-from ers_mj.position_loop.runs import Run, scales_of
+from ers_mj.position_loop.runs import Run
 from ers_mj.position_loop.terms import (
     CONSTANT,
     DERIVATIVE,
     INTEGRAL,
     SPRING,
-    STARTING,
     Term,
     delayed_within,
     form_of,
     is_there,
     lagging,
-    other_shares,
+    parts,
     present,
     sized,
-    stops,
+    stiffer,
     terms,
-    top_speed,
     ways_round,
     without,
 )
-from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
+from ers_mj.position_loop.weak_form import SCAN, Rough
 
 Progress = Callable[[str, float], None]
 GRAVITY = GravityImbalance.name
@@ -57,8 +55,8 @@ class Effort:
     rounds: int = 6
     alignments: int = 3  # of logs of different offsets
     screened: float = 50.0  # [s] of recordings on which starts are compared
-    several: Halving = Halving(looked=6, first=10, kept=3)  # starts of the bare loop
-    parted: Halving = Halving(looked=5, first=6, kept=2)  # starts of two bodies
+    several: Halving = Halving(looked=8, first=10, kept=3)  # starts of the bare loop
+    parted: Halving = Halving(looked=8, first=6, kept=2)  # starts of two bodies, sensors on each side of them
     far: int = 25  # steps of their best ones
     tried: int = 10  # steps of a candidate's best starts
     promise: float = 0.3  # of what is asked for, from which a law is refitted,
@@ -67,8 +65,6 @@ class Effort:
     near: float = 0.3  # those that gain this share of what the best one gains at first,
     nearer: float = 0.6  # or this one, where a refit to the end takes in more recordings than are screened
     enough: float = 1.15  # noise levels of error that one body may leave before two are tried
-    speeds: tuple[float, ...] = (0.9, 1.0, 1.15)  # of the largest seen, to which the reference is limited
-    inset: float = 0.06  # of the travel, beyond which a stop may act
     full: int = 40  # steps of a fit to the end
 
 
@@ -119,6 +115,14 @@ def spread_out(runs: Sequence[Run], seconds: float) -> list[Run]:
     return [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, count).round().astype(int))]
 
 
+def _stiffened(fit: Fit, data: Data) -> Fit:
+    """The best of a fit with a soft contact, and of those begun from it with one that is stiffer and stiffer."""
+    found = [fit]
+    for k in range(len(stiffer(fit.model))):
+        found.append(fitted(stiffer(found[-1].model)[k], data, EFFORT.tried))
+    return min(found, key=lambda fit: fit.cost)
+
+
 class Selector:
     """A selection under way on some runs."""
 
@@ -128,7 +132,7 @@ class Selector:
 
     def _take(self, runs: Sequence[Run]) -> None:
         self.data = Data.of(runs)
-        self._roughs: dict[tuple, list[Rough]] = {}
+        self.closed = ClosedForms(runs, self.is_angle)
         some = spread_out(runs, EFFORT.screened)
         self.screen = self.data if len(some) == len(runs) else Data.of(some)
 
@@ -150,11 +154,27 @@ class Selector:
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
             ranked = self.compared(current)
             rounds.append(tuple(ranked))
-            if not ranked or ranked[0].gain < self.policy.loop_gain or not self._pays(current, ranked[0].fit):
+            if not ranked or not self._is_worth(current, ranked[0]):
                 break
             current = ranked[0].fit
         progress("leaving out what is not needed", 0.65)
         return self.pruned(Selection(base, current, tuple(rounds)))
+
+    def another(self, selection: Selection, refused: Collection[frozenset[str]]) -> Selection | None:
+        """The selection with the best term that it lacks; None where that is not worth it, or where what stays is a set
+        of terms that was refused.
+        """
+        current = selection.chosen
+        ranked = self.compared(current, refused) if self._may_gain(current) else []
+        if not ranked or not self._is_worth(current, ranked[0]):
+            return None
+        more = self.pruned(replace(selection, chosen=ranked[0].fit, left=()))
+        terms_of = [frozenset(parts(fit.model)) for fit in (current, more.chosen)]
+        return None if terms_of[1] in {*refused, terms_of[0]} else more
+
+    def _is_worth(self, current: Fit, candidate: Compared) -> bool:
+        """Whether a candidate buys more than chance offers, and its share of what is left."""
+        return candidate.gain >= self.policy.loop_gain and self._pays(current, candidate.fit)
 
     def _pays(self, without: Fit, after: Fit) -> bool:
         """Whether an effect takes its share of the squared error above the noise: of a model that stays wrong blocks
@@ -172,12 +192,12 @@ class Selector:
     def base(self) -> Fit:
         """The loop with a limit and without, under gravity (or a spring where the output is no angle)."""
         loads = ("hold", "sin", "cos") if self.is_angle else ("hold", "a_1")
-        roughs = [rough for width in SCAN.widths for rough in self._rough(loads, width)]
-        starts = [self.begun(rough) for rough in roughs]
+        roughs = [rough for width in SCAN.widths for rough in self.closed.rough(loads, width)]
+        starts = [self.closed.begun(rough) for rough in roughs]
         first = min(roughs, key=lambda rough: rough.left)
         if "L" in first.values:
             values = {**first.values, "K": 1.5 * first.values["K"], "L": 1.3 * first.values["L"]}
-            starts.append(self.begun(Rough(values, first.left)))
+            starts.append(self.closed.begun(Rough(values, first.left)))
         found = self._whole(best(starts, self.screen, EFFORT.full, EFFORT.several))
         found = self._firmware(found)
         within = self._whole(best(delayed_within(found.model), self.screen, EFFORT.full))
@@ -222,15 +242,6 @@ class Selector:
                 fit = bare if gain(bare, fit) < self.policy.loop_gain else fit
         return fit
 
-    def begun(self, rough: Rough, **more: float) -> LoopModel:
-        """A model as a regression has it; a derivative term is free where a limit tells it apart."""
-        values = {k: v for k, v in {**rough.values, **more}.items() if k not in ("sin", "cos")}
-        drive = values.get("L", values["K"] * 0.5 * float(np.nanmax(np.abs(self.runs[0].r - self.runs[0].y))))
-        model = LoopModel(values, tuple(values), scales=scales_of(self.runs, self.is_angle, values["c_2"], drive))
-        if "sin" in rough.values:
-            model = model.with_effect(GRAVITY, np.array([rough.values["sin"], rough.values["cos"]]))
-        return model.having(D=0.0) if "L" in values else model
-
     # -- comparing -----------------------------------------------------------------------------------------------------
 
     def _may_gain(self, fit: Fit) -> bool:
@@ -241,9 +252,12 @@ class Selector:
         """What a fit leaves [output unit]."""
         return math.sqrt(fit.misfit) * float(np.sqrt(np.mean([run.sigma**2 for run in self.runs])))
 
-    def compared(self, current: Fit) -> list[Compared]:
-        """The candidates beside a model, the one that buys most first: two bodies only where one leaves too much."""
-        every = self._terms(current)
+    def compared(self, current: Fit, refused: Collection[frozenset[str]] = ()) -> list[Compared]:
+        """The candidates beside a model, the one that buys most first: two bodies only where one leaves too much; none
+        that makes a set of terms that was refused.
+        """
+        there = parts(current.model)
+        every = [term for term in self._terms(current) if frozenset((*there, term.name)) not in refused]
         ranked = self._ranked(current, self._promising(current, [t for t in every if not t.is_far]))
         if ranked and ranked[0].fit.misfit < EFFORT.enough**2:
             return ranked
@@ -252,16 +266,26 @@ class Selector:
     def _terms(self, current: Fit, names: Sequence[str] = ()) -> list[Term]:
         """The candidates beside a model, or those of these names."""
         found = terms(current.model, self.runs, self._error(current))
-        return [self._with_closed_form(term, current.model) for term in found if not names or term.name in names]
+        return [self.closed.beside(term, current.model) for term in found if not names or term.name in names]
 
     def _ranked(self, current: Fit, candidates: Sequence[Term]) -> list[Compared]:
-        seen = current if self.screen is self.data else fitted(current.model, self.screen, EFFORT.tried)
-        quick = sorted(self._map(partial(self._tried, seen), candidates), key=lambda c: -c.gain)
-        near = EFFORT.near if self.screen is self.data else EFFORT.nearer
-        least = near * max((c.gain for c in quick), default=0.0)
+        """The candidates, the one that buys most first, those that promise most refitted to the end. What acts in few
+        runs is tried on all of them.
+        """
+        whole = self.screen is self.data
+        seen = current if whole else fitted(current.model, self.screen, EFFORT.tried)
+        often = [term for term in candidates if whole or not term.is_rare]
+        quick = sorted(self._map(partial(self._tried, seen, self.screen), often), key=lambda c: -c.gain)
+        least = (EFFORT.near if whole else EFFORT.nearer) * max((c.gain for c in quick), default=0.0)
         ready = [c for c in quick[: EFFORT.finalists] if c.gain > max(least, 0.0)]
+        rest = quick[len(ready) :]
+        seldom = self._map(
+            partial(self._tried, current, self.data), [term for term in candidates if not (whole or not term.is_rare)]
+        )
+        for c in seldom:
+            (ready if c.gain > self.policy.loop_gain else rest).append(c)
         full = list(self._map(partial(self._finished, current), ready))
-        return sorted([*full, *quick[len(ready) :]], key=lambda c: -c.gain)
+        return sorted([*full, *rest], key=lambda c: -c.gain)
 
     def _promising(self, current: Fit, candidates: Sequence[Term]) -> list[Term]:
         """The candidates without those laws of which no start, in any size and beside any other numbers of the model,
@@ -292,60 +316,21 @@ class Selector:
                 found.append(replace(term, starts=tuple(sized(term.starts[k], term.name, x) for _, x, k in first)))
         return found
 
-    def _tried(self, current: Fit, term: Term) -> Compared:
+    @staticmethod
+    def _tried(current: Fit, data: Data, term: Term) -> Compared:
         if term.is_bent:
-            fit = best(term.starts, self.screen, EFFORT.far, EFFORT.several)
+            fit = best(term.starts, data, EFFORT.far, EFFORT.several)
         elif term.is_far:
-            fit = best(term.starts, self.screen, EFFORT.far, EFFORT.parted)
+            sides = {start.side: [s for s in term.starts if s.side == start.side] for start in term.starts}
+            tried = [_stiffened(best(starts, data, EFFORT.far, EFFORT.parted), data) for starts in sides.values()]
+            fit = min(tried, key=lambda fit: fit.cost)
         else:
-            fit = best(term.starts, self.screen, EFFORT.tried)
+            fit = best(term.starts, data, EFFORT.tried)
         return Compared(term.name, fit, gain(current, fit))
 
     def _finished(self, current: Fit, candidate: Compared) -> Compared:
-        others = other_shares(candidate.fit.model)
-        model = best(others, self.screen, EFFORT.tried, EFFORT.several).model if len(others) > 1 else others[0]
-        fit = fitted(model, self.data, EFFORT.full)
+        fit = fitted(candidate.fit.model, self.data, EFFORT.full)
         return replace(candidate, fit=fit, gain=gain(current, fit))
-
-    def _with_closed_form(self, term: Term, model: LoopModel) -> Term:
-        """The term with starts from a regression that has it in, for what bends the rest of the model most."""
-        if term.name == EndStop.name:
-            return replace(term, starts=(*term.starts, *self._stopped(model)))
-        if term.name not in (RateLimit.name, INTEGRAL):
-            return term
-        loads = ("hold", "sin", "cos") if GRAVITY in model.names else ("hold",)
-        is_rate = term.name == RateLimit.name
-        speeds = [x * top_speed(self.runs) for x in EFFORT.speeds] if is_rate else [np.inf]
-        begun = []
-        for speed in speeds:
-            for width in SCAN.widths:
-                roughs = self._rough(loads, width, speed, not is_rate)
-                begun += [self.begun(rough, **({"R": speed} if is_rate else {})) for rough in roughs]
-        for name, values in model.effects:
-            if name != GRAVITY:
-                begun = [m.with_effect(name, values) for m in begun]
-        return replace(
-            term, starts=(*term.starts, *(replace(m, side=model.side, whole=model.whole) for m in begun)), is_bent=True
-        )
-
-    def _rough(self, *asked, **within) -> list[Rough]:
-        """As weak_form.rough_starts of the runs; what was asked once is not worked out again."""
-        key = (*asked, *within.values())
-        if key not in self._roughs:
-            self._roughs[key] = rough_starts(self.runs, *asked, **within)
-        return self._roughs[key]
-
-    def _stopped(self, model: LoopModel) -> list[LoopModel]:
-        """Stops at the ends of the travel, beside what a regression makes of the rest of it."""
-        loads = ("hold", "sin", "cos") if self.is_angle else ("hold",)
-        low, high = model.scales.low, model.scales.high
-        inset = EFFORT.inset * (high - low)
-        found = []
-        for lower, upper in ((-np.inf, high), (low, np.inf), (low, high)):
-            within = (lower + inset, upper - inset)
-            for rough in self._rough(loads, SCAN.widths[0], within=within):
-                found += stops(self.begun(rough), lower + 0.3 * inset, upper - 0.3 * inset)
-        return found
 
     def _map(self, call: Callable, items: Sequence):
         if self.jobs == 1:
@@ -359,20 +344,11 @@ class Selector:
         """The selection with what buys too little taken out again, and with what the rest buys."""
         current = selection.chosen
         while True:
-            left = [self._left_out(current, name) for name in self._parts(current.model)]
+            left = [self._left_out(current, name) for name in parts(current.model)]
             weakest = min(left, key=lambda x: x.gain - self._least(x, current), default=None)
             if weakest is None or weakest.gain >= self._least(weakest, current):
                 return replace(selection, chosen=current, left=tuple(left))
             current = weakest.fit
-
-    def grown(self, selection: Selection, begun: LoopModel) -> Selection | None:
-        """The selection from a model with one more term, without what that makes needless; None where chance offers as
-        much.
-        """
-        current, fit = selection.chosen, fitted(begun, self.data, EFFORT.full)
-        if gain(current, fit) < self.policy.loop_gain:
-            return None
-        return self.pruned(replace(selection, chosen=fit, left=()))
 
     def _least(self, left: Left, current: Fit) -> float:
         """What a term must buy; one whose size says that it is not there, or that takes no share (a part of the bare
@@ -386,12 +362,6 @@ class Selector:
         if left.name == DERIVATIVE and abs(model["D"]) < self.policy.loop_damping * model["a_2"]:
             return math.inf
         return self.policy.loop_gain
-
-    def _parts(self, model: LoopModel) -> list[str]:
-        return [
-            *present(model),
-            *(name for name in (INTEGRAL, DERIVATIVE, STARTING, SPRING, CONSTANT) if is_there(model, name)),
-        ]
 
     def _left_out(self, current: Fit, name: str) -> Left:
         """The best refit without a term, from where the answer stands and from its own closed form."""

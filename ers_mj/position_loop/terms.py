@@ -37,7 +37,7 @@ STARTING = "starting force"  # of the firmware: the least that its motor is driv
 SPRING, CONSTANT = "spring", "constant load"  # the second may as well be an offset of the sensor: it has no name
 LAWS = (
     GravityImbalance, LoadDependentFriction, Stribeck, QuadraticDrag, AsymmetricFriction, PositionDependentFriction,
-    EndStop, Cogging,
+    Cogging,
 )  # fmt: skip
 
 
@@ -50,6 +50,11 @@ OWN = {
     SPRING: ("a_1",),
     CONSTANT: ("hold",),
 }  # letters without an effect
+BESIDE = {
+    Backlash.name: ("grease", "rubbed"),
+    ShaftCompliance.name: ("rubbed",),
+    LoadDependentFriction.name: ("rubbed", "share"),
+}  # letters that only an effect tells
 
 
 @dataclass(frozen=True)
@@ -81,9 +86,20 @@ class Sizes:
     lags: tuple[float, ...] = (0.003, 0.008)  # [s] of the speed that the firmware damps
     pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
+    drives: tuple[float, ...] = (0.99, 0.95, 0.85)  # quantiles of the drive without a limit, to which it is limited
     speeds: tuple[float, ...] = (1.0, 0.8)  # of the largest speed that is seen
     gaps: tuple[float, ...] = (0.4, 1.5)  # of the error that is left
-    shares: tuple[float, ...] = (0.3,)  # of the inertia that the motor's side bears
+    shares: tuple[tuple[float, float], ...] = ((0.3, 0.8), (0.65, 0.3))  # of inertia and friction, on the motor's side
+    resonances: tuple[float, ...] = (4.0, 8.0, 15.0)  # [Hz] of a shaft
+    contacts: tuple[tuple[float, float], ...] = (
+        (15.0, 1.5),
+        (30.0, 1.0),
+        (60.0, 0.5),
+        (100.0, 0.2),
+    )  # [Hz] of a play and damping ratio: soft at first, since bodies that bounce leave a fit many minima
+    rubs: tuple[float, ...] = (0.05, 0.3)  # of the torque that the gear carries
+    behind: tuple[float, ...] = (0.1, 0.5)  # of the inertia, on the motor's side of the gear that rubs
+    rubbed: float = 0.3  # share of the damping that both bodies bear
     parted: float = 1.3  # noise levels of error from which a second body is tried
     least: float = 0.02  # of a law's start, and
     most: float = 3.0  # of it, to which a secant may scale it
@@ -101,6 +117,7 @@ class Term:
     starts: tuple[LoopModel, ...]
     is_far: bool = False  # whether the way from its starts is long
     is_bent: bool = False  # whether the rest of the model is another with it
+    is_rare: bool = False  # whether it may act in few of many runs, as a limit does
     is_law: bool = False  # whether it adds to the forces in proportion to its size, so that a secant shows it
 
 
@@ -122,12 +139,20 @@ def present(model: LoopModel) -> list[str]:
     return [name for name in BY_NAME if is_there(model, name)]
 
 
+def parts(model: LoopModel) -> list[str]:
+    """Every term of a model that may be left out."""
+    laws = (INTEGRAL, DERIVATIVE, STARTING, SPRING, CONSTANT)
+    return [*present(model), *(name for name in laws if is_there(model, name))]
+
+
 def without(model: LoopModel, name: str) -> LoopModel:
     """The model without one term; a play takes the side of its sensors along, a limit what only it tells apart."""
     if name == EndStop.name:
         return model.without_effect(name).lacking("buried")
     if name in model.names:
-        gone = model.without_effect(name).lacking("grease")
+        gone = model.without_effect(name)
+        kept = {letter for other in gone.names for letter in BESIDE.get(other, ())}
+        gone = gone.lacking(*(letter for letter in BESIDE.get(name, ()) if letter not in kept))
         return replace(gone, side=SIDES[0]) if BY_NAME[name].subsystem == "transmission" else gone
     if name in (INTEGRAL, STARTING, SPRING, CONSTANT):
         return model.lacking(*OWN[name])
@@ -139,26 +164,18 @@ def without(model: LoopModel, name: str) -> LoopModel:
     return gone
 
 
-def together(model: LoopModel, other: LoopModel, name: str) -> LoopModel:
-    """The model with one term as another model has it."""
-    if name in other.names:
-        found = model.with_effect(name, dict(other.effects)[name])
-        return replace(found, side=other.side) if BY_NAME[name].subsystem == "transmission" else found
-    letters = OWN.get(name) or BY_NAME[name].in_loop
-    return model.having(**{letter: other[letter] for letter in letters if letter in other.free})
-
-
 def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
     """The candidates beside a model that leaves so large an error [output unit], each from its own starts; what needs a
     closed form is in selection.py.
     """
     found = [
         *_of_the_loop(model, runs),
-        Term(Presliding.name, tuple(_giving(model))),
+        Term(Presliding.name, tuple(_giving(model)), is_bent=True),
         Term(CONSTANT, (model.having(hold=0.0),)),
         Term(SPRING, (model.having(a_1=0.0, hold=0.0),)),
         *_transmissions(model, error),
-        *(Term(law.name, tuple(_begun(model, law.name)), is_law=law is not EndStop) for law in LAWS),
+        *(Term(law.name, tuple(_begun(model, law.name)), is_law=True) for law in LAWS),
+        Term(EndStop.name, tuple(_begun(model, EndStop.name)), is_rare=True),
     ]
     plain = error < SIZES.parted * max(run.sigma for run in runs)
     found = [term for term in found if term.starts and not (term.is_far and plain)]
@@ -170,15 +187,21 @@ def _of_the_loop(model: LoopModel, runs: Sequence[Run]) -> list[Term]:
     drive = model.scales.drive or 4.0 * model.scales.acceleration
     found = [
         Term(INTEGRAL, tuple(replace(model.having(I=x * model["K"]), fresh=f) for x in SIZES.integrals for f in EMPTY)),
-        Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds)),
+        Term(RateLimit.name, tuple(model.having(R=x * top_speed(runs)) for x in SIZES.speeds), is_rare=True),
         Term(InputDelay.name, (model.having(tau_s=0.01),)),
         Term(WITHIN, delayed_within(model)),
         Term(DriveDeadZone.name, tuple(_asleep(model))),
         Term(STARTING, tuple(model.having(least=x * model["c_2"]) for x in SIZES.pushes if model["c_2"] > 0.0)),
-        Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents)),
+        Term(CurrentLimit.name, tuple(model.having(most=x * drive) for x in SIZES.currents), is_rare=True),
     ]
+    damped = model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"])  # what a limit tells apart
     if "L" in model.free:
-        found.append(Term(DERIVATIVE, (model.having(D=0.3 * model["a_2"], a_2=0.7 * model["a_2"]),)))
+        found.append(Term(DERIVATIVE, (damped,)))
+    else:
+        drives = np.concatenate([np.abs(model.motion(run)[:, 3]) for run in runs])
+        limits = np.quantile(drives[np.isfinite(drives)], SIZES.drives)
+        starts = tuple(m.having(L=x) for x in limits for m in (model, damped))
+        found.append(Term(VoltageSaturation.name, starts, is_rare=True))
     return found
 
 
@@ -244,8 +267,19 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
         return [stop for low, high, _, _ in starts for stop in stops(model, low, high)]
     if name == LoadDependentFriction.name:
         rest = starts[0][1:]  # the torque that the gear carries is the integrator's own
-        return [model.with_effect(name, np.array([mu, *rest])) for mu in (0.05, 0.3)]
+        return [m.with_effect(name, np.array([mu, *rest])) for mu in SIZES.rubs for m in _rubbing(model, mu)]
     return [model.with_effect(name, start) for start in starts]
+
+
+def _rubbing(model: LoopModel, mu: float) -> list[LoopModel]:
+    """The model without friction that grows by mu of what the gear carries: what its drive seemed to be, it was less
+    that. On which side of the gear it acts follows from the loads where there are several.
+    """
+    more = {x: model[x] / (1.0 - mu) for x in ("K", "D", "I", "L", "a_2") if x in model.free}
+    model = model.having(rubbed=SIZES.rubbed, **more)
+    if model["rotor"] > 0.0:
+        return [model]
+    return [model.having(share=share) for share in SIZES.behind]
 
 
 def form_of(model: LoopModel, name: str) -> tuple[bool, ...]:
@@ -275,13 +309,13 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
     """
     if any(BY_NAME[name].subsystem == "transmission" or name == Presliding.name for name in model.names):
         return []
-    contact = min(60.0, 0.35 / model.scales.sample_time)
-    play = [np.array([x * error, rho, 0.8, contact, 0.3]) for x in SIZES.gaps for rho in SIZES.shares]
-    shaft = [np.array([15.0, 0.1, 0.6, 0.3, np.inf])]
-    found = []
+    soft = SIZES.contacts[0]
+    play = [np.array([x * error, rho, phi, *soft]) for x in SIZES.gaps for rho, phi in SIZES.shares]
+    shaft = [np.array([f, 0.1, 0.6, 0.3, np.inf]) for f in SIZES.resonances]
+    parted, found = model.having(rubbed=SIZES.rubbed), []
     for name, starts in ((Backlash.name, play), (ShaftCompliance.name, shaft)):
         models = []
-        slick = model.having(grease=0.1) if BY_NAME[name].is_play else model
+        slick = parted.having(grease=0.1) if BY_NAME[name].is_play else parted
         for side in SIDES:
             held = slick if side == SIDES[0] else slick.having(c_2=0.7 * model["c_2"])
             models += [replace(held.with_effect(name, start), side=side) for start in starts]
@@ -289,11 +323,10 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
     return found
 
 
-def other_shares(model: LoopModel) -> list[LoopModel]:
-    """A model with a play, and others whose bodies share inertia, friction and contact differently."""
+def stiffer(model: LoopModel) -> list[LoopModel]:
+    """A model with a play, its contact stiffer from one to the next; none without a play."""
     play = next((e for e in model.effects if BY_NAME[e[0]].is_play), None)
     if play is None:
-        return [model]
-    gap, rho, phi, f, zeta = play[1]
-    others = [(rho, phi, 1.0), (rho, 1.0, 1.0), (rho, 1.0, zeta), (0.2, 0.9, 1.0), (0.5, 0.9, 1.0), (0.8, 1.0, 1.0)]
-    return [model, *(model.with_effect(play[0], np.array([gap, r, p, f, z])) for r, p, z in others)]
+        return []
+    gap, rho, phi, *_ = play[1]
+    return [model.with_effect(play[0], np.array([gap, rho, phi, f, zeta])) for f, zeta in SIZES.contacts[1:]]

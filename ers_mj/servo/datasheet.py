@@ -60,7 +60,7 @@ VERDICTS = ("consistent", "parameters_only", "missing_physics", "unexplained")
 KINDS, SENSORS = ("P", "PD", "PI", "PID"), ("load", "link", "motor")  # of a firmware's loop, and where its sensor sits
 LOOP = (
     "K", "D", "lag_s", "I", "L", "tau_s", "dead_time_s", "R", "band", "idle", "least", "most", "creep", "heavy",
-    "buried", "share", "grease", "rotor", "hold",
+    "buried", "share", "grease", "rubbed", "rotor", "hold",
 )  # fmt: skip
 
 

@@ -26,6 +26,12 @@ def turn_one(c, x):
     return cornered(c, gain, push, x.damp + x.d_wall + x.brake, level, x.w, x.theta - c.theta_0)
 
 
+def carry(c, x, v, w_m):
+    """The torque that the gear carries: the motor's, and what the load holds against it, by the other's inertia."""
+    motor = limited(x.fresh * limited(v, c.L) + x.late - c.a_emf * w_m, c.most)
+    x.carried = (1.0 - c.share) * motor - c.share * (x.push + x.wall)
+
+
 def settle_one(c, x):
     """One body: within the limits of its firmware, and not pulled by a stop."""
     if c.looped > 0.0 and c.idle > 0.0:
@@ -53,7 +59,7 @@ def settle_one(c, x):
         x.d_wall = 0.0
         w = turn_one(c, x)
     if c.looped > 0.0:
-        x.carried = (1.0 - c.share) * (w - x.w) / c.h - x.push - x.wall
+        carry(c, x, v, 0.5 * (x.w + w))
         integrate(c, x, v)
     x.w = w
     x.w_m = w
@@ -128,8 +134,8 @@ def settle_two(c, x):
                 w_m = turn_motor(c, x, w, level_m)
         k += 1
     if c.looped > 0.0:
+        carry(c, x, v, 0.5 * (x.w_m + w_m))
         integrate(c, x, v)
-        x.carried = x.touch
     x.w = w
     x.w_m = w_m
     if c.looped > 0.0 and c.lag > 0.0:

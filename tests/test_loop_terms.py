@@ -1,0 +1,62 @@
+"""What acts behind or within a firmware's loop: found from starts of its own, and looked for again beside what held-out
+data left.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_position_loop import LIMITED, recorded
+
+from ers_mj.effects.backlash import Backlash
+from ers_mj.effects.gravity_imbalance import GravityImbalance
+from ers_mj.effects.load_dependent_friction import LoadDependentFriction
+from ers_mj.effects.presliding import Presliding
+from ers_mj.effects.shaft_compliance import ShaftCompliance
+from ers_mj.effects.stribeck import Stribeck
+from ers_mj.effects.voltage_saturation import VoltageSaturation
+from ers_mj.position_loop.fit import fitted
+from ers_mj.position_loop.model import LoopModel
+from ers_mj.position_loop.runs import runs_of
+from ers_mj.position_loop.selection import Selector
+from ers_mj.position_loop.terms import is_there, parts, without
+
+BEHIND = {
+    LoadDependentFriction.name: ({"rubbed": 0.2, "share": 0.1}, [0.25, np.inf, np.inf, np.inf, np.inf]),
+    ShaftCompliance.name: ({"rubbed": 0.4}, [4.3, 0.06, 0.65, 0.38, np.inf]),
+    Backlash.name: ({"rubbed": 0.3, "grease": 0.1}, [0.03, 0.6, 0.3, 60.0, 0.5]),
+    Presliding.name: ({}, [0.15, 0.5, *4 * [np.inf]]),
+}
+
+
+@pytest.mark.parametrize("name", BEHIND)
+def test_what_acts_behind_a_loop_is_found_from_a_start_of_its_own(name):
+    letters, numbers = BEHIND[name]
+    runs = runs_of(recorded(LIMITED | letters, seeds=(2,), effects=((name, np.array(numbers)),)))
+    chosen = Selector(runs, True).run().chosen
+    assert chosen.model.names == (name,)
+    assert chosen.model["K"] == pytest.approx(LIMITED["K"], rel=0.1)
+
+
+def test_a_limit_is_found_beside_a_model_that_lacks_it_unless_it_was_refused():
+    selector = Selector(runs_of(recorded(LIMITED)), True)
+    found = selector.run()
+    bare = fitted(without(found.chosen.model, VoltageSaturation.name), selector.data)
+    lacking = replace(found, chosen=bare, left=())
+    again = selector.another(lacking, ())
+    assert again is not None and is_there(again.chosen.model, VoltageSaturation.name)
+    instead = selector.another(lacking, {frozenset(parts(again.chosen.model))})
+    assert instead is None or set(parts(instead.chosen.model)) != set(parts(again.chosen.model))
+
+
+def test_an_effect_goes_with_the_letters_that_only_it_tells():
+    play, shaft = np.array([0.02, 0.5, 0.3, 60.0, 0.5]), np.array([8.0, 0.1, 0.6, 0.3, np.inf])
+    effects = ((Backlash.name, play), (GravityImbalance.name, np.array([20.0, 0.0])))
+    model = LoopModel(LIMITED, tuple(LIMITED), effects).having(grease=0.1, rubbed=0.3)
+    assert {"grease", "rubbed"} <= set(without(model, GravityImbalance.name).free)
+    assert not {"grease", "rubbed"} & set(without(model, Backlash.name).free)
+    both = model.without_effect(Backlash.name).with_effect(ShaftCompliance.name, shaft)
+    both = both.having(share=0.2).with_effect(LoadDependentFriction.name, np.array([0.2, *4 * [np.inf]]))
+    left = without(both, LoadDependentFriction.name)
+    assert "rubbed" in left.free and "share" not in left.free
+    assert without(both, Stribeck.name).free == both.free
