@@ -47,9 +47,9 @@ LETTERS: Mapping[str, Letter] = {
     "creep": Letter("1/s", math.inf, lower=5.0, upper=1e5),
     "heavy": Letter("-", 1.0, lower=1.0, upper=10.0),
     "buried": Letter("-", 1.0, lower=1.0, upper=30.0),
-    "share": Letter("-", 0.5, positive=False, upper=0.97, size=0.3),
+    "share": Letter("-", math.nan, positive=False, upper=0.97, size=0.3),  # absent: as the inertia is shared
     "grease": Letter("1/s", lower=1e-4),
-    "rubbed": Letter("-", 1.0, positive=False, upper=1.0, size=0.3),  # share of the damping that is no back-EMF
+    "rubbed": Letter("-", positive=False, upper=1.0, size=0.3),  # share of the damping that is no back-EMF
     "rotor": Letter("-", lower=1e-6, upper=1e6),
     "a_1": Letter("1/s^2", positive=False, lower=-math.inf, size=20.0),
     "a_2": Letter("1/s", lower=1e-4),
@@ -194,9 +194,13 @@ class LoopModel:
         return (rotor + 1.0) / (rotor + run.inertia)
 
     def motor_share(self, run: Run) -> float:
-        """The motor's share of the inertia in this run."""
+        """On which side of the gear that rubs the inertia lies: the motor's share in this run, half where that is not
+        known, or the same share in all runs.
+        """
         rotor = self["rotor"]
-        return rotor / (rotor + run.inertia) if rotor > 0 else self["share"]
+        if math.isfinite(self["share"]):
+            return self["share"]
+        return rotor / (rotor + run.inertia) if rotor > 0 else 0.5
 
     def of(self, run: Run) -> tuple[LoopNumbers, np.ndarray]:
         """The firmware's numbers and the plant (laid out, see laws.laid_out) of one run."""

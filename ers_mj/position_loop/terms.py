@@ -273,13 +273,12 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
 
 def _rubbing(model: LoopModel, mu: float) -> list[LoopModel]:
     """The model without friction that grows by mu of what the gear carries: what its drive seemed to be, it was less
-    that. On which side of the gear it acts follows from the loads where there are several.
+    that. On which side of the gear it acts may follow from the loads where there are several.
     """
     more = {x: model[x] / (1.0 - mu) for x in ("K", "D", "I", "L", "a_2") if x in model.free}
     model = model.having(rubbed=SIZES.rubbed, **more)
-    if model["rotor"] > 0.0:
-        return [model]
-    return [model.having(share=share) for share in SIZES.behind]
+    tied = [model] if model["rotor"] > 0.0 else []
+    return [*tied, *(model.having(share=share) for share in SIZES.behind)]
 
 
 def form_of(model: LoopModel, name: str) -> tuple[bool, ...]:
