@@ -32,6 +32,7 @@ from ers_mj.position_loop.terms import (
     form_of,
     is_there,
     lagging,
+    other_forms,
     parts,
     present,
     sized,
@@ -55,7 +56,7 @@ class Effort:
     rounds: int = 6
     alignments: int = 3  # of logs of different offsets
     screened: float = 50.0  # [s] of recordings on which starts are compared
-    several: Halving = Halving(looked=8, first=10, kept=3)  # starts of the bare loop
+    several: Halving = Halving(looked=9, first=10, kept=3)  # starts of the bare loop
     parted: Halving = Halving(looked=8, first=6, kept=2)  # starts of two bodies, sensors on each side of them
     far: int = 25  # steps of their best ones
     tried: int = 10  # steps of a candidate's best starts
@@ -156,7 +157,7 @@ class Selector:
             rounds.append(tuple(ranked))
             if not ranked or not self._is_worth(current, ranked[0]):
                 break
-            current = ranked[0].fit
+            current = self._formed(ranked[0])
         progress("leaving out what is not needed", 0.65)
         return self.pruned(Selection(base, current, tuple(rounds)))
 
@@ -168,9 +169,17 @@ class Selector:
         ranked = self.compared(current, refused) if self._may_gain(current) else []
         if not ranked or not self._is_worth(current, ranked[0]):
             return None
-        more = self.pruned(replace(selection, chosen=ranked[0].fit, left=()))
+        more = self.pruned(replace(selection, chosen=self._formed(ranked[0]), left=()))
         terms_of = [frozenset(parts(fit.model)) for fit in (current, more.chosen)]
         return None if terms_of[1] in {*refused, terms_of[0]} else more
+
+    def _formed(self, taken: Compared) -> Fit:
+        """The fit of a candidate, or the better one with that effect in another form, before others stand for that."""
+        if not self._may_gain(taken.fit):
+            return taken.fit
+        others = [fitted(model, self.data, EFFORT.full) for model in other_forms(taken.fit.model, taken.name)]
+        found = max(others, key=lambda fit: gain(taken.fit, fit), default=taken.fit)
+        return found if gain(taken.fit, found) > self.policy.loop_place else taken.fit
 
     def _is_worth(self, current: Fit, candidate: Compared) -> bool:
         """Whether a candidate buys more than chance offers, and its share of what is left."""

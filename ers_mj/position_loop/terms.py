@@ -82,6 +82,7 @@ class Sizes:
         (150.0, 1.0),
     )  # [1/s], and how heavy
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
+    bristles: tuple[float, ...] = (3.0, 1.0, 0.1)  # of the widest that shows without a loop, which goes on driving
     bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K, or of c_2
     lags: tuple[float, ...] = (0.003, 0.008)  # [s] of the speed that the firmware damps
     pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
@@ -210,9 +211,10 @@ def _giving(model: LoopModel) -> Iterator[LoopModel]:
     for creep, heavy in SIZES.creeps:
         yield model.fixed(heavy=heavy).having(creep=creep)
     if not any(BY_NAME[name].subsystem == "transmission" for name in model.names):
-        for start in BY_NAME[Presliding.name].starts(model.scales):
-            if np.isfinite(start[0]) and not np.isfinite(start[2]):
-                yield model.with_effect(Presliding.name, start)
+        bristles = [start for start in BY_NAME[Presliding.name].starts(model.scales) if np.isfinite(start[0])]
+        for wider in SIZES.bristles:  # each with damping that fades, and with one that stays
+            for start in bristles[:2]:
+                yield model.with_effect(Presliding.name, np.array([wider * start[0], *start[1:]]))
 
 
 def _asleep(model: LoopModel) -> Iterator[LoopModel]:
@@ -284,6 +286,14 @@ def _rubbing(model: LoopModel, mu: float) -> list[LoopModel]:
 def form_of(model: LoopModel, name: str) -> tuple[bool, ...]:
     """Which of an effect's numbers a model has."""
     return tuple(bool(x) for x in np.isfinite(dict(model.effects)[name]))
+
+
+def other_forms(model: LoopModel, name: str) -> list[LoopModel]:
+    """The model with one of its effects in other forms; of load friction none, whose torque is the integrator's own."""
+    if name not in model.names or name == LoadDependentFriction.name:
+        return []
+    forms = BY_NAME[name].grown(name, dict(model.effects)[name], model.scales)
+    return [model.with_effect(name, form) for form in forms]
 
 
 def sized(model: LoopModel, name: str, size: float) -> LoopModel:
