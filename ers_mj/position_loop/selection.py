@@ -74,11 +74,14 @@ EFFORT = Effort()
 
 @dataclass(frozen=True)
 class Compared:
-    """A candidate of a round: its gain over the model at hand after everything was refitted."""
+    """A candidate of a round: its gain over the model at hand after everything was refitted, to all runs in the end or
+    only at first.
+    """
 
     name: str
     fit: Fit
     gain: float
+    is_final: bool = False
 
 
 @dataclass(frozen=True)
@@ -116,12 +119,19 @@ def spread_out(runs: Sequence[Run], seconds: float) -> list[Run]:
     return [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, count).round().astype(int))]
 
 
+def _in_order(candidates: Sequence[Compared]) -> list[Compared]:
+    """Those that were refitted to the end first, of these the one that buys most."""
+    return sorted(candidates, key=lambda c: (not c.is_final, -c.gain))
+
+
 def _stiffened(fit: Fit, data: Data) -> Fit:
-    """The best of a fit with a soft contact, and of those begun from it with one that is stiffer and stiffer."""
+    """The best fit with a stiff contact of those begun from one with a soft contact, each stiffer than the last; a fit
+    without a play as it is.
+    """
     found = [fit]
     for k in range(len(stiffer(fit.model))):
         found.append(fitted(stiffer(found[-1].model)[k], data, EFFORT.tried))
-    return min(found, key=lambda fit: fit.cost)
+    return min(found[1:], key=lambda fit: fit.cost, default=fit)
 
 
 class Selector:
@@ -270,7 +280,7 @@ class Selector:
         ranked = self._ranked(current, self._promising(current, [t for t in every if not t.is_far]))
         if ranked and ranked[0].fit.misfit < EFFORT.enough**2:
             return ranked
-        return sorted([*self._ranked(current, [t for t in every if t.is_far]), *ranked], key=lambda c: -c.gain)
+        return _in_order([*self._ranked(current, [t for t in every if t.is_far]), *ranked])
 
     def _terms(self, current: Fit, names: Sequence[str] = ()) -> list[Term]:
         """The candidates beside a model, or those of these names."""
@@ -294,7 +304,7 @@ class Selector:
         for c in seldom:
             (ready if c.gain > self.policy.loop_gain else rest).append(c)
         full = list(self._map(partial(self._finished, current), ready))
-        return sorted([*full, *rest], key=lambda c: -c.gain)
+        return _in_order([*full, *rest])
 
     def _promising(self, current: Fit, candidates: Sequence[Term]) -> list[Term]:
         """The candidates without those laws of which no start, in any size and beside any other numbers of the model,
@@ -339,7 +349,7 @@ class Selector:
 
     def _finished(self, current: Fit, candidate: Compared) -> Compared:
         fit = fitted(candidate.fit.model, self.data, EFFORT.full)
-        return replace(candidate, fit=fit, gain=gain(current, fit))
+        return replace(candidate, fit=fit, gain=gain(current, fit), is_final=True)
 
     def _map(self, call: Callable, items: Sequence):
         if self.jobs == 1:

@@ -94,7 +94,7 @@ class Sizes:
     resonances: tuple[float, ...] = (4.0, 8.0, 15.0)  # [Hz] of a shaft
     contacts: tuple[tuple[float, float], ...] = (
         (15.0, 1.5),
-        (30.0, 1.0),
+        (40.0, 1.0),
         (60.0, 0.5),
         (100.0, 0.2),
     )  # [Hz] of a play and damping ratio: soft at first, since bodies that bounce leave a fit many minima
@@ -270,7 +270,18 @@ def _begun(model: LoopModel, name: str) -> list[LoopModel]:
     if name == LoadDependentFriction.name:
         rest = starts[0][1:]  # the torque that the gear carries is the integrator's own
         return [m.with_effect(name, np.array([mu, *rest])) for mu in SIZES.rubs for m in _rubbing(model, mu)]
-    return [model.with_effect(name, start) for start in starts]
+    wave = BY_NAME[name].wave
+    quarters = [
+        _turned(start, wave[1], k) for k in (1, 2, 3) for start in starts if wave and np.isfinite(start[wave[1]])
+    ]
+    return [model.with_effect(name, start) for start in (*starts, *quarters)]
+
+
+def _turned(start: np.ndarray, phase: int, quarters: int) -> np.ndarray:
+    """A wave's numbers so many quarters of a period further, which a change of its size alone does not reach."""
+    turned = start.copy()
+    turned[phase] += 0.5 * np.pi * quarters
+    return turned
 
 
 def _rubbing(model: LoopModel, mu: float) -> list[LoopModel]:
