@@ -27,6 +27,7 @@ class Begun:
 
     speeds: tuple[float, ...] = (0.9, 1.0, 1.15)  # of the largest seen, to which the reference is limited
     inset: float = 0.06  # of the travel, beyond which a stop may act
+    level: float = 1.6  # [rad] of travel within which a weight's cosine is a constant torque
 
 
 BEGUN = Begun()
@@ -38,6 +39,14 @@ class ClosedForms:
     def __init__(self, runs: Sequence[Run], is_angle: bool):
         self.runs, self.is_angle = runs, is_angle
         self._known: dict[tuple, list[Rough]] = {}
+
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """What a servo may bear: a spring, or a weight, with a constant torque where something parts the two."""
+        if not self.is_angle:
+            return "hold", "a_1"
+        travel = max(float(np.nanmax(run.y)) for run in self.runs) - min(float(np.nanmin(run.y)) for run in self.runs)
+        return ("sin", "cos") if travel < BEGUN.level else ("hold", "sin", "cos")
 
     def rough(self, *asked, **within) -> list[Rough]:
         """As weak_form.rough_starts of the runs."""
@@ -68,7 +77,7 @@ class ClosedForms:
 
     def _bent(self, name: str, model: LoopModel) -> list[LoopModel]:
         """The loop and its load alone, with a limit of the reference's speed, an integral, or a limit of the drive."""
-        loads = ("hold", "sin", "cos") if GRAVITY in model.names else ("hold",)
+        loads = self.loads if GRAVITY in model.names else ("hold",)
         speeds = [model["R"]]
         if name == RateLimit.name:
             speeds = [x * top_speed(self.runs) for x in BEGUN.speeds]
@@ -83,7 +92,7 @@ class ClosedForms:
 
     def _parted(self, term: Term, model: LoopModel) -> list[LoopModel]:
         """Two bodies from what a regression of one has: a fit of one bends its numbers to stand for the second."""
-        loads, found = ("hold", "sin", "cos") if GRAVITY in model.names else ("hold",), []
+        loads, found = self.loads if GRAVITY in model.names else ("hold",), []
         for rough in (rough for width in SCAN.widths for rough in self.rough(loads, width, model["R"], False)):
             if ("L" in rough.values) == ("L" in model.free):
                 one = self.begun(rough)
@@ -103,7 +112,7 @@ class ClosedForms:
 
     def _stopped(self, model: LoopModel) -> list[LoopModel]:
         """Stops at the ends of the travel, beside what a regression makes of the rest of it."""
-        loads = ("hold", "sin", "cos") if self.is_angle else ("hold",)
+        loads = self.loads if self.is_angle else ("hold",)
         low, high = model.scales.low, model.scales.high
         inset = BEGUN.inset * (high - low)
         found = []

@@ -64,7 +64,7 @@ WIDER = {
     "zeta": (0.02, 10.0),
 }  # a loop's motor may be light and bear all friction
 CONTACT = ("f_contact", "zeta")  # of a play: what no loop shows
-FASTEST, SEEN = 120.0, 0.4  # [Hz] of a contact that is told from a stiff one, and that as a share of the log's rate
+FASTEST, SEEN = 120.0, 1.0  # [Hz] of a contact that is told from a stiff one, and that as a share of the log's rate
 SIDES = ("load", "link", "motor")  # where loop and log sit: both on the load; loop on the motor; both on the motor
 
 
@@ -143,6 +143,8 @@ class LoopModel:
             lower, upper = WIDER[p.name]
         if p.kind == "frequency" and self.scales is not None:  # what the samples can show of a contact or a shaft
             upper = max(min(upper, FASTEST, SEEN / self.scales.sample_time), 1.1 * lower)
+        if p.name == "period" and self.scales is not None:
+            upper = min(upper, (self.scales.high - self.scales.low) / BY_NAME[name].fewest_turns)
         return Free(name, p.name, k, p.positive, size, lower, upper)
 
     def vector(self, layout: Sequence[Free]) -> np.ndarray:

@@ -210,8 +210,7 @@ class Selector:
 
     def base(self) -> Fit:
         """The loop with a limit and without, under gravity (or a spring where the output is no angle)."""
-        loads = ("hold", "sin", "cos") if self.is_angle else ("hold", "a_1")
-        roughs = [rough for width in SCAN.widths for rough in self.closed.rough(loads, width)]
+        roughs = [rough for width in SCAN.widths for rough in self.closed.rough(self.closed.loads, width)]
         starts = [self.closed.begun(rough) for rough in roughs]
         first = min(roughs, key=lambda rough: rough.left)
         if "L" in first.values:

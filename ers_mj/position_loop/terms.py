@@ -83,7 +83,7 @@ class Sizes:
     )  # [1/s], and how heavy
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
     bristles: tuple[float, ...] = (3.0, 1.0, 0.1)  # of the widest that shows without a loop, which goes on driving
-    bands: tuple[float, ...] = (0.7, 2.0)  # of the stiction width c_2 / K, or of c_2
+    bands: tuple[float, ...] = (0.35, 1.0, 2.5)  # of the stiction width c_2 / K, or of c_2
     lags: tuple[float, ...] = (0.003, 0.008)  # [s] of the speed that the firmware damps
     pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
