@@ -6,20 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_position_loop import LIMITED, recorded
+from test_position_loop import LIMITED, recorded, run_of, steps_of
 
 from ers_mj.effects.backlash import Backlash
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.load_dependent_friction import LoadDependentFriction
+from ers_mj.effects.position_dependent_friction import PositionDependentFriction
 from ers_mj.effects.presliding import Presliding
 from ers_mj.effects.shaft_compliance import ShaftCompliance
 from ers_mj.effects.stribeck import Stribeck
 from ers_mj.effects.voltage_saturation import VoltageSaturation
+from ers_mj.position_loop.closed_form import ClosedForms
 from ers_mj.position_loop.fit import fitted
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import runs_of
 from ers_mj.position_loop.selection import Selector
-from ers_mj.position_loop.terms import is_there, parts, without
+from ers_mj.position_loop.terms import is_there, other_forms, parts, terms, without
+from ers_mj.position_loop.weak_form import Rough
 
 BEHIND = {
     LoadDependentFriction.name: ({"rubbed": 0.2, "share": 0.1}, [0.25, np.inf, np.inf, np.inf, np.inf]),
@@ -60,3 +63,30 @@ def test_an_effect_goes_with_the_letters_that_only_it_tells():
     left = without(both, LoadDependentFriction.name)
     assert "rubbed" in left.free and "share" not in left.free
     assert without(both, Stribeck.name).free == both.free
+
+
+def test_a_wave_is_begun_in_every_quarter_of_its_period():
+    runs = runs_of(recorded(LIMITED, seeds=(1,)))
+    model = ClosedForms(runs, True).begun(Rough({"K": 900.0, "tau_s": 0.01, "a_2": 20.0, "c_2": 8.0, "L": 150.0}, 0.0))
+    starts = next(term.starts for term in terms(model, runs, 1e-3) if term.name == PositionDependentFriction.name)
+    waves = [dict(start.effects)[PositionDependentFriction.name] for start in starts]
+    phases = {round(float(x[4]) / (0.5 * np.pi)) for x in waves if np.isfinite(x[4])}
+    assert phases == {0, 1, 2, 3}
+
+
+def test_a_bristle_is_tried_in_its_other_forms_and_load_friction_in_none():
+    runs = runs_of(recorded(LIMITED, seeds=(1,)))
+    model = ClosedForms(runs, True).begun(Rough({"K": 900.0, "tau_s": 0.01, "a_2": 20.0, "c_2": 8.0, "L": 150.0}, 0.0))
+    bent = model.with_effect(Presliding.name, np.array([0.02, 0.5, *4 * [np.inf]]))
+    exponents = [dict(other.effects)[Presliding.name][3] for other in other_forms(bent, Presliding.name)]
+    assert any(np.isfinite(x) and x > 1.0 for x in exponents)
+    rubbing = model.with_effect(LoadDependentFriction.name, np.array([0.2, *4 * [np.inf]]))
+    assert other_forms(rubbing, LoadDependentFriction.name) == []
+
+
+@pytest.mark.parametrize(("size", "loads"), [(0.2, ("sin", "cos")), (1.5, ("hold", "sin", "cos"))])
+def test_a_small_travel_has_no_constant_torque_beside_a_weight(size, loads):
+    t, r = steps_of(1, size=size)
+    runs = [run_of(t, r)]
+    assert ClosedForms(runs, True).loads == loads
+    assert ClosedForms(runs, False).loads == ("hold", "a_1")
