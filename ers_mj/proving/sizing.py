@@ -4,6 +4,8 @@ refitted.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ers_mj.proving.quick import COARSE, ROUGH, run, simulate
@@ -81,27 +83,51 @@ def refit(servo, runs, rounds=5):
     return [float(np.sqrt(np.mean(part**2))) for part in levenberg(residuals, len(FREE), rounds)]
 
 
+@dataclass(frozen=True)
+class Refit:
+    """How far a refit goes, and over what its slopes are taken: where friction holds and lets go, over wide steps at
+    first, since a narrow one sees the fork of one stop and not the way down.
+    """
+
+    steps: tuple[float, ...] = (1e-2, 1e-3)  # of a parameter's logarithm
+    farthest: float = 1.5
+    dampings: int = 4
+    enough: float = 1e-3  # share of the sum of squares that a round must gain
+
+
+REFIT = Refit()
+
+
 def levenberg(residuals, free, rounds):
     """Residuals (a list of arrays) at the least sum of their squares, begun at zero, by Levenberg-Marquardt over x
-    (free,); 4 dampings a round, and no further where a round gains less than a thousandth.
+    (free,), so many rounds with slopes of each step, and no further with one that gains no more.
     """
-    x, parts, damping = np.zeros(free), residuals(np.zeros(free)), 1e-3
-    for _ in range(rounds):
-        flat = np.concatenate(parts)
-        columns = [(np.concatenate(residuals(x + 1e-4 * e)) - flat) / 1e-4 for e in np.eye(free)]
-        jac = np.stack(columns, 1)
-        normal, slope = jac.T @ jac, jac.T @ flat
-        for _ in range(4):
-            trial = np.clip(x - np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-9), slope), -1.5, 1.5)
-            trial_parts = residuals(trial)
-            gain = np.sum(flat**2) - np.sum(np.concatenate(trial_parts) ** 2)
-            damping *= 0.2 if gain > 0 else 8.0
-            if gain > 0:
-                x, parts = trial, trial_parts
+    x, parts = np.zeros(free), residuals(np.zeros(free))
+    for step in REFIT.steps:
+        damping = 1e-3
+        for _ in range(rounds):
+            flat = np.concatenate(parts)
+            columns = [(np.concatenate(residuals(x + step * e)) - flat) / step for e in np.eye(free)]
+            x, better, damping = _descended(residuals, x, parts, np.stack(columns, 1), damping)
+            gained = np.sum(flat**2) - np.sum(np.concatenate(better) ** 2)
+            parts = better
+            if gained < REFIT.enough * np.sum(flat**2):
                 break
-        if gain < 1e-3 * np.sum(flat**2):
-            break
     return parts
+
+
+def _descended(residuals, x, parts, jac, damping):
+    """(x, residuals, damping) after the first of some dampings that gains, or as they were."""
+    flat = np.concatenate(parts)
+    normal, slope = jac.T @ jac, jac.T @ flat
+    for _ in range(REFIT.dampings):
+        to = x - np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-9), slope)
+        trial = np.clip(to, -REFIT.farthest, REFIT.farthest)
+        trial_parts = residuals(trial)
+        if np.sum(np.concatenate(trial_parts) ** 2) < np.sum(flat**2):
+            return trial, trial_parts, 0.2 * damping
+        damping *= 8.0
+    return x, parts, damping
 
 
 class Ruler:
