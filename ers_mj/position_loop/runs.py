@@ -24,6 +24,7 @@ class Reading:
 
     window: int = 20  # samples over which the noise is taken
     quiet: float = 0.1  # quantile of the windows: the rest is motion
+    fast: float = 0.6  # of the samples, fewer of which a slower sensor read
     share: float = 0.7  # of the noise that this quantile of windows of noise alone shows
     settled: float = 0.02  # of the travel: a reference so near the output stood there before
     start: float = 0.05  # [s] over which the first speed is taken,
@@ -193,8 +194,11 @@ def _load(recording: Recording, first: Recording) -> tuple[float, float]:
 
 
 def noise_of(y: np.ndarray, quantum: float) -> float:
-    """Noise of a record (N,): third differences over sqrt(20) in its quieter windows, at least q / sqrt(12)."""
-    d = np.diff(y, 3)
+    """Noise of a record (N,): third differences over sqrt(20) in its quieter windows, at least q / sqrt(12); of what a
+    slower sensor read where that is most of the samples that are missing.
+    """
+    known = np.isfinite(y)
+    d = np.diff(y[known] if np.mean(known) < READING.fast else y, 3)
     d = d[np.isfinite(d)]
     least = max(quantum / math.sqrt(12.0), 1e-9 * float(np.nanstd(y)) + 1e-300)
     windows = d[: d.size // READING.window * READING.window].reshape(-1, READING.window)
@@ -207,9 +211,11 @@ def noise_of(y: np.ndarray, quantum: float) -> float:
 
 def started(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float]:
     """(angle, speed) at the first sample: at rest where the first samples allow it."""
+    known = np.isfinite(y)
+    t, y = t[known], y[known]
     n = max(READING.samples, int(np.searchsorted(t, READING.start)))
     low, high = start_seen(t[:n], y[:n], sigma)
-    return float(y[np.isfinite(y)][0]), 0.5 * (low + high)
+    return float(y[0]), 0.5 * (low + high)
 
 
 def stood(t: np.ndarray, r: np.ndarray, y: np.ndarray, sigma: float, travel: float) -> bool:

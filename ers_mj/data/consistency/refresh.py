@@ -23,7 +23,7 @@ class Refresh:
     longest: int = 500  # rows
     least: int = 100  # values that must be left
     edge: float = 0.05  # of its range, by which an input must change to be kept as an edge
-    most_edges: float = 0.2  # of the fresh rows; of a position command with more the mean between them is taken
+    most_edges: float = 0.2  # of the fresh rows; of an input with more all rows are kept
 
 
 REFRESH = Refresh()
@@ -116,11 +116,11 @@ def _edges(u: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def _thinned(sheet: Sheet, rows: np.ndarray) -> Sheet:
-    """The fresh rows, and those of a few edges of the input, under its mean up to the next row; where the input of a
-    motor changes more often all rows from the first fresh one on, without the repeats: the mean moves it elsewhere.
+    """The fresh rows, and those of a few edges of the input, under its mean up to the next row; where the input changes
+    more often all rows from the first fresh one on, without the repeats: its mean moves a servo elsewhere.
     """
     kept = np.union1d(rows, _edges(sheet.u, rows))
-    if sheet.kind != "position" and np.count_nonzero(np.diff(sheet.u)) > REFRESH.most_edges * rows.size:
+    if np.count_nonzero(np.diff(sheet.u)) > REFRESH.most_edges * rows.size:
         kept = np.arange(rows[0], sheet.t.size)
     width = np.diff(sheet.t, append=2 * sheet.t[-1] - sheet.t[-2])
     last = kept[-1] + 1
