@@ -32,6 +32,7 @@ from ers_mj.position_loop.terms import (
     form_of,
     is_there,
     lagging,
+    lesser,
     other_forms,
     parts,
     present,
@@ -39,7 +40,6 @@ from ers_mj.position_loop.terms import (
     stiffer,
     terms,
     ways_round,
-    without,
 )
 from ers_mj.position_loop.weak_form import SCAN, Rough
 
@@ -169,7 +169,11 @@ class Selector:
                 break
             current = self._formed(ranked[0])
         progress("leaving out what is not needed", 0.65)
-        return self.pruned(Selection(base, current, tuple(rounds)))
+        found = self.pruned(Selection(base, current, tuple(rounds)))
+        chosen = found.chosen
+        for name in chosen.model.names:  # beside all that was found
+            chosen = self._formed(Compared(name, chosen, 0.0))
+        return found if chosen is found.chosen else self.pruned(replace(found, chosen=chosen, left=()))
 
     def another(self, selection: Selection, refused: Collection[frozenset[str]]) -> Selection | None:
         """The selection with the best term that it lacks; None where that is not worth it, or where what stays is a set
@@ -254,9 +258,9 @@ class Selector:
 
     def unburdened(self, fit: Fit) -> Fit:
         """The fit without those loads that do not pay."""
-        for name in (CONSTANT, SPRING, GRAVITY):
+        for name in (SPRING, GRAVITY, CONSTANT):
             if is_there(fit.model, name):
-                bare = fitted(without(fit.model, name), self.data, EFFORT.full)
+                bare = best(lesser(fit.model, name), self.data, EFFORT.full)
                 fit = bare if gain(bare, fit) < self.policy.loop_gain else fit
         return fit
 
@@ -278,8 +282,13 @@ class Selector:
         every = [term for term in self._terms(current) if frozenset((*there, term.name)) not in refused]
         ranked = self._ranked(current, self._promising(current, [t for t in every if not t.is_far]))
         if ranked and ranked[0].fit.misfit < EFFORT.enough**2:
-            return ranked
-        return _in_order([*self._ranked(current, [t for t in every if t.is_far]), *ranked])
+            return self._weighed(ranked)
+        return self._weighed(_in_order([*self._ranked(current, [t for t in every if t.is_far]), *ranked]))
+
+    def _weighed(self, ranked: list[Compared]) -> list[Compared]:
+        """The candidates, a weight before a spring that does no better: along a small travel they are alike."""
+        least = ranked[0].gain - self.policy.loop_place if ranked and ranked[0].name == SPRING else math.inf
+        return sorted(ranked, key=lambda c: not (c.name == GRAVITY and c.is_final and c.gain > least))
 
     def _terms(self, current: Fit, names: Sequence[str] = ()) -> list[Term]:
         """The candidates beside a model, or those of these names."""
@@ -383,6 +392,5 @@ class Selector:
 
     def _left_out(self, current: Fit, name: str) -> Left:
         """The best refit without a term, from where the answer stands and from its own closed form."""
-        bare = without(current.model, name)
-        fit = best([bare], self.data, EFFORT.full)
+        fit = best(lesser(current.model, name), self.data, EFFORT.full)
         return Left(name, gain(fit, current), fit)

@@ -91,12 +91,14 @@ class Sizes:
     speeds: tuple[float, ...] = (1.0, 0.8)  # of the largest speed that is seen
     gaps: tuple[float, ...] = (0.4, 1.5)  # of the error that is left
     shares: tuple[tuple[float, float], ...] = ((0.3, 0.8), (0.65, 0.3))  # of inertia and friction, on the motor's side
+    light: tuple[float, float] = (0.8, 1.0)  # the motor's shares of a load that is light and bears no friction
     resonances: tuple[float, ...] = (4.0, 8.0, 15.0)  # [Hz] of a shaft
     contacts: tuple[tuple[float, float], ...] = (
         (15.0, 1.5),
         (40.0, 1.0),
         (60.0, 0.5),
         (100.0, 0.2),
+        (160.0, 0.5),
     )  # [Hz] of a play and damping ratio: soft at first, since bodies that bounce leave a fit many minima
     rubs: tuple[float, ...] = (0.05, 0.3)  # of the torque that the gear carries
     behind: tuple[float, ...] = (0.1, 0.5)  # of the inertia, on the motor's side of the gear that rubs
@@ -163,6 +165,12 @@ def without(model: LoopModel, name: str) -> LoopModel:
     if name == VoltageSaturation.name and gone["dead_time_s"] == 0.0:
         gone = gone.having(a_2=max(model["a_2"] + model["D"], 1e-3)).lacking(*OWN[DERIVATIVE])
     return gone
+
+
+def lesser(model: LoopModel, name: str) -> list[LoopModel]:
+    """The model without one term; without a weight also with the constant torque that it is along a small travel."""
+    bare = without(model, name)
+    return [bare, bare.having(hold=0.0)] if name == GravityImbalance.name and "hold" not in bare.free else [bare]
 
 
 def terms(model: LoopModel, runs: Sequence[Run], error: float) -> list[Term]:
@@ -300,10 +308,17 @@ def form_of(model: LoopModel, name: str) -> tuple[bool, ...]:
 
 
 def other_forms(model: LoopModel, name: str) -> list[LoopModel]:
-    """The model with one of its effects in other forms; of load friction none, whose torque is the integrator's own."""
+    """The model with one of its effects in other forms, a play with other contacts and a light load that rubs nowhere;
+    of load friction none, whose torque is the integrator's own.
+    """
     if name not in model.names or name == LoadDependentFriction.name:
         return []
-    forms = BY_NAME[name].grown(name, dict(model.effects)[name], model.scales)
+    values = dict(model.effects)[name]
+    if BY_NAME[name].is_play:
+        shares, contacts = ((values[1], values[2]), SIZES.light), SIZES.contacts[1:]
+        forms = [np.array([values[0], *share, *contact]) for share in shares for contact in contacts]
+    else:
+        forms = BY_NAME[name].grown(name, values, model.scales)
     return [model.with_effect(name, form) for form in forms]
 
 
