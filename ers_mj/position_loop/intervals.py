@@ -73,7 +73,7 @@ class Intervals:
         e = data.residuals(model)
         groups = data.block // DOUBT.run
         slopes = np.array([np.bincount(groups, j[:, k] * e) for k in range(len(layout))]).T
-        hessian = j.T @ j
+        hessian = j.T @ j + np.diag([12.0 / f.span**2 for f in layout])  # within its bounds any number is as likely
         size = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
         inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-10) / np.outer(size, size)
         n = slopes.shape[0]

@@ -80,6 +80,13 @@ class Free:
     lower: float
     upper: float
 
+    @property
+    def span(self) -> float:
+        """How far apart the transformed bounds are; infinite where there is none."""
+        if not self.positive:
+            return (self.upper - self.lower) / self.size
+        return math.log(self.upper / self.lower) if 0.0 < self.lower < self.upper < math.inf else math.inf
+
     def inside(self, z: float) -> float:
         """The number of a transformed one, within its bounds."""
         return min(max(math.exp(min(z, 80.0)) if self.positive else z * self.size, self.lower), self.upper)
