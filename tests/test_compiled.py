@@ -48,6 +48,8 @@ def home(tmp_path):
     return tmp_path
 
 
+# Python takes what it compiled for its source's where second and size are the same, as those of a quick edit may be
+NOT_KEPT = "import sys\nsys.dont_write_bytecode = True\n"
 WITHOUT_JIT = {"NUMBA_DISABLE_JIT": "1"}
 
 
@@ -56,7 +58,7 @@ def process(folder, program, **more):
     otherwise.
     """
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{folder}", **more}
-    program = textwrap.dedent(program)
+    program = NOT_KEPT + textwrap.dedent(program)
     if any(name.startswith("NUMBA") for name in more):
         done = subprocess.run(
             [sys.executable, "-c", program], env=environment, cwd=folder, capture_output=True, text=True

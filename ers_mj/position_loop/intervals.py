@@ -190,11 +190,10 @@ def _at(model: LoopModel) -> dict[tuple[str, str], float]:
 
 
 def _unseen(model: LoopModel, data: Data, e: np.ndarray, j: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-    """Covariance (k, k) by effects that the model lacks: how far a refit from the first and the last start of each ends
-    from the model's own numbers, scaled to where the effect would take away what one may that is not found, or what it
+    """Covariance (k, k) by effects that the model lacks: what a fit of its numbers makes of the errors that each adds
+    from its first and last start, scaled to where it would take away what an effect may that is not found, or what it
     takes of what is left, if that is more; never beyond the start. Any is as likely as the next.
     """
-    z, layout = _at(model), model.layout()
     cost = 0.5 * float(e @ e)
     hidden = cost * -math.expm1(-2.0 * DOUBT.unseen / data.blocks)
     error = math.sqrt(2.0 * cost / e.size) * max(run.sigma for run in data.runs)
@@ -204,14 +203,10 @@ def _unseen(model: LoopModel, data: Data, e: np.ndarray, j: np.ndarray, inverse:
         for start in term.starts[:1] + term.starts[1:][-1:]:
             secant = data.residuals(start) - e
             if np.all(np.isfinite(secant)):
-                its = _at(start)
-                begun = np.array([its.get(key, z[key]) - z[key] for key in map(_key, layout)])
                 shift = inverse @ (j.T @ secant)
                 apart = secant - j @ shift
                 most = max(0.5 * float(apart @ apart), 1e-12)
-                own.append(
-                    (begun - shift) * min(1.0, math.sqrt(max(hidden, 0.25 * float(e @ apart) ** 2 / most) / most))
-                )
+                own.append(shift * min(1.0, math.sqrt(max(hidden, 0.25 * float(e @ apart) ** 2 / most) / most)))
         found += [own] if own else []
     moved = [shift / math.sqrt(len(own) * len(found)) for own in found for shift in own]
     return np.array(moved).reshape(-1, j.shape[1]).T @ np.array(moved).reshape(-1, j.shape[1])
