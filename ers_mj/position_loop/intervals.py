@@ -16,7 +16,7 @@ from ers_mj.position_loop import beside
 from ers_mj.position_loop.fit import Data, Fit, best, fitted, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
 from ers_mj.position_loop.selection import Selection
-from ers_mj.position_loop.terms import is_there, lagging, terms
+from ers_mj.position_loop.terms import lagging, parts, terms
 
 
 @dataclass(frozen=True)
@@ -155,10 +155,11 @@ def _inexact(f: Free, z: float, rate: float, K: float) -> float:
 
 def passed_over(selection: Selection, policy: Policy) -> list[tuple[float, LoopModel]]:
     """The answer with the likeliest candidate that was not taken in the end, and how likely that acts: its share of the
-    gain that is asked for.
+    gain that is asked for. What lacks a term of the answer is no doubt of it.
     """
     last = selection.rounds[-1] if selection.rounds else ()
-    asked = [c for c in last if c.gain > 0.0 and not is_there(selection.chosen.model, c.name)]
+    answer = set(parts(selection.chosen.model))
+    asked = [c for c in last if c.gain > 0.0 and c.name not in answer and answer <= set(parts(c.fit.model))]
     return [(min(1.0, c.gain / policy.loop_gain), c.fit.model) for c in sorted(asked, key=lambda c: -c.gain)[:1]]
 
 
