@@ -22,6 +22,7 @@ import numpy as np
 from ers_mj.plants.bristle import bent, bristle_damping
 from ers_mj.plants.compiled import inline, kernel, record_in, unit
 from ers_mj.plants.forces import stop_at
+from ers_mj.plants.held_reference import mean_reference, switched
 from ers_mj.plants.laws import friction_level, remember, total_torque
 from ers_mj.plants.state import (
     READ,
@@ -38,7 +39,7 @@ from ers_mj.plants.state import (
     types,
 )
 
-LONGEST, SHORTEST = 1e-3, 1e-9  # [s] of a step, and of a part of one
+LONGEST = 1e-3  # [s] of a step
 STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
 PAST = 512  # steps of the drive that are kept: the longest dead time
 
@@ -104,41 +105,6 @@ class Moving(NamedTuple):
 
 M10 = types.NamedUniTuple(F, 10, Moving)
 PAIR = types.UniTuple(F, 2)
-
-
-@inline
-def _mean_reference(t, r, before, k, a, b):
-    """(mean of the held reference over a..b, the sample that holds at b), the search begun at sample k."""
-    n = r.size
-    while k + 1 < n and t[k + 1] <= a:
-        k += 1
-    total, at = 0.0, a
-    while True:
-        end = b if k + 1 >= n or t[k + 1] >= b else t[k + 1]
-        if a < t[0] and at < t[0]:
-            end = min(b, t[0])
-            total += before * (end - at)
-        else:
-            total += r[k] * (end - at)
-            if k + 1 < n and end >= t[k + 1]:
-                k += 1
-        at = end
-        if at >= b:
-            return total / (b - a), k
-
-
-@inline
-def _parted(t, r, before, k, tau, at, end, least):
-    """The first instant well within at..end at which a reference that is tau late switches by more than ``least``, or
-    the end; the search begun at the sample k that holds at ``at``.
-    """
-    if at + SHORTEST < t[0] + tau < end - SHORTEST and abs(r[0] - before) > least:
-        return t[0] + tau
-    while k + 1 < t.size and t[k + 1] + tau < end - SHORTEST:
-        if t[k + 1] + tau > at + SHORTEST and abs(r[k + 1] - r[k]) > least:
-            return t[k + 1] + tau
-        k += 1
-    return end
 
 
 @inline
@@ -347,6 +313,18 @@ def _late_drive(q, past, k, h):
 
 
 @inline
+def _followed(q, x, seen, rate, h):
+    """The state drawn to what the log shows, both bodies alike, at a rate [1/s]: a critically damped observer of angle
+    and speed, its log h apart.
+    """
+    kept = math.exp(-rate * h)
+    missed = seen - (x.theta_m if q.log_at_motor > 0.0 else x.theta)
+    by, faster = (1.0 - kept * kept) * missed, (1.0 - kept) ** 2 / h * missed
+    theta, w, theta_m, w_m = x.theta + by, x.w + faster, x.theta_m + by, x.w_m + faster
+    return Moving(theta, w, theta_m, w_m, x.xi, x.slow, x.r, x.drive, x.carried, x.z)
+
+
+@inline
 def _started(c, q, theta, w, r):
     """The state at the beginning: both bodies together, an integral that holds it there, or a ``fresh`` one."""
     hold = _held(c, theta, 0.0, 0.0, 0.0)
@@ -355,12 +333,13 @@ def _started(c, q, theta, w, r):
     return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0, 0.0)
 
 
-@kernel(types.void(READ, READ, READ_BOOL, VECTOR, VECTOR, F, F, F, N, TABLE))
-def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
+@kernel(types.void(READ, READ, READ_BOOL, VECTOR, VECTOR, F, F, F, N, READ, F, TABLE))
+def simulate(t, r, enable, plant, loop, theta, w, before, refine, seen, rate, out):
     """Fill out (N, 4) with the load's angle and speed, the motor side's angle and the drive at the times t (N,), from
     (theta, w) and under the reference r (N,), which was ``before`` until t[0].
 
-    ``plant`` as laws.laid_out makes it, ``loop`` the numbers of LoopNumbers; a motion that runs away becomes NaN.
+    ``plant`` as laws.laid_out makes it, ``loop`` the numbers of LoopNumbers; a motion that runs away becomes NaN. At a
+    ``rate`` [1/s] above 0 the motion follows what was ``seen`` (N,), NaN where nothing was, from each row on.
     """
     c, q = plant_in(plant), loop_in(loop)
     longest, n = _step_length(c) / refine, t.size
@@ -372,6 +351,8 @@ def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = x.theta, x.w, x.theta_m, x.drive
         if i == n - 1:
             break
+        if rate > 0.0 and math.isfinite(seen[i]):
+            x = _followed(q, x, seen[i], rate, t[i + 1] - t[i])
         steps = int(math.ceil((t[i + 1] - t[i]) / longest - 1e-9))
         h = (t[i + 1] - t[i]) / steps
         remember(c, x.theta, x.w, x.drive, x.theta_m, x.w_m, t[i + 1] - t[i])
@@ -380,9 +361,9 @@ def simulate(t, r, enable, plant, loop, theta, w, before, refine, out):
             fresh, late = _late_drive(q, past, step, h) if enable[i] else (0.0, 0.0)
             mean_drive = 0.0
             while at < end:
-                until = _parted(t, r, before, k, q.tau, at, end, least)
+                until = switched(t, r, before, k, q.tau, at, end, least)
                 part = until - at
-                asked, k = _mean_reference(t, r, before, k, at - q.tau, until - q.tau)
+                asked, k = mean_reference(t, r, before, k, at - q.tau, until - q.tau)
                 now = x.r + min(max(asked - x.r, -q.R * part), q.R * part)
                 mean = 0.5 * (x.r + now) if q.R < np.inf else asked
                 x = Moving(x.theta, x.w, x.theta_m, x.w_m, x.xi, x.slow, now, x.drive, x.carried, x.z)

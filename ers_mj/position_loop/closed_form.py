@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ers_mj.effects import BY_NAME
 from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.effects.voltage_saturation import VoltageSaturation
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, scales_of
-from ers_mj.position_loop.terms import INTEGRAL, Term, stops, top_speed
+from ers_mj.position_loop.terms import INTEGRAL, SIZES, Term, stops, top_speed
 from ers_mj.position_loop.weak_form import SCAN, Rough, rough_starts
 
 GRAVITY = GravityImbalance.name
@@ -31,6 +32,7 @@ class Begun:
 
 
 BEGUN = Begun()
+RESET = {"D": 0.0, "lag_s": SIZES.lags[0]}  # what no regression has
 
 
 class ClosedForms:
@@ -63,6 +65,21 @@ class ClosedForms:
         if "sin" in rough.values:
             model = model.with_effect(GRAVITY, np.array([rough.values["sin"], rough.values["cos"]]))
         return model.having(D=0.0) if "L" in values else model
+
+    def again(self, model: LoopModel) -> list[LoopModel]:
+        """A model of one body with what regressions make of its loop and its load, all else as it stands."""
+        if any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+            return []
+        loads = self.loads if GRAVITY in model.names else ("hold", "a_1") if "a_1" in model.free else ("hold",)
+        found = []
+        for width in SCAN.widths:
+            for rough in self.rough(loads, width, model["R"], "I" in model.free):
+                start = model.having(**{x: v for x, v in rough.values.items() if x in model.free})
+                start = start.having(**{x: v for x, v in RESET.items() if x in model.free})
+                if GRAVITY in model.names:
+                    start = start.with_effect(GRAVITY, np.array([rough.values["sin"], rough.values["cos"]]))
+                found.append(start)
+        return found
 
     def beside(self, term: Term, model: LoopModel) -> Term:
         """The term with starts from a regression that has it in, and with what else the model has."""

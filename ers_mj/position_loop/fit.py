@@ -63,13 +63,14 @@ class _Point:
 @dataclass(frozen=True)
 class Data:
     """Runs, how their errors count, and the blocks (N,) of all scored samples; simulations take ``refine`` times finer
-    steps.
+    steps, and follow what was seen at a rate of ``following`` [1/s] where that is not 0.
     """
 
     runs: tuple[Run, ...]
     soft: float
     block: np.ndarray
     refine: int = 1
+    following: float = 0.0
     simulated: list[int] = field(default_factory=lambda: [0], repr=False)  # how often these runs were
 
     @staticmethod
@@ -101,7 +102,7 @@ class Data:
         """Errors (N,) of the scored samples in noise sigmas, large ones softened; those of a second signal last."""
         self.simulated[0] += 1
         runs = self._simulated
-        motions = [model.motion(run, self.refine) for run in runs]
+        motions = [model.motion(run, self.refine, self.following) for run in runs]
         errors = [
             _softened((run.y - model.logged(m))[run.scored], self.soft, run.sigma)
             for run, m in zip(runs, motions, strict=True)

@@ -29,6 +29,7 @@ class Doubt:
     inexact: float = 0.0025  # standard deviation of what firmware and simulation do in steps: relative,
     clock: float = 0.00075  # [s] and in time
     unseen: float = 2.0  # gain of an effect that is not found
+    noise: float = 1.1  # noise variances that noise alone may leave
     lagged: int = 12  # steps of a refit with a late speed
 
 
@@ -192,11 +193,12 @@ def _at(model: LoopModel) -> dict[tuple[str, str], float]:
 
 def _unseen(model: LoopModel, data: Data, e: np.ndarray, j: np.ndarray, inverse: np.ndarray) -> np.ndarray:
     """Covariance (k, k) by effects that the model lacks: what a fit of its numbers makes of the errors that each adds
-    from its first and last start, scaled to where it would take away what an effect may that is not found, or what it
-    takes of what is left, if that is more; never beyond the start. Any is as likely as the next.
+    from its first and last start, scaled to where it would take away what an effect may that is not found, or all that
+    is left beyond the noise, or what it takes of what is left, if that is more; never beyond the start. Any is as
+    likely as the next.
     """
     cost = 0.5 * float(e @ e)
-    hidden = cost * -math.expm1(-2.0 * DOUBT.unseen / data.blocks)
+    hidden = max(cost * -math.expm1(-2.0 * DOUBT.unseen / data.blocks), cost - 0.5 * DOUBT.noise * e.size)
     error = math.sqrt(2.0 * cost / e.size) * max(run.sigma for run in data.runs)
     found: list[list[np.ndarray]] = []
     for term in terms(model, data.runs, error):

@@ -124,7 +124,7 @@ class LoopModel:
     @property
     def kind(self) -> str:
         """P, PD, PI or PID."""
-        return "P" + ("I" if self["I"] > 0 else "") + ("D" if self["D"] != 0 else "")
+        return "P" + ("I" if self["I"] > 0 else "") + ("D" if self["D"] > 0 else "")
 
     def layout(self) -> list[Free]:
         """Every fitted number."""
@@ -268,13 +268,16 @@ class LoopModel:
             [v * factor if p.kind in PER_INERTIA else v for p, v in zip(effect.parameters, values, strict=True)]
         )
 
-    def motion(self, run: Run, refine: int = 1) -> np.ndarray:
-        """Free run (N, 4) from the first sample: load's angle and speed, motor side's angle, drive."""
+    def motion(self, run: Run, refine: int = 1, following: float = 0.0) -> np.ndarray:
+        """Free run (N, 4) from the first sample, or one that follows the log at a rate [1/s]: load's angle and speed,
+        motor side's angle, drive.
+        """
         loop, plant = self.of(run)
         out = np.empty((run.t.size, 4))
         theta, w = run.start
-        start = theta - self["offset"], w
-        simulate(run.t, run.r, run.enable, plant, np.array(loop, float), *start, run.before, refine, out)
+        start, seen = (theta - self["offset"], w), run.seen - self["offset"]
+        numbers = np.array(loop, float)
+        simulate(run.t, run.r, run.enable, plant, numbers, *start, run.before, refine, seen, following, out)
         return out
 
     def predicted(self, run: Run, refine: int = 1) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -85,6 +86,11 @@ class Run:
     def block(self) -> np.ndarray:
         """Block (N,) of each sample."""
         return ((self.t - self.t[0]) / BLOCK).astype(np.int64)
+
+    @cached_property
+    def seen(self) -> np.ndarray:
+        """The samples (N,) that are scored, NaN between them."""
+        return np.where(self.scored, self.y, np.nan)
 
     def shifted(self, offset: float) -> Run:
         """The run with the offset of its log's sensor taken off."""

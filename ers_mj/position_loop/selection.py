@@ -37,10 +37,10 @@ from ers_mj.position_loop.terms import (
     parts,
     present,
     sized,
-    stiffer,
     terms,
     ways_round,
 )
+from ers_mj.position_loop.two_bodies import parted, refitted
 from ers_mj.position_loop.weak_form import SCAN, Rough
 
 Progress = Callable[[str, float], None]
@@ -57,15 +57,14 @@ class Effort:
     alignments: int = 3  # of logs of different offsets
     screened: float = 50.0  # [s] of recordings on which starts are compared
     several: Halving = Halving(looked=9, first=10, kept=3)  # starts of the bare loop
-    parted: Halving = Halving(looked=8, first=6, kept=2)  # starts of two bodies, sensors on each side of them
-    far: int = 25  # steps of their best ones
+    far: int = 25  # steps of the best ones of a bent model
     tried: int = 10  # steps of a candidate's best starts
     promise: float = 0.3  # of what is asked for, from which a law is refitted,
     begun: int = 3  # from so many of its starts
     finalists: int = 3  # candidates that are refitted to the end,
     near: float = 0.3  # those that gain this share of what the best one gains at first,
     nearer: float = 0.6  # or this one, where a refit to the end takes in more recordings than are screened
-    enough: float = 1.15  # noise levels of error that one body may leave before two are tried
+    enough: float = 1.15  # noise levels of error that a model may leave before what is far from it is tried
     full: int = 40  # steps of a fit to the end
 
 
@@ -124,16 +123,6 @@ def _in_order(candidates: Sequence[Compared]) -> list[Compared]:
     return sorted(candidates, key=lambda c: (not c.is_final, -c.gain))
 
 
-def _stiffened(fit: Fit, data: Data) -> Fit:
-    """The best fit with a stiff contact of those begun from one with a soft contact, each stiffer than the last; a fit
-    without a play as it is.
-    """
-    found = [fit]
-    for k in range(len(stiffer(fit.model))):
-        found.append(fitted(stiffer(found[-1].model)[k], data, EFFORT.tried))
-    return min(found[1:], key=lambda fit: fit.cost, default=fit)
-
-
 class Selector:
     """A selection under way on some runs."""
 
@@ -161,7 +150,7 @@ class Selector:
                 tried = self._ranked(current, self._terms(current, (name,)))
                 rounds += [(c,) for c in tried if self._takes_most(current, c)]
                 current = self._firmware(rounds[-1][0].fit) if rounds else current
-        while len(rounds) < EFFORT.rounds and self._may_gain(current):
+        while len(rounds) < EFFORT.rounds and self._may_gain(current := self._begun_again(current)):
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
             ranked = self.compared(current)
             rounds.append(tuple(ranked))
@@ -264,6 +253,17 @@ class Selector:
                 fit = bare if gain(bare, fit) < self.policy.loop_gain else fit
         return fit
 
+    def _begun_again(self, fit: Fit) -> Fit:
+        """The fit, or a better one of the same terms from their closed form, in this firmware or another: what was not
+        yet there bent what was told first.
+        """
+        starts = self.closed.again(fit.model) if self._may_gain(fit) else []
+        if not starts:
+            return fit
+        starts += [turned(start) for turned in ways_round(fit.model, self.runs) for start in starts]
+        found = self._whole(best(starts, self.screen, EFFORT.full, EFFORT.several))
+        return found if gain(fit, found) > self.policy.loop_place else fit
+
     # -- comparing -----------------------------------------------------------------------------------------------------
 
     def _may_gain(self, fit: Fit) -> bool:
@@ -348,9 +348,7 @@ class Selector:
         if term.is_bent:
             fit = best(term.starts, data, EFFORT.far, EFFORT.several)
         elif term.is_far:
-            sides = {start.side: [s for s in term.starts if s.side == start.side] for start in term.starts}
-            tried = [_stiffened(best(starts, data, EFFORT.far, EFFORT.parted), data) for starts in sides.values()]
-            fit = min(tried, key=lambda fit: fit.cost)
+            fit = parted(term.starts, data)
         else:
             fit = best(term.starts, data, EFFORT.tried)
         return Compared(term.name, fit, gain(current, fit))
@@ -378,12 +376,14 @@ class Selector:
             current = weakest.fit
 
     def _least(self, left: Left, current: Fit) -> float:
-        """What a term must buy; one whose size says that it is not there, or that takes no share (a part of the bare
-        loop's need not), everything.
+        """What a term must buy; one that takes no share (a part of the bare loop's need not), everything, and so one
+        whose size says that it is not there, unless too much is left without it.
         """
         model = current.model
         if left.name not in BARE and not self._pays(left.fit, current):
             return math.inf
+        if left.fit.misfit > EFFORT.enough**2:
+            return self.policy.loop_gain
         if left.name == INTEGRAL and model["I"] < self.policy.loop_integral * model["K"]:
             return math.inf
         if left.name == DERIVATIVE and abs(model["D"]) < self.policy.loop_damping * model["a_2"]:
@@ -392,5 +392,5 @@ class Selector:
 
     def _left_out(self, current: Fit, name: str) -> Left:
         """The best refit without a term, from where the answer stands and from its own closed form."""
-        fit = best(lesser(current.model, name), self.data, EFFORT.full)
+        fit = refitted(lesser(current.model, name), self.data, EFFORT.full)
         return Left(name, gain(fit, current), fit)

@@ -356,12 +356,3 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
             models += [replace(held.with_effect(name, start), side=side) for start in starts]
         found.append(Term(name, tuple(models), is_far=True))
     return found
-
-
-def stiffer(model: LoopModel) -> list[LoopModel]:
-    """A model with a play, its contact stiffer from one to the next; none without a play."""
-    play = next((e for e in model.effects if BY_NAME[e[0]].is_play), None)
-    if play is None:
-        return []
-    gap, rho, phi, *_ = play[1]
-    return [model.with_effect(play[0], np.array([gap, rho, phi, f, zeta])) for f, zeta in SIZES.contacts[1:]]
