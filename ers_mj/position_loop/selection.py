@@ -150,7 +150,7 @@ class Selector:
                 tried = self._ranked(current, self._terms(current, (name,)))
                 rounds += [(c,) for c in tried if self._takes_most(current, c)]
                 current = self._firmware(rounds[-1][0].fit) if rounds else current
-        while len(rounds) < EFFORT.rounds and self._may_gain(current := self._begun_again(current)):
+        while len(rounds) < EFFORT.rounds and self._may_gain(current := self.begun_again(current)):
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
             ranked = self.compared(current)
             rounds.append(tuple(ranked))
@@ -253,7 +253,7 @@ class Selector:
                 fit = bare if gain(bare, fit) < self.policy.loop_gain else fit
         return fit
 
-    def _begun_again(self, fit: Fit) -> Fit:
+    def begun_again(self, fit: Fit) -> Fit:
         """The fit, or a better one of the same terms from their closed form, in this firmware or another: what was not
         yet there bent what was told first.
         """
@@ -270,6 +270,11 @@ class Selector:
         """Whether noise alone leaves so much less that an effect could be asked for."""
         return 0.5 * fit.blocks * math.log(max(fit.misfit, 1e-9)) > self.policy.loop_gain
 
+    @staticmethod
+    def _explains(fit: Fit) -> bool:
+        """Whether a fit leaves little beside the noise."""
+        return fit.misfit < EFFORT.enough**2
+
     def _error(self, fit: Fit) -> float:
         """What a fit leaves [output unit]."""
         return math.sqrt(fit.misfit) * float(np.sqrt(np.mean([run.sigma**2 for run in self.runs])))
@@ -281,7 +286,7 @@ class Selector:
         there = parts(current.model)
         every = [term for term in self._terms(current) if frozenset((*there, term.name)) not in refused]
         ranked = self._ranked(current, self._promising(current, [t for t in every if not t.is_far]))
-        if ranked and ranked[0].fit.misfit < EFFORT.enough**2:
+        if ranked and self._explains(ranked[0].fit):
             return self._weighed(ranked)
         return self._weighed(_in_order([*self._ranked(current, [t for t in every if t.is_far]), *ranked]))
 
@@ -348,13 +353,13 @@ class Selector:
         if term.is_bent:
             fit = best(term.starts, data, EFFORT.far, EFFORT.several)
         elif term.is_far:
-            fit = parted(term.starts, data)
+            fit = parted(term.starts, data, EFFORT.enough)
         else:
             fit = best(term.starts, data, EFFORT.tried)
         return Compared(term.name, fit, gain(current, fit))
 
     def _finished(self, current: Fit, candidate: Compared) -> Compared:
-        fit = fitted(candidate.fit.model, self.data, EFFORT.full)
+        fit = refitted([candidate.fit.model], self.data, EFFORT.full, EFFORT.enough)
         return replace(candidate, fit=fit, gain=gain(current, fit), is_final=True)
 
     def _map(self, call: Callable, items: Sequence):
@@ -379,18 +384,17 @@ class Selector:
         """What a term must buy; one that takes no share (a part of the bare loop's need not), everything, and so one
         whose size says that it is not there, unless too much is left without it.
         """
-        model = current.model
-        if left.name not in BARE and not self._pays(left.fit, current):
-            return math.inf
-        if left.fit.misfit > EFFORT.enough**2:
-            return self.policy.loop_gain
-        if left.name == INTEGRAL and model["I"] < self.policy.loop_integral * model["K"]:
-            return math.inf
-        if left.name == DERIVATIVE and abs(model["D"]) < self.policy.loop_damping * model["a_2"]:
-            return math.inf
-        return self.policy.loop_gain
+        model, policy = current.model, self.policy
+        small = {
+            INTEGRAL: model["I"] < policy.loop_integral * model["K"],
+            DERIVATIVE: abs(model["D"]) < policy.loop_damping * model["a_2"],
+        }
+        absent = small.get(left.name, False) and self._explains(left.fit)
+        shares = left.name in BARE or self._pays(left.fit, current)
+        return policy.loop_gain if shares and not absent else math.inf
 
     def _left_out(self, current: Fit, name: str) -> Left:
         """The best refit without a term, from where the answer stands and from its own closed form."""
-        fit = refitted(lesser(current.model, name), self.data, EFFORT.full)
+        enough = math.inf if self._explains(current) else EFFORT.enough
+        fit = refitted(lesser(current.model, name), self.data, EFFORT.full, enough)
         return Left(name, gain(fit, current), fit)

@@ -32,22 +32,33 @@ class Parting:
 PARTING = Parting()
 
 
-def parted(starts: Sequence[LoopModel], data: Data) -> Fit:
-    """The best fit, the sensors on each side in turn, of free runs and of what following the log led to."""
+def parted(starts: Sequence[LoopModel], data: Data, enough: float) -> Fit:
+    """The best fit, the sensors on each side in turn; where free runs leave more than ``enough`` noise levels, also
+    from where following the log leads.
+    """
     sides = [[start for start in starts if start.side == side] for side in dict.fromkeys(s.side for s in starts)]
-    closely = replace(data, following=PARTING.following)
-    tried, led = ([_stiffened(best(s, d, PARTING.far, PARTING.starts), d) for s in sides] for d in (data, closely))
-    tried.append(fitted(min(led, key=_cost).model, data, PARTING.far))
-    return min(tried, key=_cost)
 
+    def on_each(data: Data) -> Fit:
+        return min((_stiffened(best(s, data, PARTING.far, PARTING.starts), data) for s in sides), key=_cost)
 
-def refitted(starts: Sequence[LoopModel], data: Data, steps: int) -> Fit:
-    """The best fit of several starts, of two bodies also from where following the log leads."""
-    found = best(starts, data, steps)
-    if not any(BY_NAME[name].subsystem == "transmission" for name in found.model.names):
+    found = on_each(data)
+    if found.misfit < enough**2:
         return found
-    led = best(starts, replace(data, following=PARTING.following), steps)
-    return min(found, fitted(led.model, data, steps), key=_cost)
+    return min(found, fitted(on_each(_followed(data)).model, data, PARTING.far), key=_cost)
+
+
+def refitted(starts: Sequence[LoopModel], data: Data, steps: int, enough: float) -> Fit:
+    """The best fit of several starts; of two bodies that leaves more than ``enough`` noise levels also from where
+    following the log leads.
+    """
+    found = best(starts, data, steps)
+    if found.misfit < enough**2 or not any(BY_NAME[name].subsystem == "transmission" for name in found.model.names):
+        return found
+    return min(found, fitted(best(starts, _followed(data), steps).model, data, steps), key=_cost)
+
+
+def _followed(data: Data) -> Data:
+    return replace(data, following=PARTING.following)
 
 
 def _cost(fit: Fit) -> float:
