@@ -127,10 +127,12 @@ class LoopModel:
         return "P" + ("I" if self["I"] > 0 else "") + ("D" if self["D"] > 0 else "")
 
     def layout(self) -> list[Free]:
-        """Every fitted number."""
-        letters = [
-            Free("", n, 0, x.positive, x.size, x.lower, x.upper) for n, x in ((n, LETTERS[n]) for n in self.free)
-        ]
+        """Every fitted number; a speed that is late is one that damps."""
+        letters = []
+        for name in self.free:
+            x = LETTERS[name]
+            lower = 0.0 if name == "D" and "lag_s" in self.free else x.lower
+            letters.append(Free("", name, 0, x.positive, x.size, lower, x.upper))
         effects = [
             self._of_effect(name, p, k, values[k])
             for name, values in self.effects
