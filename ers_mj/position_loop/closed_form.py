@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.effects import BY_NAME
 from ers_mj.effects.end_stop import EndStop
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.rate_limit import RateLimit
@@ -68,7 +67,7 @@ class ClosedForms:
 
     def again(self, model: LoopModel) -> list[LoopModel]:
         """A model of one body with what regressions make of its loop and its load, all else as it stands."""
-        if any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+        if model.has_two_bodies:
             return []
         loads = self.loads if GRAVITY in model.names else ("hold", "a_1") if "a_1" in model.free else ("hold",)
         found = []

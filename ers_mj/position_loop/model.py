@@ -122,6 +122,11 @@ class LoopModel:
         return tuple(name for name, _ in self.effects)
 
     @property
+    def has_two_bodies(self) -> bool:
+        """Whether a play or a shaft parts the motor from the load."""
+        return any(BY_NAME[name].subsystem == "transmission" for name in self.names)
+
+    @property
     def kind(self) -> str:
         """P, PD, PI or PID."""
         return "P" + ("I" if self["I"] > 0 else "") + ("D" if self["D"] > 0 else "")

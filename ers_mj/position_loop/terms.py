@@ -218,7 +218,7 @@ def _giving(model: LoopModel) -> Iterator[LoopModel]:
     """Friction that creeps, as MuJoCo's does, and of one body one that a bristle carries."""
     for creep, heavy in SIZES.creeps:
         yield model.fixed(heavy=heavy).having(creep=creep)
-    if not any(BY_NAME[name].subsystem == "transmission" for name in model.names):
+    if not model.has_two_bodies:
         bristles = [start for start in BY_NAME[Presliding.name].starts(model.scales) if np.isfinite(start[0])]
         for wider in SIZES.bristles:  # each with damping that fades, and with one that stays
             for start in bristles[:2]:
@@ -342,7 +342,7 @@ def _transmissions(model: LoopModel, error: float) -> list[Term]:
     """A play or a shaft, with the loop's sensor and the log's on either side; of a loop on the motor's side friction is
     partly the load's.
     """
-    if any(BY_NAME[name].subsystem == "transmission" or name == Presliding.name for name in model.names):
+    if model.has_two_bodies or Presliding.name in model.names:
         return []
     soft = SIZES.contacts[0]
     play = [np.array([x * error, rho, phi, *soft]) for x in SIZES.gaps for rho, phi in SIZES.shares]

@@ -52,7 +52,7 @@ def refitted(starts: Sequence[LoopModel], data: Data, steps: int, enough: float)
     following the log leads.
     """
     found = best(starts, data, steps)
-    if found.misfit < enough**2 or not any(BY_NAME[name].subsystem == "transmission" for name in found.model.names):
+    if found.misfit < enough**2 or not found.model.has_two_bodies:
         return found
     return min(found, fitted(best(starts, _followed(data), steps).model, data, steps), key=_cost)
 
