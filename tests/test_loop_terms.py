@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from test_position_loop import LIMITED, recorded, run_of, steps_of
 
+from ers_mj.data.recording import from_arrays
 from ers_mj.effects.backlash import Backlash
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.load_dependent_friction import LoadDependentFriction
 from ers_mj.effects.position_dependent_friction import PositionDependentFriction
 from ers_mj.effects.presliding import Presliding
+from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.effects.shaft_compliance import ShaftCompliance
 from ers_mj.effects.stribeck import Stribeck
 from ers_mj.effects.voltage_saturation import VoltageSaturation
@@ -50,6 +52,16 @@ def test_a_limit_is_found_beside_a_model_that_lacks_it_unless_it_was_refused():
     assert again is not None and is_there(again.chosen.model, VoltageSaturation.name)
     instead = selector.another(lacking, {frozenset(parts(again.chosen.model))})
     assert instead is None or set(parts(instead.chosen.model)) != set(parts(again.chosen.model))
+
+
+def test_the_offset_of_a_log_shows_once_the_limit_of_its_reference_is_known():
+    """Under a weight, which the loop without that limit lost."""
+    given = recorded(LIMITED | {"R": 2.5}, seeds=(1, 2, 3), effects=((GravityImbalance.name, np.array([30.0, 12.0])),))
+    logs = [from_arrays(x.t, x.u, x.y + 0.004 * (x is given[2]), name=x.name, input_unit="rad") for x in given]
+    selector = Selector(runs_of(logs), True)
+    chosen = selector.run().chosen
+    assert {GravityImbalance.name, RateLimit.name} <= set(parts(chosen.model)) and chosen.misfit < 1.2
+    assert selector.runs[2].y[0] == pytest.approx(given[2].y[0], abs=1e-3)
 
 
 def test_an_effect_goes_with_the_letters_that_only_it_tells():

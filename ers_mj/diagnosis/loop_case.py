@@ -16,12 +16,13 @@ from ers_mj.diagnosis.errors_told import errors_told
 from ers_mj.plants.looped_mujoco import LoopedPlant
 from ers_mj.plants.mechanical import MechanicalPlant
 from ers_mj.position_loop import beside
+from ers_mj.position_loop.compared import Selection
 from ers_mj.position_loop.confirmation import Confirmed, recalibrated
 from ers_mj.position_loop.fit import Fit
 from ers_mj.position_loop.intervals import Intervals
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run
-from ers_mj.position_loop.selection import Selection, Selector
+from ers_mj.position_loop.selection import Selector
 from ers_mj.servo.datasheet import Datasheet
 
 LAGS = 3  # samples over which what a model leaves is remembered

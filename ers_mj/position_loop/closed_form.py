@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -92,15 +93,17 @@ class ClosedForms:
         return replace(term, starts=(*term.starts, *begun), is_bent=True)
 
     def _bent(self, name: str, model: LoopModel) -> list[LoopModel]:
-        """The loop and its load alone, with a limit of the reference's speed, an integral, or a limit of the drive."""
-        loads = self.loads if GRAVITY in model.names else ("hold",)
+        """The loop and its load alone, with a limit of the reference's speed, an integral, or a limit of the drive;
+        also under a load that the model without it has lost.
+        """
+        borne = (self.loads,) if GRAVITY in model.names else (("hold",), self.loads)
         speeds = [model["R"]]
         if name == RateLimit.name:
             speeds = [x * top_speed(self.runs) for x in BEGUN.speeds]
         found = []
         for speed in speeds:
             more = {"R": speed} if np.isfinite(speed) else {}
-            for width in SCAN.widths:
+            for loads, width in product(borne, SCAN.widths):
                 for rough in self.rough(loads, width, speed, name == INTEGRAL):
                     if name != VoltageSaturation.name or "L" in rough.values:
                         found.append(self.begun(rough, **more))

@@ -13,10 +13,11 @@ import numpy as np
 from ers_mj.decisions.confirmation import HeldOut, Won, is_confirmed, paired_p, pays
 from ers_mj.decisions.explained import cost, score
 from ers_mj.decisions.thresholds import Policy
+from ers_mj.position_loop.compared import Left, Selection
 from ers_mj.position_loop.fit import Data, Fit, fitted, gain
 from ers_mj.position_loop.model import LoopModel, only_letters
 from ers_mj.position_loop.runs import Run
-from ers_mj.position_loop.selection import Left, Selection, Selector
+from ers_mj.position_loop.selection import Selector
 from ers_mj.position_loop.terms import INTEGRAL, SPRING, STARTING, parts, without
 
 

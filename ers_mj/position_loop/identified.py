@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.data.recording import Recording
+from ers_mj.position_loop.compared import Selection
 from ers_mj.position_loop.fit import Data, Fit, polished
 from ers_mj.position_loop.intervals import Intervals
 from ers_mj.position_loop.runs import runs_of
-from ers_mj.position_loop.selection import Selection, Selector
+from ers_mj.position_loop.selection import Selector
 
 WRONG = 1.5  # mean squared error in noise variances from which the bare loop is said to be wrong
 

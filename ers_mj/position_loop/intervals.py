@@ -13,9 +13,9 @@ from scipy.special import stdtrit
 
 from ers_mj.decisions.thresholds import Policy
 from ers_mj.position_loop import beside
+from ers_mj.position_loop.compared import Selection
 from ers_mj.position_loop.fit import Data, Fit, best, fitted, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
-from ers_mj.position_loop.selection import Selection
 from ers_mj.position_loop.terms import lagging, parts, terms
 
 

@@ -33,7 +33,7 @@ class Letter:
 
 LETTERS: Mapping[str, Letter] = {
     "K": Letter("1/s^2", lower=1e-3),
-    "D": Letter("1/s", positive=False, lower=-math.inf, size=10.0),
+    "D": Letter("1/s", positive=False, size=10.0),
     "lag_s": Letter("s", lower=1e-4, upper=0.05),  # of the speed that D multiplies
     "I": Letter("1/s^3", lower=1e-6),
     "L": Letter("{y}/s^2", math.inf, lower=1e-6),
@@ -132,12 +132,9 @@ class LoopModel:
         return "P" + ("I" if self["I"] > 0 else "") + ("D" if self["D"] > 0 else "")
 
     def layout(self) -> list[Free]:
-        """Every fitted number; a speed that is late is one that damps."""
-        letters = []
-        for name in self.free:
-            x = LETTERS[name]
-            lower = 0.0 if name == "D" and "lag_s" in self.free else x.lower
-            letters.append(Free("", name, 0, x.positive, x.size, lower, x.upper))
+        """Every fitted number."""
+        every = [(name, LETTERS[name]) for name in self.free]
+        letters = [Free("", name, 0, x.positive, x.size, x.lower, x.upper) for name, x in every]
         effects = [
             self._of_effect(name, p, k, values[k])
             for name, values in self.effects

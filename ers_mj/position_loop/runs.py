@@ -264,3 +264,12 @@ def speed_of(run: Run, width: float = 0.02) -> np.ndarray:
     y = np.interp(run.t, run.t[known], run.y[known])
     i, j = np.clip(np.arange(y.size) - k, 0, None), np.clip(np.arange(y.size) + k, None, y.size - 1)
     return (y[j] - y[i]) / np.maximum(run.t[j] - run.t[i], 1e-12)
+
+
+def spread_out(runs: Sequence[Run], seconds: float) -> list[Run]:
+    """Runs evenly picked of many, of so many seconds together; at least four."""
+    total = sum(float(run.t[-1]) for run in runs)
+    count = max(4, round(len(runs) * seconds / total))
+    if count >= len(runs):
+        return list(runs)
+    return [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, count).round().astype(int))]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -19,9 +19,10 @@ from ers_mj.effects.input_delay import InputDelay
 from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.effects.voltage_saturation import VoltageSaturation
 from ers_mj.position_loop.closed_form import ClosedForms
+from ers_mj.position_loop.compared import Compared, Left, Selection, in_order
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted, gain, jacobian
 from ers_mj.position_loop.model import LoopModel, only_letters
-from ers_mj.position_loop.runs import Run
+from ers_mj.position_loop.runs import Run, spread_out
 from ers_mj.position_loop.terms import (
     CONSTANT,
     DERIVATIVE,
@@ -35,7 +36,6 @@ from ers_mj.position_loop.terms import (
     lesser,
     other_forms,
     parts,
-    present,
     sized,
     terms,
     ways_round,
@@ -71,58 +71,6 @@ class Effort:
 EFFORT = Effort()
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A candidate of a round: its gain over the model at hand after everything was refitted, to all runs in the end or
-    only at first.
-    """
-
-    name: str
-    fit: Fit
-    gain: float
-    is_final: bool = False
-
-
-@dataclass(frozen=True)
-class Left:
-    """What a term of the answer buys: its gain over the best refit without it."""
-
-    name: str
-    gain: float
-    fit: Fit
-
-
-@dataclass(frozen=True)
-class Selection:
-    """The bare loop, the answer, each round's candidates (the best first), and what each term of the answer buys."""
-
-    base: Fit
-    chosen: Fit
-    rounds: tuple[tuple[Compared, ...], ...]
-    left: tuple[Left, ...] = ()
-    loads: tuple[tuple[str, Fit], ...] = field(default=(), repr=False)
-
-    @property
-    def named(self) -> tuple[Left, ...]:
-        """The named effects, the one that buys most first."""
-        names = present(self.chosen.model)
-        return tuple(sorted((x for x in self.left if x.name in names), key=lambda x: -x.gain))
-
-
-def spread_out(runs: Sequence[Run], seconds: float) -> list[Run]:
-    """Runs evenly picked of many, of so many seconds together; at least four."""
-    total = sum(float(run.t[-1]) for run in runs)
-    count = max(4, round(len(runs) * seconds / total))
-    if count >= len(runs):
-        return list(runs)
-    return [runs[k] for k in np.unique(np.linspace(0, len(runs) - 1, count).round().astype(int))]
-
-
-def _in_order(candidates: Sequence[Compared]) -> list[Compared]:
-    """Those that were refitted to the end first, of these the one that buys most."""
-    return sorted(candidates, key=lambda c: (not c.is_final, -c.gain))
-
-
 class Selector:
     """A selection under way on some runs."""
 
@@ -143,13 +91,8 @@ class Selector:
     def run(self, progress: Progress = lambda text, share: None) -> Selection:
         """Base, rounds, and what can be left out again."""
         progress("fitting the loop", 0.05)
-        current = base = self.aligned(self.base())
-        rounds: list[tuple[Compared, ...]] = []
-        for name in FIRST:  # what bends all the rest, before anything that could stand for it
-            if self._may_gain(current):
-                tried = self._ranked(current, self._terms(current, (name,)))
-                rounds += [(c,) for c in tried if self._takes_most(current, c)]
-                current = self._firmware(rounds[-1][0].fit) if rounds else current
+        base = self.base()
+        current, rounds = self._levelled(base)
         while len(rounds) < EFFORT.rounds and self._may_gain(current := self.begun_again(current)):
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
             ranked = self.compared(current)
@@ -241,6 +184,35 @@ class Selector:
             base = fitted(base.model, self.data, EFFORT.full)
         return base
 
+    def _levelled(self, base: Fit) -> tuple[Fit, list[tuple[Compared, ...]]]:
+        """The loop with what bends all the rest, its logs aligned before that is looked for or after, whichever leaves
+        less: what bends a loop may look like offsets, and they like that.
+        """
+        logs = self.runs
+        aligned = self.aligned(base)
+        bent, rounds = self._bent(aligned)
+        if aligned is base:
+            return self.aligned(bent), rounds
+        shifted = self.runs
+        self._take(logs)
+        other, other_rounds = self._bent(base)
+        other = self.aligned(other)
+        if other.cost < bent.cost:
+            return other, other_rounds
+        self._take(shifted)
+        return bent, rounds
+
+    def _bent(self, current: Fit) -> tuple[Fit, list[tuple[Compared, ...]]]:
+        """The fit with what bends all the rest, before anything that could stand for it, and those rounds."""
+        rounds: list[tuple[Compared, ...]] = []
+        for name in FIRST:
+            if self._may_gain(current):
+                for c in self._ranked(current, self._terms(current, (name,))):
+                    if self._takes_most(current, c):
+                        rounds.append((c,))
+                        current = self._firmware(c.fit)
+        return current, rounds
+
     def _whole(self, fit: Fit) -> Fit:
         """A fit to some of the runs refitted to all."""
         return fit if self.screen is self.data else fitted(fit.model, self.data, EFFORT.full)
@@ -288,7 +260,7 @@ class Selector:
         ranked = self._ranked(current, self._promising(current, [t for t in every if not t.is_far]))
         if ranked and self._explains(ranked[0].fit):
             return self._weighed(ranked)
-        return self._weighed(_in_order([*self._ranked(current, [t for t in every if t.is_far]), *ranked]))
+        return self._weighed(in_order([*self._ranked(current, [t for t in every if t.is_far]), *ranked]))
 
     def _weighed(self, ranked: list[Compared]) -> list[Compared]:
         """The candidates, a weight before a spring that does no better: along a small travel they are alike."""
@@ -317,7 +289,7 @@ class Selector:
         for c in seldom:
             (ready if c.gain > self.policy.loop_gain else rest).append(c)
         full = list(self._map(partial(self._finished, current), ready))
-        return _in_order([*full, *rest])
+        return in_order([*full, *rest])
 
     def _promising(self, current: Fit, candidates: Sequence[Term]) -> list[Term]:
         """The candidates without those laws of which no start, in any size and beside any other numbers of the model,
@@ -353,7 +325,7 @@ class Selector:
         if term.is_bent:
             fit = best(term.starts, data, EFFORT.far, EFFORT.several)
         elif term.is_far:
-            fit = parted(term.starts, data, EFFORT.enough)
+            fit = parted(term.starts, data)
         else:
             fit = best(term.starts, data, EFFORT.tried)
         return Compared(term.name, fit, gain(current, fit))

@@ -23,7 +23,7 @@ class Parting:
     [1/s] a run follows its log that leads there.
     """
 
-    starts: Halving = Halving(looked=8, first=6, kept=2)
+    starts: Halving = Halving(looked=6, first=6, kept=1)
     far: int = 25
     stiffer: int = 10
     following: float = 60.0
@@ -32,19 +32,12 @@ class Parting:
 PARTING = Parting()
 
 
-def parted(starts: Sequence[LoopModel], data: Data, enough: float) -> Fit:
-    """The best fit, the sensors on each side in turn; where free runs leave more than ``enough`` noise levels, also
-    from where following the log leads.
-    """
+def parted(starts: Sequence[LoopModel], data: Data) -> Fit:
+    """The fit to which the best run that follows its log leads, the sensors on each side in turn."""
     sides = [[start for start in starts if start.side == side] for side in dict.fromkeys(s.side for s in starts)]
-
-    def on_each(data: Data) -> Fit:
-        return min((_stiffened(best(s, data, PARTING.far, PARTING.starts), data) for s in sides), key=_cost)
-
-    found = on_each(data)
-    if found.misfit < enough**2:
-        return found
-    return min(found, fitted(on_each(_followed(data)).model, data, PARTING.far), key=_cost)
+    near = _followed(data)
+    found = min((best(side, near, PARTING.far, PARTING.starts) for side in sides), key=_cost)
+    return fitted(_stiffened(found, near).model, data, PARTING.far)
 
 
 def refitted(starts: Sequence[LoopModel], data: Data, steps: int, enough: float) -> Fit:
