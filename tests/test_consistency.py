@@ -341,3 +341,35 @@ def test_the_supply_and_a_drive_that_is_off_are_told(drive, put):
         "region_s": [4.0, drive["t_s"][-1]],
         "sentence": record.faults[1].sentence,
     }
+
+
+# -- a clock that is not even ----------------------------------------------------------------------------------------
+
+
+def jittering(drive, moves: bool, rms: float = 0.03):
+    """The drive's columns with stamps off its clock, at which the output was read where it ``moves`` with them."""
+    t = drive["t_s"]
+    stamps = t + np.clip(rms * np.random.default_rng(4).standard_normal(N), -0.15, 0.15) * STEP
+    exact = motor(drive["u_V"])
+    y = np.interp(stamps, t, exact) if moves else exact
+    return drive | {"t_s": stamps, "theta_rad": np.round(y / 1e-5) * 1e-5}
+
+
+def test_stamps_with_which_nothing_moves_are_the_ticks_of_a_clock(drive, put):
+    record = read_recording(put(jittering(drive, moves=False)))
+    assert np.ptp(np.diff(record.t)) < 1e-9 and record.faults == ()
+    assert record.sample_time == pytest.approx(STEP, rel=1e-4)
+    assert any("regular clock of 0.005" in problem for problem in record.problems)
+
+
+def test_stamps_with_which_the_output_moves_stand(drive, put):
+    columns = jittering(drive, moves=True)
+    record = read_recording(put(columns))
+    np.testing.assert_array_equal(record.t, columns["t_s"])
+    assert any("jitter" in problem for problem in record.problems)
+
+
+def test_a_clock_that_wanders_stands(drive, put):
+    t = np.cumsum(STEP * (1.0 + 0.02 * np.random.default_rng(5).standard_normal(N)))
+    record = read_recording(put(drive | {"t_s": t}))
+    np.testing.assert_array_equal(record.t, t)

@@ -21,6 +21,7 @@ class Limits:
 
     most_missing: float = 0.20  # share of a column: a required one is refused, another one not used
     least_jitter: float = 0.01  # rms share of the step from which jitter is worth a sentence
+    regular: float = 0.2  # share of the step that no step of a regular clock is off a whole number of them
     largest: float = 1e25  # of any column: no sensor gives more, and its powers are still numbers
     least_travel: float = 1e-25  # of an output, below which it is constant
     ends: tuple[int, ...] = (32767, 32768)  # counts at which a register of 16 bits ends
@@ -171,9 +172,19 @@ def _region(t: np.ndarray, first: int, last: int) -> tuple[float, float]:
     return float(t[first]), float(t[last])
 
 
+def gaps_in(t: np.ndarray) -> np.ndarray:
+    """The steps of time (N - 1,) in which rows are lost: of two and more of a regular clock's, else of more than GAP
+    median ones.
+    """
+    dt = np.diff(t) / np.median(np.diff(t))
+    whole = np.rint(dt)
+    is_regular = bool(np.all(whole >= 1.0)) and float(np.max(np.abs(dt - whole) / whole)) < LIMITS.regular
+    return whole > 1.0 if is_regular else dt > GAP
+
+
 def _told_gaps(t: np.ndarray, label: str) -> list[Fault]:
     dt = np.diff(t)
-    gaps = np.flatnonzero(dt > GAP * np.median(dt))
+    gaps = np.flatnonzero(gaps_in(t))
     if not gaps.size:
         return []
     k = gaps[np.argmax(dt[gaps])]
@@ -183,7 +194,7 @@ def _told_gaps(t: np.ndarray, label: str) -> list[Fault]:
 
 def _told_jitter(t: np.ndarray, label: str) -> list[Fault]:
     dt = np.diff(t) / np.median(np.diff(t))
-    jitter = np.sqrt(np.mean((dt[dt <= GAP] - 1) ** 2))
+    jitter = np.sqrt(np.mean((dt[~gaps_in(t)] - 1) ** 2))
     sentence = f"the steps of time jitter by {jitter:.1%} rms"
     return [Fault("jitter", label, sentence)] if jitter > LIMITS.least_jitter else []
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ers_mj.data.checks import gaps_in
 from ers_mj.data.consistency.refresh import fresh_rows
 from ers_mj.data.sensor_faults import converter_step, held_spans, noise_sigma
 
@@ -123,7 +124,7 @@ class Inspection:
 def inspected(record: Recorded) -> Inspection:
     """Look a recording over."""
     dt = np.diff(record.t)
-    ordinary = dt[dt <= 3.0 * np.median(dt)] / np.median(dt) - 1.0
+    ordinary = dt[~gaps_in(record.t)] / np.median(dt) - 1.0
     speed = speed_of(record)
     columns = {name: x for name, x in record.columns().items() if name != "t_s"}
     channels = tuple(_channel(name, x, record) for name, x in columns.items())

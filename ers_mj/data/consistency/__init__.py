@@ -1,6 +1,6 @@
 """One pass over all columns of a recording before anything is fitted: data before physics.
 
-    fields as checked -> clock (scale, jumps, lone rows) -> scales (another unit) -> wraps -> commands (unsigned)
+    fields as checked -> clock (scale, jumps, lone rows, ticks) -> scales (another unit) -> wraps -> commands (unsigned)
     -> references (the output itself, of another zero or sign, behind a limit) -> supply (readings off, drive off)
     -> blackouts (several columns repeat together, leaps) -> refresh (held samples)
     -> fields, masked or mended, and a fault for each
@@ -21,6 +21,7 @@ STEPS = (
     clock.jumps,
     clock.pieces,
     clock.lone_rows,
+    clock.regular,
     scales.whole_numbers,
     scales.duty_counts,
     scales.speed_unit,

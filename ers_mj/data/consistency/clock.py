@@ -22,6 +22,10 @@ class Clock:
     long_gap: float = 20.0  # median steps
     fewest: int = 100  # samples that the longest part must have
     thinnest: float = 20.0  # median steps of time a sample, all in all: what is laid out over time stays that small
+    late: float = 0.2  # steps that the stamps of a regular clock may be off,
+    told: float = 1e-3  # from where on it matters,
+    alike: float = 0.5  # correlation of neighbours, above which the clock itself wanders,
+    sure: float = 3.0  # and standard deviations by which the output must move with the stamps to prove them right
 
 
 CLOCK = Clock()
@@ -49,6 +53,45 @@ def scale(sheet: Sheet) -> Found:
         f"{sheet.name}: the time {column} steps by {step:.6g} s, which is no log of a servo: give its unit as in"
         f' --map "t_s={column} [ms]", or insist with --map "t_s={column} [s]"'
     )
+
+
+def regular(sheet: Sheet) -> Found:
+    """Stamps that are off a regular clock, one by one, are its ticks, unless the output moves with them: what is put
+    in for a little longer turns a motor further.
+    """
+    dt = np.diff(sheet.t)
+    ticks = np.r_[0.0, np.cumsum(np.maximum(np.rint(dt / np.median(dt)), 1.0))]
+    step, first = np.polyfit(ticks, sheet.t, 1)
+    clock = first + step * ticks
+    off = sheet.t - clock
+    size, worst = float(np.std(off)) / step, float(np.max(np.abs(off))) / step
+    if not CLOCK.told < size or worst > CLOCK.late or abs(np.corrcoef(off[1:], off[:-1])[0, 1]) > CLOCK.alike:
+        return sheet, []
+    share, spread = _moves_with(sheet.y, off, step)
+    if share > 0.5 and share > CLOCK.sure * spread:
+        return sheet, []
+    jitter = float(np.sqrt(np.mean((dt / (step * np.diff(ticks)) - 1.0) ** 2)))
+    sentence = (
+        f"the steps of time jitter by {jitter:.1%} rms about a regular clock of {step:.4g} s, and the output does not"
+        " move with them: the ticks of that clock are taken"
+    )
+    clock = clock - clock[0] + sheet.t[0]
+    return sheet.changed(t=clock), [Fault("jitter", sheet.labels["t"], sentence)]
+
+
+def _moves_with(y: np.ndarray, off: np.ndarray, step: float) -> tuple[float, float]:
+    """Which share of the stamps' deviations (N,) the output (N,) moves by, at its speed, and that share's standard
+    deviation.
+    """
+    bend = lambda x: x[2:] - 2.0 * x[1:-1] + x[:-2]
+    speed = (y[2:] - y[:-2]) / (2.0 * step)
+    moved, would = bend(y), bend(off) * speed
+    seen = np.isfinite(moved) & np.isfinite(would)
+    power = float(np.sum(would[seen] ** 2))
+    if power == 0.0:
+        return 0.0, np.inf
+    share = float(moved[seen] @ would[seen]) / power
+    return share, float(np.sqrt(np.sum((would[seen] * moved[seen]) ** 2))) / power
 
 
 def jumps(sheet: Sheet) -> Found:
