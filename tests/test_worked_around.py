@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from csv_made import N, problem
 
+from ers_mj.data.checks import gaps_in
+from ers_mj.data.inspection import inspected
 from ers_mj.data.recording import from_arrays
 
 
@@ -69,3 +71,13 @@ def test_a_rudder_at_rest_is_not_a_stuck_sensor(columns):
 def test_a_constant_input_is_told(columns):
     t, u, y = columns.values()
     assert problem(from_arrays(t, np.full(N, 3.0), y), "constant") == "the input u is constant at 3"
+
+
+def test_rows_that_a_regular_clock_skips_are_gaps_and_no_jitter():
+    t = np.delete(0.002 * np.arange(2500), [300, 701, 1100, 1101, 1502, 1900])
+    kept = from_arrays(t, np.sin(8.0 * t), np.cos(8.0 * t))
+    assert any("time has 5 gaps" in problem for problem in kept.problems)
+    assert not any("jitter" in problem for problem in kept.problems)
+    assert inspected(kept).jitter < 1e-6
+    late = np.random.default_rng(2).uniform(0.0, 0.8, kept.t.size) * 0.002
+    assert not gaps_in(np.arange(kept.t.size) * 0.002 + late).any()

@@ -25,7 +25,7 @@ from ers_mj.effects import BY_NAME, SUSPECTS
 from ers_mj.effects.quantities import Symptoms
 from ers_mj.estimation.baseline import Start, baseline, sharpened
 from ers_mj.estimation.fit import polished
-from ers_mj.estimation.lost_rows import cleaned
+from ers_mj.estimation.initial_state import without_spikes
 from ers_mj.selection.budget import SEARCH, Budget, Search
 from ers_mj.selection.comparison import Candidate
 from ers_mj.selection.confirmation import Confirmed, confirmed
@@ -80,7 +80,7 @@ def diagnose(
     grown = partial(select, jobs=jobs, progress=progress, policy=policy, budget=budget)
     start, chosen = _polished(start, grown(start.fit, start.traces, start=begun, exclude=barred))
     progress("judging on held-out data", 0.75)
-    held = cleaned(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
+    held = without_spikes(start.fit.model, counted([trace_of(r, inertia) for r in holdout], travel))
     selection, judged = confirmed(start, chosen, held, jobs, policy)
     suspects: tuple[Candidate, ...] = ()
     if not still and search.among is None:

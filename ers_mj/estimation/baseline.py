@@ -15,8 +15,7 @@ from ers_mj.decisions import explained
 from ers_mj.decisions.thresholds import POLICY
 from ers_mj.errors import InputError
 from ers_mj.estimation.fit import Along, fit, hopped
-from ers_mj.estimation.initial_state import with_starts
-from ers_mj.estimation.lost_rows import cleaned
+from ers_mj.estimation.initial_state import with_starts, without_spikes
 from ers_mj.estimation.objective import Fit, run_of, tau_of
 from ers_mj.estimation.scales import ampere_in, free_in, scales_of
 from ers_mj.estimation.search import HOLDING, SPRINGS, Kinds, simplest
@@ -183,7 +182,7 @@ def _refined(model: Model, traces: Sequence[Trace], jobs: int) -> tuple[Fit, Seq
     first = fit(model, traces)
     second = first if _explains(first) else fit(model, traces, along=Along(by_tangents=False))
     first, second = sorted((first, second), key=lambda found: found.cost)
-    traces = with_starts(first.model, cleaned(first.model, traces))
+    traces = with_starts(first.model, without_spikes(first.model, traces))
     found = fit(first.model, traces, tau=tau_of(first.misfit))
     others = [dict(second.model.values)] if second.cost - found.cost > POLICY.valley else []
     return *hopped(found, traces, tau_of(found.misfit), jobs, restart=True), others
