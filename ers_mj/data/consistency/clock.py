@@ -17,13 +17,13 @@ class Clock:
     fastest: float = 1e-7  # [s] a step of time, below which no servo is logged
     slowest: float = 0.5  # [s] a step of time, from which it is no log of a servo's motion
     usual: tuple[float, float] = (1e-4, 0.2)  # [s] the steps of one, by which a unit is guessed
-    gap: float = 3.0  # median steps, above which a step is a gap
     lone: int = 10  # samples: fewer at an end, beside a long gap, tell nothing
     long_gap: float = 20.0  # median steps
     fewest: int = 100  # samples that the longest part must have
     thinnest: float = 20.0  # median steps of time a sample, all in all: what is laid out over time stays that small
     late: float = 0.2  # steps that the stamps of a regular clock may be off,
     told: float = 1e-3  # from where on it matters,
+    plain: float = 0.02  # and by how many its last tick may be off where its step is told in fewer digits,
     alike: float = 0.5  # correlation of neighbours, above which the clock itself wanders,
     sure: float = 3.0  # and standard deviations by which the output must move with the stamps to prove them right
 
@@ -75,8 +75,13 @@ def regular(sheet: Sheet) -> Found:
         f"the steps of time jitter by {jitter:.1%} rms about a regular clock of {step:.4g} s, and the output does not"
         " move with them: the ticks of that clock are taken"
     )
-    clock = clock - clock[0] + sheet.t[0]
-    return sheet.changed(t=clock), [Fault("jitter", sheet.labels["t"], sentence)]
+    return sheet.changed(t=sheet.t[0] + _plain(step, ticks[-1]) * ticks), [Fault("jitter", sheet.labels["t"], sentence)]
+
+
+def _plain(step: float, count: float) -> float:
+    """The step in as few digits as leave no doubt after so many: recordings of one clock have one step."""
+    plain = (float(f"{step:.{digits}g}") for digits in range(1, 17))
+    return next(x for x in plain if abs(x - step) * count <= CLOCK.plain * step)
 
 
 def _moves_with(y: np.ndarray, off: np.ndarray, step: float) -> tuple[float, float]:
