@@ -21,7 +21,7 @@ from ers_mj.decisions.explained import attainable
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.jacobian import central_jacobian
 from ers_mj.estimation.objective import residuals
-from ers_mj.servo.model import OBSERVER_RATE, STATES, Model
+from ers_mj.servo.model import OBSERVER_RATE, STATES, Free, Model
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class Doubt:
     unseen: float = 1.0  # effects of that size that act, on average
     fewest_records: int = 3  # left out in turn, from which a jackknife counts
     lost: float = 1e6  # [sigma] that a run leaves where it ran away
+    same: float = 0.5  # share of an unseen effect that an effect of the model leaves, below which it is that one
     run: int = 4  # neighbouring blocks that are resampled together
 
 
@@ -100,7 +101,7 @@ def _sandwich(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.nd
     hessian = weighted.T @ jacobian
     run = blocks.index // DOUBT.run
     slopes = np.array([np.bincount(run, weighted[:, k] * e, run.max() + 1) for k in range(len(layout))]).T
-    inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
+    inverse = _inverse(hessian)
     n = slopes.shape[0]
     covariance = inverse @ (slopes.T @ slopes) @ inverse * n / max(n - len(layout), 1)
     return stdtrit(max(n - len(layout), 1), 0.975) ** 2 * covariance
@@ -138,22 +139,41 @@ def spread_by(shifts: Shifts, gain: float) -> np.ndarray:
 
 def unseen_shifts(model: Model, traces: Sequence[Trace], tau: float, jacobian: np.ndarray) -> Shifts:
     """How far the numbers move to make up for effects that act unseen: what a fit makes of each effect's secant. The
-    ``jacobian`` is ``slopes_of`` the model.
+    ``jacobian`` is ``slopes_of`` the model. One most of which an effect of the model explains is the same by another
+    name: a rival, to which that one may have to give way, but nothing that moves its numbers from beside.
     """
     layout, blocks, e = model.layout(), Blocks.of(traces), _left(model, traces)
     weight = (2.0 / ((tau + blocks.misfit(e)) * blocks.counts))[blocks.index]
     hessian = jacobian.T @ (weight[:, None] * jacobian)
-    inverse = np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(layout)), rcond=1e-12)
+    inverse, beside = _inverse(hessian), _without_each(model, layout, hessian)
     found: list[list[tuple[np.ndarray, float]]] = []
     for effect in (e for e in BY_NAME.values() if not (e.name in model.names or e.once or _is_in(e, model))):
         own = []
         for start in (starts := effect.starts(model.scales))[:1] + starts[1:][-1:]:
             secant = residuals(model.with_effect(effect.name, start), traces, OBSERVER_RATE) - e
             if np.all(np.isfinite(secant)):
-                pull = jacobian.T @ (weight * secant)
-                apart = float(secant @ (weight * secant) - pull @ inverse @ pull)
-                own.append((inverse @ pull, 0.5 * apart))
+                pull, whole = jacobian.T @ (weight * secant), float(secant @ (weight * secant))
+                shift, apart = inverse @ pull, whole - float(pull @ inverse @ pull)
+                for mine, others in beside:
+                    if apart < DOUBT.same * (whole - float(pull @ others @ pull)):
+                        shift = np.where(mine, 0.0, shift)
+                own.append((shift, 0.5 * apart))
         found += [own] if own else []
     every = [(shift, gain, 1.0 / (len(own) * len(found))) for own in found for shift, gain in own]
     moved, gains, shares = zip(*every) if every else ((), (), ())
     return Shifts(np.array(moved).reshape(-1, len(layout)), np.array(gains), np.array(shares))
+
+
+def _without_each(model: Model, layout: Sequence[Free], hessian: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of each effect of a model: which numbers (k,) are its own, and the inverse (k, k) among the others."""
+    found = []
+    for name in model.names:
+        mine = np.array([f.owner == name for f in layout])
+        others, inverse = np.flatnonzero(~mine), np.zeros_like(hessian)
+        inverse[np.ix_(others, others)] = _inverse(hessian[np.ix_(others, others)])
+        found += [(mine, inverse)] if mine.any() else []
+    return found
+
+
+def _inverse(hessian: np.ndarray) -> np.ndarray:
+    return np.linalg.pinv(hessian + 1e-12 * np.trace(hessian) * np.eye(len(hessian)), rcond=1e-12)
