@@ -105,9 +105,26 @@ def test_an_idle_bridge_takes_its_share_of_the_drive():
     rests = LoopModel(idle, ()).motion(run_of(t, 0.05 * r))
     assert np.ptp(rests[:, 0]) == 0.0 and np.ptp(rests[:, 3]) == 0.0
     assert np.max(drive) == pytest.approx(400.0 * 0.4 - 10.0, rel=0.1)
-    twin = looped_plant(Datasheet(lumped={"a_2": 8.0}, loop={k: idle[k] for k in ("K", "D", "idle")}))
-    there = twin.simulate(t, r, (0.0, 0.0), 0.0)
-    assert np.max(np.abs(there - LoopModel(idle, ()).predicted(run_of(t, r)))) < 5e-3
+    limited = idle | {"L": 100.0}  # the firmware's limit, of which the bridge loses the same
+    assert np.max(LoopModel(limited, ()).motion(run_of(t, r))[:, 3]) == pytest.approx(100.0 - 10.0)
+    for numbers in (idle, limited):
+        twin = looped_plant(Datasheet(lumped={"a_2": 8.0}, loop={k: v for k, v in numbers.items() if k != "a_2"}))
+        there = twin.simulate(t, r, (0.0, 0.0), 0.0)
+        assert np.max(np.abs(there - LoopModel(numbers, ()).predicted(run_of(t, r)))) < 5e-3
+
+
+def test_a_drive_that_is_late_takes_damping_and_nothing_else():
+    """Two steps of the firmware late, the drive of a loop without a damping of its own."""
+    true, data = {"K": 900.0, "L": 150.0, "a_2": 20.0, "c_2": 8.0, "tau_s": 0.012, "dead_time_s": 0.002}, []
+    for seed in (1, 2, 3):
+        t, r = steps_of(seed)
+        y = LoopModel(true, ()).predicted(run_of(t, r)) + 3e-4 * np.random.default_rng(seed).standard_normal(t.size)
+        data.append(from_arrays(t, r, y, input_unit="rad"))
+    found = identify_loop(data).intervals
+    assert "dead_time_s" not in found.model.free and found.model["D"] < 0.0
+    for letter in ("K", "L", "a_2", "c_2"):
+        low, high = found.told("", letter).ci95
+        assert low < true[letter] < high and high / low < 1.4
 
 
 def test_a_bristle_gives_and_springs_back_within_its_level():

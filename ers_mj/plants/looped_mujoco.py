@@ -146,6 +146,7 @@ class _Firmware:
         self.slow = w + (self.slow - w) * math.exp(-h / q.lag) if q.lag > 0.0 else w
         v = q.K * math.copysign(size, e) + self.xi - q.D * self.slow
         v -= min(max(v, -q.idle), q.idle)
-        if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
+        most = max(q.L - q.idle, 0.0)
+        if q.I > 0.0 and (abs(v) < most or v * e < 0.0):
             self.xi = min(max(self.xi + h * q.I * e, -q.L), q.L)
-        return min(max(v, -q.L), q.L)
+        return min(max(v, -most), most)

@@ -2,7 +2,7 @@
 
     r_R   the reference tau late, its speed within +-R
     v     = K e + xi - D s,  e = r_R - theta (of the body that the loop's sensor sees),  xi' = I e,  lag s' = w - s
-    drive = v less what of it lies within +-idle, within +-L, ``dead_time`` late, its current within +-most
+    drive = v within +-L less what of it lies within +-idle, ``dead_time`` late, its current within +-most
     theta'' = drive - a_emf w + Eq. (6)'s forces and the laws of effects, friction set-valued
 
 Fixed steps of second order (leapfrog, dampers by the trapezium), friction and limits solved for with the speed at the
@@ -185,8 +185,14 @@ def _touched(c, q, twist, over):
 
 
 @inline
+def _most(q):
+    """The largest drive that the bridge passes."""
+    return max(q.L - q.idle, 0.0)
+
+
+@inline
 def _limited(q, v):
-    return min(max(v, -q.L), q.L)
+    return min(max(v, -_most(q)), _most(q))
 
 
 @inline
@@ -206,8 +212,8 @@ def _ignored(q, v):
 @inline
 def _integrated(q, xi, v, e, h):
     """The loop's integral h later, of an error e at the drive v; at its limit it is not pushed on."""
-    if q.I > 0.0 and (abs(v) < q.L or v * e < 0.0):
-        return _limited(q, xi + h * q.I * e)
+    if q.I > 0.0 and (abs(v) < _most(q) or v * e < 0.0):
+        return min(max(xi + h * q.I * e, -q.L), q.L)
     return xi
 
 
@@ -234,8 +240,8 @@ def _one_body(c, q, t, x, r, fresh, late, h):
         ahead = asked - _ignored(q, asked - 0.5 * D * (x.w + w))
         w = _slipped(mass, push + fresh * ahead + late, a + fresh * D + c.a_emf, level, q.creep, q.heavy, x.w, h)
     v = ahead - 0.5 * D * (x.w + w)
-    if abs(v) > q.L:
-        drive = fresh * math.copysign(q.L, v) + late
+    if abs(v) > _most(q):
+        drive = fresh * _limited(q, v) + late
         w = _slipped(mass, push + drive, a + c.a_emf, level, q.creep, q.heavy, x.w, h)
     else:
         drive = fresh * v + late
@@ -281,7 +287,7 @@ def _two_bodies(c, q, t, x, r, fresh, late, h):
             v = asked - 0.5 * D * (x.w + w)
         lost = _ignored(q, v)
         ahead, v = asked - lost, v - lost
-        if q.at_motor == 0.0 or abs(v) > q.L:
+        if q.at_motor == 0.0 or abs(v) > _most(q):
             asks = fresh * _limited(q, v) + late + between
             w_m = _slipped(c.rho, asks, a_m + d, level_m, q.creep, q.heavy, x.w_m, h)
     xi = _integrated(q, x.xi, v, e, h)

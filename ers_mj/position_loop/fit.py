@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ers_mj.effects import BY_NAME
 from ers_mj.position_loop import beside
 from ers_mj.position_loop.model import Free, LoopModel
 from ers_mj.position_loop.runs import Run
@@ -24,8 +23,8 @@ class Search:
 
     tries: int = 5
     longest: float = 1.5  # of a step, in transformed numbers
-    step: float = 1e-3  # in transformed numbers, to take a slope,
-    bouncing: float = 5e-3  # and that of two bodies that bounce
+    step: float = 1e-2  # in transformed numbers, to take a slope: wider than what sticking and switching leave uneven,
+    place: float = 1e-3  # and of an effect's number that is no logarithm: a place on the travel
     enough: float = 1e-4  # share of the cost that a step must win,
     last: float = 1e-7  # and where a fit is brought to its minimum
     untold: float = 1.0  # noise variances that a step of one must change, else no data tell where to go
@@ -126,7 +125,6 @@ class _Problem:
 
     def __init__(self, model: LoopModel, layout: Sequence[Free], data: Data):
         self.model, self.layout, self.data = model, layout, data
-        self.span = SEARCH.bouncing if any(BY_NAME[name].is_play for name in model.names) else SEARCH.step
 
     def reach(self, z: np.ndarray) -> _Point:
         model = self.model.at(self.layout, z)
@@ -147,11 +145,12 @@ class _Problem:
     def slopes(self, point: _Point, both: bool = False) -> np.ndarray:
         """Of the errors by the transformed numbers (N, k), from one side or from ``both``."""
         out = np.zeros((point.e.size, point.z.size), order="F")
-        for k in range(point.z.size):
-            ends = [self._beside(point, k, way * self.span) for way in (1.0, -1.0)[: 1 + both]]
+        for k, f in enumerate(self.layout):
+            step = SEARCH.place if f.owner and not f.positive else SEARCH.step
+            ends = [self._beside(point, k, way * step) for way in (1.0, -1.0)[: 1 + both]]
             ends = [end for end in ends if end[0] != point.z[k] and np.isfinite(end[1]).all()]
             if not ends and not both:
-                ends = [self._beside(point, k, -self.span)]
+                ends = [self._beside(point, k, -step)]
             if len(ends) < 2:
                 ends.append((point.z[k], point.e))
             (z_1, e_1), (z_2, e_2) = ends

@@ -165,10 +165,16 @@ def passed_over(selection: Selection, policy: Policy) -> list[tuple[float, LoopM
 
 
 def _with_lag(model: LoopModel, data: Data) -> list[tuple[float, LoopModel]]:
-    """A loop whose damping has the speed late, which its firmware is sure to do by a little."""
-    if "D" not in model.free or "lag_s" in model.free:
+    """A loop whose damping has the speed late, which its firmware is sure to do by a little; where nothing parts the
+    firmware's damping from the plant's, with their sum for the plant's.
+    """
+    if "lag_s" in model.free:
         return []
-    return [(1.0, best(lagging(model), data, DOUBT.lagged).model)]
+    if "D" in model.free:
+        return [(1.0, best(lagging(model), data, DOUBT.lagged).model)]
+    half = 0.5 * model["a_2"]
+    found = best(lagging(model.having(D=half, a_2=half)), data, DOUBT.lagged).model
+    return [(1.0, replace(found, values={**found.values, "a_2": found["a_2"] + found["D"]}))]
 
 
 def _beside_rivals(model: LoopModel, layout: Sequence[Free], rivals: Sequence[tuple[float, LoopModel]]) -> np.ndarray:

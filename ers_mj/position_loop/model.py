@@ -33,7 +33,7 @@ class Letter:
 
 LETTERS: Mapping[str, Letter] = {
     "K": Letter("1/s^2", lower=1e-3),
-    "D": Letter("1/s", positive=False, size=10.0),
+    "D": Letter("1/s", positive=False, size=10.0),  # its lower bound: LATEST
     "lag_s": Letter("s", lower=1e-4, upper=0.05),  # of the speed that D multiplies
     "I": Letter("1/s^3", lower=1e-6),
     "L": Letter("{y}/s^2", math.inf, lower=1e-6),
@@ -65,6 +65,7 @@ WIDER = {
 }  # a loop's motor may be light and bear all friction
 CONTACT = ("f_contact", "zeta")  # of a play: what no loop shows
 FASTEST, SEEN = 120.0, 1.0  # [Hz] of a contact that is told from a stiff one, and that as a share of the log's rate
+LATEST = 0.003  # [s] by which a firmware's drive may follow the error; late by h it acts as the damping -K h
 SIDES = ("load", "link", "motor")  # where loop and log sit: both on the load; loop on the motor; both on the motor
 
 
@@ -134,7 +135,7 @@ class LoopModel:
     def layout(self) -> list[Free]:
         """Every fitted number."""
         every = [(name, LETTERS[name]) for name in self.free]
-        letters = [Free("", name, 0, x.positive, x.size, x.lower, x.upper) for name, x in every]
+        letters = [Free("", name, 0, x.positive, x.size, self._lower(name), x.upper) for name, x in every]
         effects = [
             self._of_effect(name, p, k, values[k])
             for name, values in self.effects
@@ -142,6 +143,11 @@ class LoopModel:
             if np.isfinite(values[k]) and p.fitted and not (BY_NAME[name].is_play and p.name in CONTACT)
         ]
         return letters + effects
+
+    def _lower(self, name: str) -> float:
+        """A letter's lower bound; a speed that is late is one that damps."""
+        late = name == "D" and "lag_s" not in self.free
+        return -LATEST * self["K"] if late else LETTERS[name].lower
 
     def _of_effect(self, name: str, p: Parameter, k: int, value: float) -> Free:
         size = max(abs(value), 1e-3)

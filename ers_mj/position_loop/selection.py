@@ -93,7 +93,7 @@ class Selector:
         progress("fitting the loop", 0.05)
         base = self.base()
         current, rounds = self._levelled(base)
-        while len(rounds) < EFFORT.rounds and self._may_gain(current := self.begun_again(current)):
+        while len(rounds) < EFFORT.rounds and self._may_gain(current := self.aligned(self.begun_again(current))):
             progress(f"round {len(rounds) + 1}: comparing effects", 0.1 + 0.1 * len(rounds))
             ranked = self.compared(current)
             rounds.append(tuple(ranked))

@@ -28,7 +28,7 @@ def turn_one(c, x):
 
 def carry(c, x, v, w_m):
     """The torque that the gear carries: the motor's, and what the load holds against it, by the other's inertia."""
-    motor = limited(x.fresh * limited(v, c.L) + x.late - c.a_emf * w_m, c.most)
+    motor = limited(x.fresh * limited(v, passed(c)) + x.late - c.a_emf * w_m, c.most)
     x.carried = (1.0 - c.share) * motor - c.share * (x.push + x.wall)
 
 
@@ -45,10 +45,10 @@ def settle_one(c, x):
         w = turn_one(c, x)
     if c.looped > 0.0:
         v = asked_of(c, x, x.w, w)
-        if abs(v) > c.L:
+        if abs(v) > passed(c):
             ask(c, x, v)
             w = turn_one(c, x)
-        current = x.fresh * limited(v, c.L) + x.late - 0.5 * c.a_emf * (x.w + w)
+        current = x.fresh * limited(v, passed(c)) + x.late - 0.5 * c.a_emf * (x.w + w)
         if abs(current) > c.most:
             x.force = limited(current, c.most)
             x.brake = 0.0
@@ -129,7 +129,7 @@ def settle_two(c, x):
         if c.looped > 0.0 and c.at_motor > 0.0:
             bridge(c, x, x.w_m, w_m)
             v = asked_of(c, x, x.w_m, w_m)
-            if abs(v) > c.L:
+            if abs(v) > passed(c):
                 ask(c, x, v)
                 w_m = turn_motor(c, x, w, level_m)
         k += 1

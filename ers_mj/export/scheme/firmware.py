@@ -50,9 +50,14 @@ def own_damping(c):
     return 0.0 if c.lag > 0.0 else c.D
 
 
+def passed(c):
+    """The largest drive that the bridge passes."""
+    return c.L - c.idle
+
+
 def ask(c, x, v):
     """The motor's force where the firmware asks for v beyond its limit."""
-    x.force = x.fresh * limited(v, c.L) + x.late
+    x.force = x.fresh * limited(v, passed(c)) + x.late
     x.brake = c.a_emf
 
 
@@ -68,7 +73,7 @@ def bridge(c, x, w_before, w):
 
 def integrate(c, x, v):
     """Bring the loop's integral on, and keep the drive."""
-    if c.I > 0.0 and (abs(v) < c.L or v * x.e < 0.0):
+    if c.I > 0.0 and (abs(v) < passed(c) or v * x.e < 0.0):
         x.xi = limited(x.xi + c.h * c.I * x.e, c.L)
-    x.drive = limited(v, c.L)
+    x.drive = limited(v, passed(c))
     keep(x.drives, c.drives_kept, x.count, x.drive)

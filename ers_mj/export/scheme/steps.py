@@ -74,7 +74,7 @@ def begin(c, x, command):
         v = c.K * (command - x.theta)
         if c.I > 0.0:
             x.xi = limited(held, c.L) - v
-        x.drive = limited(v + x.xi, c.L)
+        x.drive = limited(v + x.xi, passed(c))
     k = 0
     while k < c.drives_kept:
         x.drives[k] = x.drive
