@@ -152,9 +152,9 @@ class Selector:
         if "L" in first.values:
             values = {**first.values, "K": 1.5 * first.values["K"], "L": 1.3 * first.values["L"]}
             starts.append(self.closed.begun(Rough(values, first.left)))
-        found = self._whole(best(starts, self.screen, EFFORT.full, EFFORT.several))
-        found = self._firmware(found)
-        within = self._whole(best(delayed_within(found.model), self.screen, EFFORT.full))
+        bare = self._whole(best(starts, self.screen, EFFORT.full, EFFORT.several))
+        found = self._firmware(bare)
+        within = self._firmware(self._whole(best(delayed_within(bare.model), self.screen, EFFORT.full)))
         return self.unburdened(within if gain(found, within) > self.policy.loop_place else found)
 
     def _firmware(self, fit: Fit) -> Fit:
