@@ -64,6 +64,20 @@ def test_the_offset_of_a_log_shows_once_the_limit_of_its_reference_is_known():
     assert selector.runs[2].y[0] == pytest.approx(given[2].y[0], abs=1e-3)
 
 
+def test_two_bodies_are_begun_without_what_one_had_late_within_its_loop():
+    """Which stands for the second one."""
+    runs = runs_of(recorded(LIMITED, seeds=(1,)))
+    closed = ClosedForms(runs, True)
+    one = closed.begun(Rough({"K": 900.0, "tau_s": 0.01, "a_2": 20.0, "c_2": 8.0, "L": 150.0}, 0.0))
+    late = one.lacking("tau_s").having(dead_time_s=0.03, lag_s=0.005)
+    shaft = next(term for term in terms(late, runs, 0.01) if term.name == ShaftCompliance.name)
+    starts = closed.beside(shaft, late).starts
+    assert {start["dead_time_s"] for start in starts} == {0.0, 0.03} and {start["lag_s"] for start in starts} == {
+        0.0,
+        0.005,
+    }
+
+
 def test_an_effect_goes_with_the_letters_that_only_it_tells():
     play, shaft = np.array([0.02, 0.5, 0.3, 60.0, 0.5]), np.array([8.0, 0.1, 0.6, 0.3, np.inf])
     effects = ((Backlash.name, play), (GravityImbalance.name, np.array([20.0, 0.0])))

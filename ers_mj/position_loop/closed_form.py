@@ -32,6 +32,7 @@ class Begun:
 
 
 BEGUN = Begun()
+LATE = ("dead_time_s", "lag_s")
 RESET = {"D": 0.0, "lag_s": SIZES.lags[0]}  # what no regression has
 
 
@@ -110,13 +111,15 @@ class ClosedForms:
         return found
 
     def _parted(self, term: Term, model: LoopModel) -> list[LoopModel]:
-        """Two bodies from what a regression of one has: a fit of one bends its numbers to stand for the second."""
+        """Two bodies from what a regression of one has: a fit of one bends its numbers to stand for the second, and has
+        what is late in the loop where the second one is.
+        """
         loads, found = self.loads if GRAVITY in model.names else ("hold",), []
         for rough in (rough for width in SCAN.widths for rough in self.rough(loads, width, model["R"], False)):
             if ("L" in rough.values) == ("L" in model.free):
                 one = self.begun(rough)
                 for start in term.starts:
-                    more = {x: start[x] for x in start.free if x not in one.free}
+                    more = {x: start[x] for x in start.free if x not in (*one.free, *LATE)}
                     more["c_2"] = one["c_2"] * start["c_2"] / max(model["c_2"], 1e-9)
                     two = one.having(**more).lacking(*(x for x in ("hold", "rotor") if x not in start.free))
                     found.append(replace(start, values=two.values, free=two.free, scales=two.scales))
