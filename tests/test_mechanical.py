@@ -91,6 +91,18 @@ def test_start_load_and_open_circuit_are_those_of_the_reduced_model():
         assert rms_deg(plant.simulate(T, u, start, **extra).theta - truth) < 0.02
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+@pytest.mark.parametrize("values", [{}, {"tau_e": 2e-3}])
+def test_what_mujoco_steps_by_itself_is_what_it_steps_under_a_load_of_nothing(gap, values):
+    """A load is handed over at every sample; without one MuJoCo goes on from one correction to the next."""
+    plant, u = MechanicalPlant(lumped(SHEET.to_lumped() | values), gap=gap, timestep=5e-4), INPUTS["multisine"](T)
+    seen = {"y": np.where(T < 0.5, 0.3, np.nan), "gain": 0.1, "every": 8}
+    for observed in ({}, seen):
+        alone, under = plant.simulate(T, u, **observed), plant.simulate(T, u, load=np.zeros(T.size), **observed)
+        for rows in ("theta", "omega", "theta_m", "drive"):
+            assert np.allclose(getattr(alone, rows), getattr(under, rows), rtol=1e-9, atol=1e-9)
+
+
 def test_samples_need_not_be_uniform():
     t = T + 3e-4 * np.sin(50 * T)
     u = INPUTS["steps"](T)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import mujoco
 import mujoco.batch
 import numpy as np
+from mujoco.rollout import Rollout
 
 from ers_mj.effects.base import LEAST_IRON
 from ers_mj.effects.quantities import Coefficients
@@ -19,6 +20,9 @@ MOTOR_GROUP = 1  # actuator group that an open circuit disables
 TIME_CONSTANT = 0  # where MuJoCo keeps a motor's electrical time constant in its actuator's dynprm
 # steps over which a law keeps its value; one beside a bristle, whose level is stiff, and where the inductance falls
 LAW_STEPS = 4
+FARTHEST = 1e12  # of an output that has run away
+LOST = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dynprm
 
 Late = Callable[[np.ndarray], np.ndarray]  # mean input between given instants [s] (k + 1,) -> (k,)
@@ -113,15 +117,17 @@ class Stepper:
         """Rows (N, 5) at the sample times t (N,): theta, omega, theta_m, motor speed / n, drive acceleration; under u
         (N,), or what of it ``late`` gives.
         """
+        if late is None and load is None and self._goes_alone(t, enable):
+            rows = self._rolled(t, u, observer)
+            if rows is not None:
+                return rows
         model, data, rows = self.model, self.data, np.full((t.size, 5), np.nan)
         data.time = t[0]
         for k in range(t.size):
             rows[k] = self._observe()
-            if k == t.size - 1 or not abs(rows[k, 0]) < 1e12:
+            if k == t.size - 1 or not abs(rows[k, 0]) < FARTHEST:
                 break
-            if observer is not None and k % observer.every == 0 and np.isfinite(observer.y[k]):
-                for name, change in observer.moved(rows[k, 0], observer.gain * (observer.y[k] - rows[k, 0])).items():
-                    data.qpos[self._address(name)] += change
+            self._correct(observer, k, rows[k, 0])
             h, steps = self._divide(t[k + 1] - t[k])
             model.opt.timestep = h
             self._connect(enable is None or bool(enable[k]))
@@ -129,6 +135,56 @@ class Stepper:
             inputs = [(u[k], steps)] if late is None else [(v, 1) for v in late(t[k] + h * np.arange(steps + 1))]
             for v, count in inputs:
                 self._advance(v, known, count)
+        return rows
+
+    def _correct(self, observer: Observer | None, k: int, theta: float) -> None:
+        """Move the output towards what was measured, where the observer does at this sample."""
+        if observer is not None and k % observer.every == 0 and np.isfinite(observer.y[k]):
+            for name, change in observer.moved(theta, observer.gain * (observer.y[k] - theta)).items():
+                self.data.qpos[self._address(name)] += change
+
+    def _goes_alone(self, t: np.ndarray, enable) -> bool:
+        """Whether MuJoCo needs nobody between the samples: it carries the plant whole, and all samples are as long."""
+        if self.laws or self.falls or t.size < 2 or not (enable is None or np.all(enable)):
+            return False
+        return bool(np.ptp(np.diff(t)) < 1e-9 * (t[1] - t[0]))
+
+    def _rolled(self, t: np.ndarray, u: np.ndarray, observer: Observer | None) -> np.ndarray | None:
+        """As ``run`` of a plant that goes alone: MuJoCo steps by itself from one correction to the next. None, and the
+        state as before, where it runs away: MuJoCo then repeats itself without saying since when.
+        """
+        model, data = self.model, self.data
+        model.opt.timestep, steps = self._divide(t[1] - t[0])
+        self._connect(True)
+        data.time = t[0]
+        every, size = t.size if observer is None else observer.every, model.nq + model.nv + model.na
+        states, control = np.empty((t.size, size)), np.zeros((1, (t.size - 1) * steps, model.nu))
+        control[0, :, self.motor] = np.repeat(u[:-1], steps)
+        states[0] = np.concatenate([data.qpos, data.qvel, data.act])
+        begun = np.empty((1, mujoco.mj_stateSize(model, FULL)))
+        mujoco.mj_getState(model, data, first := np.empty(begun.size), FULL)
+        with Rollout(nthread=0) as pool:
+            for k in range(0, t.size - 1, every):
+                self._correct(observer, k, self._observe()[0])
+                mujoco.mj_getState(model, data, begun[0], FULL)
+                span = control[:, k * steps : (k + every) * steps]
+                after, warm = np.empty((1, span.shape[1], begun.size)), data.qacc_warmstart[None].copy()
+                pool.rollout(
+                    [model],
+                    [data],
+                    begun,
+                    span,
+                    skip_checks=True,
+                    nstep=span.shape[1],
+                    initial_warmstart=warm,
+                    state=after,
+                )
+                states[k + 1 : k + 1 + every] = after[0, steps - 1 :: steps, 1 : 1 + size]
+        rows = _rows(self, states, u)
+        if any(data.warning[bad].number for bad in LOST) or not np.all(np.abs(rows[:, 0]) < FARTHEST):
+            mujoco.mj_resetData(model, data)
+            mujoco.mj_setState(model, data, first, FULL)
+            return None
         return rows
 
     def hold(self, inputs: Sequence[tuple[float, int]], sample: float) -> None:
