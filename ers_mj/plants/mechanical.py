@@ -249,8 +249,14 @@ class MechanicalPlant:
 
     def _moved(self, theta: float, by: float) -> dict[str, float]:
         """{joint: change of its position} where the output moves from theta by so much."""
-        before, after = self._start((theta, 0.0)), self._start((theta + by, 0.0))
-        return {name: q - before[name][0] for name, (q, _) in after.items() if q != before[name][0]}
+        before, after = self._positions(theta), self._positions(theta + by)
+        return {name: q - before[name] for name, q in after.items() if q != before[name]}
+
+    def _positions(self, theta: float) -> dict[str, float]:
+        """{joint: position} at theta."""
+        home, pose = self._lowered.theta_0, self._skeleton.pose(theta)
+        levers = {"lever_up": max(theta, home), "lever_down": min(theta, home)}
+        return {name: q for name, (q, _) in pose.items()} | levers
 
     def _motion(self, t: np.ndarray, rows: np.ndarray) -> Motion:
         """Rows (N, 5) of theta, omega, theta_m, motor speed over n, drive -> Motion."""
