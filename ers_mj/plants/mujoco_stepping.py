@@ -15,12 +15,12 @@ from mujoco.rollout import Rollout
 from ers_mj.effects.base import LEAST_IRON
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants.mjcf import unlogged
+from ers_mj.plants.state import RUNAWAY
 
 MOTOR_GROUP = 1  # actuator group that an open circuit disables
 TIME_CONSTANT = 0  # where MuJoCo keeps a motor's electrical time constant in its actuator's dynprm
 # steps over which a law keeps its value; one beside a bristle, whose level is stiff, and where the inductance falls
 LAW_STEPS = 4
-FARTHEST = 1e12  # of an output that has run away
 LOST = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 LUGRE_DAMPING = 6  # where MuJoCo keeps a bristle's sigma_1 in an actuator's dynprm
@@ -125,7 +125,7 @@ class Stepper:
         data.time = t[0]
         for k in range(t.size):
             rows[k] = self._observe()
-            if k == t.size - 1 or not abs(rows[k, 0]) < FARTHEST:
+            if k == t.size - 1 or not abs(rows[k, 0]) < RUNAWAY:
                 break
             self._correct(observer, k, rows[k, 0])
             h, steps = self._divide(t[k + 1] - t[k])
@@ -181,7 +181,7 @@ class Stepper:
                 )
                 states[k + 1 : k + 1 + every] = after[0, steps - 1 :: steps, 1 : 1 + size]
         rows = _rows(self, states, u)
-        if any(data.warning[bad].number for bad in LOST) or not np.all(np.abs(rows[:, 0]) < FARTHEST):
+        if any(data.warning[bad].number for bad in LOST) or not np.all(np.abs(rows[:, 0]) < RUNAWAY):
             mujoco.mj_resetData(model, data)
             mujoco.mj_setState(model, data, first, FULL)
             return None

@@ -32,7 +32,6 @@ class Begun:
 
 
 BEGUN = Begun()
-LATE = ("dead_time_s", "lag_s")
 RESET = {"D": 0.0, "lag_s": SIZES.lags[0]}  # what no regression has
 
 
@@ -119,7 +118,7 @@ class ClosedForms:
             if ("L" in rough.values) == ("L" in model.free):
                 one = self.begun(rough)
                 for start in term.starts:
-                    more = {x: start[x] for x in start.free if x not in (*one.free, *LATE)}
+                    more = {x: start[x] for x in start.free if x not in (*one.free, "dead_time_s", "lag_s")}
                     more["c_2"] = one["c_2"] * start["c_2"] / max(model["c_2"], 1e-9)
                     two = one.having(**more).lacking(*(x for x in ("hold", "rotor") if x not in start.free))
                     found.append(replace(start, values=two.values, free=two.free, scales=two.scales))

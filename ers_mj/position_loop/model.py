@@ -20,7 +20,8 @@ from ers_mj.servo.simulation import PER_INERTIA
 @dataclass(frozen=True)
 class Letter:
     """A number of the loop or of the plant behind it: its unit ({y}: the output's), what it is where it is absent,
-    whether it is fitted in its logarithm, its bounds, and the size in which a signed one is fitted.
+    whether it is fitted in its logarithm, its bounds, and the size in which a signed one is fitted; by how much [s] a
+    drive may be ``late``, which acts as the damping -K late.
     """
 
     unit: str
@@ -29,11 +30,12 @@ class Letter:
     lower: float = 0.0
     upper: float = math.inf
     size: float = 1.0
+    late: float = 0.0
 
 
 LETTERS: Mapping[str, Letter] = {
     "K": Letter("1/s^2", lower=1e-3),
-    "D": Letter("1/s", positive=False, size=10.0),  # its lower bound: LATEST
+    "D": Letter("1/s", positive=False, size=10.0, late=0.003),
     "lag_s": Letter("s", lower=1e-4, upper=0.05),  # of the speed that D multiplies
     "I": Letter("1/s^3", lower=1e-6),
     "L": Letter("{y}/s^2", math.inf, lower=1e-6),
@@ -65,7 +67,6 @@ WIDER = {
 }  # a loop's motor may be light and bear all friction
 CONTACT = ("f_contact", "zeta")  # of a play: what no loop shows
 FASTEST, SEEN = 120.0, 1.0  # [Hz] of a contact that is told from a stiff one, and that as a share of the log's rate
-LATEST = 0.003  # [s] by which a firmware's drive may follow the error; late by h it acts as the damping -K h
 SIDES = ("load", "link", "motor")  # where loop and log sit: both on the load; loop on the motor; both on the motor
 
 
@@ -146,8 +147,8 @@ class LoopModel:
 
     def _lower(self, name: str) -> float:
         """A letter's lower bound; a speed that is late is one that damps."""
-        late = name == "D" and "lag_s" not in self.free
-        return -LATEST * self["K"] if late else LETTERS[name].lower
+        letter = LETTERS[name]
+        return letter.lower if "lag_s" in self.free else letter.lower - letter.late * self["K"]
 
     def _of_effect(self, name: str, p: Parameter, k: int, value: float) -> Free:
         size = max(abs(value), 1e-3)
