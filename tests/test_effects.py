@@ -288,3 +288,10 @@ def test_an_effect_is_narrower_without_what_may_be_absent():
     assert not load.narrower(load.narrower(load.narrower(wide)[0])[0])  # the share itself stays
     assert [p[:2].tolist() for p in stop.narrower(np.array([-1.0, 1.0, 40.0, 0.3]))] == [[-none, 1.0], [-1.0, none]]
     assert not site.narrower(np.array([1.0, 2.0, 3.0, none, none]))  # a place or a period it needs
+
+
+def test_a_reading_that_no_output_explains_is_no_number_and_no_warning():
+    behind = BY_NAME["sensor_nonlinearity"].behind(
+        np.array([0.0, -1e3, np.inf, np.inf, np.inf]), np.linspace(-1.0, 1.0, 5)
+    )
+    assert behind[2] == 0.0 and not np.isfinite(behind[[0, 4]]).any()

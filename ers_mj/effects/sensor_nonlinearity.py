@@ -55,11 +55,12 @@ class SensorNonlinearity(Sensor):
 
     def behind(self, p, y):
         theta = y
-        for _ in range(6):
-            step = (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), 0.2)
-            theta = theta + step
-            if np.fmax.reduce(np.abs(step), initial=0.0) < 1e-7:  # its error is of the order of its square
-                break
+        with np.errstate(over="ignore", invalid="ignore"):  # of a sensor that no output explains
+            for _ in range(6):
+                step = (y - self.measure(p, None, theta)) / np.maximum(self._slope(p, theta), 0.2)
+                theta = theta + step
+                if np.fmax.reduce(np.abs(step), initial=0.0) < 1e-7:  # its error is of the order of its square
+                    break
         return theta
 
     def _slope(self, p, theta):
