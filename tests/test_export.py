@@ -120,6 +120,13 @@ def test_python_controls_system_is_the_module_alone(limited):
     np.testing.assert_allclose(np.sort(control.poles(made.linear())), np.sort(control.poles(model.to_control())))
 
 
+def test_a_late_drives_damping_is_written_in_general_terms():
+    _, servo = exported.of(exported.hobby({"D": -1.8}))
+    joint = OwnJoint(servo)
+    t, u = np.arange(0.0, 1.0, 5e-4), np.full(2000, 0.4)
+    assert "<general" in joint.xml and apart(joint.follow(t, u), response(servo, joint.carried, t, u)) < MOST
+
+
 @pytest.mark.parametrize("name", ["loop", "loop, late damping"])
 def test_a_loops_linear_system_follows_its_reference(name):
     _, servo = exported.of(exported.MODELS[name])

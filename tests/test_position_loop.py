@@ -339,3 +339,10 @@ def test_commands_take_a_model_with_a_loop_or_refuse_it(tmp_path, capsys):
     assert main(["excite", model, "--out", str(tmp_path / "a.csv")]) == 2
     assert "position loop" in capsys.readouterr().err
     assert main(["identify", out, "--method", "ga", "--out", str(tmp_path / "other")]) == 2
+
+
+def test_a_late_drives_damping_reaches_mujoco_as_it_is():
+    """Where gain and stiffness are the same, MuJoCo reads a positive velocity bias as a damping ratio."""
+    for D in (-1.8, 1.8):
+        motor = looped_plant(Datasheet(lumped={"a_2": 20.0}, loop={"K": 900.0, "D": D, "L": 150.0})).spec().compile()
+        assert motor.actuator("motor").biasprm[1:3] == pytest.approx([-900.0, -D])

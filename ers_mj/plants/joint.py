@@ -13,6 +13,7 @@ number of the model that it stands in.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
@@ -55,12 +56,26 @@ class JointLines:
             f'<!-- for <compiler angle="radian" autolimits="true"/> and <option timestep="{self.timestep!r}"'
             ' integrator="implicitfast"/> -->',
             f"<joint {_written(self.joint)}/>",
-            f"<actuator><{self.kind} {_written(self.actuator)}/></actuator>",
+            f"<actuator><{_element(self.kind, self.actuator)}/></actuator>",
         )
         return "\n".join([*lines, *([told] if told else [])])
 
     def __str__(self) -> str:
         return self.xml
+
+
+def _element(kind: str, actuator: Mapping[str, object]) -> str:
+    """An actuator as MJCF has it; a position's whose damping is negative in general terms, which its own refuse: MuJoCo
+    reads such a number as a damping ratio where gain and stiffness are the same to the bit.
+    """
+    kp, kv = actuator.get("kp", 0.0), actuator.get("kv", 0.0)
+    if isinstance(kp, float) and isinstance(kv, float) and kv < 0.0:
+        rest = {name: x for name, x in actuator.items() if name not in ("kp", "kv")}
+        kind, actuator = (
+            "general",
+            rest | {"gainprm": kp, "biastype": "affine", "biasprm": (0.0, -math.nextafter(kp, 0.0), -kv)},
+        )
+    return f"{kind} {_written(actuator)}"
 
 
 def _written(attributes: Mapping[str, object]) -> str:

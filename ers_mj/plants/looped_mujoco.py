@@ -75,7 +75,8 @@ class LoopedPlant:
         motor.gaintype, motor.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
         motor.gear[0] = 1.0
         motor.gainprm = [q.K, *[0.0] * 9]
-        motor.biasprm = [0.0, -q.K, -q.D, *[0.0] * 7]
+        held = q.K if q.D >= 0.0 else math.nextafter(q.K, 0.0)  # beside the same K, -D were a damping ratio
+        motor.biasprm = [0.0, -held, -q.D, *[0.0] * 7]
         if math.isfinite(q.L):
             motor.forcelimited, motor.forcerange = True, [-q.L, q.L]
         late = q.tau + q.dead_time
