@@ -261,9 +261,14 @@ def _squares(e: np.ndarray) -> float:
 
 
 def central(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, step: float) -> np.ndarray:
-    """Central differences (N, k) of a function of x (k,)."""
-    moves = step * np.eye(x.size)
-    return np.column_stack([(function(x + move) - function(x - move)) / (2.0 * step) for move in moves])
+    """Central differences (N, k) of a function of x (k,), its columns' numbers side by side."""
+    out = np.empty((0, x.size), order="F")
+    for k, move in enumerate(step * np.eye(x.size)):
+        column = (function(x + move) - function(x - move)) / (2.0 * step)
+        if not k:  # one array, filled column by column: an hour's are 30 MB each
+            out = np.empty((column.size, x.size), order="F")
+        out[:, k] = column
+    return out
 
 
 def structure_at(unknowns: Unknowns, traces: Sequence[Trace], letters: np.ndarray, scale: float) -> Structure:
@@ -273,10 +278,12 @@ def structure_at(unknowns: Unknowns, traces: Sequence[Trace], letters: np.ndarra
     def moved(z):
         return residuals(unknowns.model(np.where(angle, letters + scale * z, letters * np.exp(z))), traces, 0.0)
 
-    slopes, coarser = (
-        np.nan_to_num(central(moved, np.zeros(len(letters)), step)) for step in (STEP, NEAR.coarser * STEP)
-    )
-    size = np.abs(slopes).max(axis=0) + 1e-300
-    smooth = np.max(np.abs(slopes - coarser) / size, axis=1) < NEAR.forks  # elsewhere stick and slip fork at a touch
-    smooth = smooth if smooth.mean() > NEAR.fewest else np.ones_like(smooth)
-    return structure_of(slopes[smooth], unknowns.names, slopes[smooth] - coarser[smooth])
+    slopes, off = (central(moved, np.zeros(len(letters)), step) for step in (STEP, NEAR.coarser * STEP))
+    smooth = np.ones(len(slopes), bool)
+    for column, doubt in zip(slopes.T, off.T, strict=True):
+        np.nan_to_num(column, copy=False)
+        np.subtract(column, np.nan_to_num(doubt, copy=False), out=doubt)
+        size = np.abs(column).max() + 1e-300
+        smooth &= np.abs(doubt) / size < NEAR.forks  # elsewhere stick and slip fork at a touch
+    some = smooth if smooth.mean() > NEAR.fewest else None
+    return structure_of(slopes, unknowns.names, off, some)

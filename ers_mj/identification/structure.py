@@ -96,21 +96,42 @@ def _power(name: str, exponent: float) -> str:
     return name if exponent == 1 else f"{name}^{exponent:g}"
 
 
-def structure_of(slopes: np.ndarray, names: Sequence[str], doubt: np.ndarray | None = None) -> Structure:
+def structure_of(
+    slopes: np.ndarray, names: Sequence[str], doubt: np.ndarray | None = None, some: np.ndarray | None = None
+) -> Structure:
     """From sensitivities (N, k), by the logarithms of the letters, and what they are off by: a direction in which they
     say no more than that does nothing.
+
+    Args:
+        doubt: what they are off by (N, k).
+        some: the rows (N,) that are looked at, all of them where it is None.
     """
-    size = np.linalg.norm(slopes, axis=0)
+    told = _triangle(slopes, some)
+    size = np.linalg.norm(told, axis=0)
     scale = np.maximum(size, 1e-8 * size.max() + 1e-300)
-    _, singular, turn = np.linalg.svd(slopes / scale, full_matrices=len(slopes) < len(names))
-    singular = np.concatenate([singular, np.zeros(len(names) - singular.size)])
-    unsure = np.linalg.norm(doubt / scale @ turn.T, axis=0) if doubt is not None else np.zeros(len(names))
+    _, singular, turn = np.linalg.svd(told / scale)
+    unsure = np.zeros(len(names))
+    if doubt is not None:
+        unsure = np.linalg.norm(_triangle(doubt, some) / scale @ turn.T, axis=0)
     # a direction does nothing whose singular value is that small, or no more than three times what it is off by
     null = turn[singular <= np.maximum(1e-6 * singular[0], 3.0 * unsure)] / scale
     null, pivots = _reduced(null / np.maximum(np.abs(null).max(axis=1, keepdims=True), 1e-300), names)
     for array in (null, singular):
         array.setflags(write=False)
     return Structure(tuple(names), null, pivots, singular)
+
+
+def _triangle(rows: np.ndarray, some: np.ndarray | None, at_once: int = 100_000) -> np.ndarray:
+    """R (k, k) with R'R = A'A for some of the rows A (N, k), which has their singular values and directions; block by
+    block, so that an hour's rows are not copied (QR of tall matrices, Demmel et al. 2012).
+    """
+    k = rows.shape[1]
+    found = np.zeros((k, k))
+    for begin in range(0, len(rows), at_once):
+        part = rows[begin : begin + at_once]
+        part = part if some is None else part[some[begin : begin + at_once]]
+        found = np.linalg.qr(np.vstack([found, part])).R
+    return found
 
 
 def _reduced(null: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, tuple[int, ...]]:
