@@ -151,6 +151,16 @@ def test_what_is_concealed_in_a_record():
     assert np.allclose(biased["u_V"], record["u_V"] - 0.3) and not moved.any()
 
 
+def test_what_acts_ahead_of_a_converter_is_read_by_it_again():
+    t, step = np.arange(2000) * 0.01, 0.003
+    record = {"t_s": t, "u_V": np.sin(t), "theta_rad": 0.1 + step * np.round(np.sin(t) / step)}
+    lagged, _ = real.conceal(np.random.default_rng(0), record, "sensor_lag", 0.05, "u_V", "theta_rad")
+    codes = (lagged["theta_rad"] - record["theta_rad"][0]) / step
+    assert np.allclose(codes, np.round(codes)) and np.allclose(
+        lagged["theta_rad"][100:], 0.1 + np.sin(t[100:] - 0.05), atol=1.1 * step
+    )
+
+
 def test_every_rig_is_diagnosed_as_it_is_first():
     plans = real.plans(len(real.COVERAGE), 1)
     assert [(p.rig, p.label) for p in plans[:3]] == [(rig, None) for rig in real.RIGS] and {

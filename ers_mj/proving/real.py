@@ -5,8 +5,10 @@ What is done to the untouched records of a rig, by a sealed seed: the command ac
 the reading lags (sensor_lag), is rounded down (sensor_quantisation) or held for a while (sensor_dropout), or a constant
 part of the command goes unrecorded, which is a constant torque (bias_torque). A play, a friction that grows with the
 load and a limit of the input cannot be put into a record: they move it by the difference that they make in the rig's
-own best model, which is half simulated and is counted apart. Each rig is also diagnosed as it is: what is named there
-is its own, and how much more than its own error a record leaves that was touched is its visibility.
+own best model, which is half simulated and is counted apart. What acts ahead of the rig's converter is read by that
+again: values that repeat to the last digit where it rests, and nowhere else, would be a fault of the sensor. Each rig
+is also diagnosed as it is: what is named there is its own, and how much more than its own error a record leaves that
+was touched is its visibility.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
 
+from ers_mj.data.sensor_faults import converter_step
 from ers_mj.errors import InputError
 from ers_mj.proving.concealed.base import between, spells
 from ers_mj.proving.scoring import class_of, scored
@@ -150,7 +153,7 @@ def _touched(
     u, y = RIGS[plan.rig]
     if plan.label in HALF_SIMULATED:
         strength, moved = _half_simulated(rng, plan.label, records, own, u, y)
-        touched = [record | {y: record[y] + by} for record, by in zip(records, moved, strict=True)]
+        touched = [record | {y: read(record[y], record[y] + by)} for record, by in zip(records, moved, strict=True)]
         return touched, moved, {"strength": strength, "shape": {"form": "the rig's own model's"}}
     strength, touched, moved = draw(rng, plan, records, u, y), [], []
     for record in records:
@@ -243,7 +246,7 @@ def conceal(
         }
         return out, theta[late:] - theta[:-late]
     if label == "sensor_lag":
-        out[y] = lagged(t, theta, s)
+        out[y] = read(theta, lagged(t, theta, s))
     elif label == "sensor_quantisation":
         out[y] = np.floor(theta / s) * s
     elif label == "sensor_dropout":
@@ -253,6 +256,15 @@ def conceal(
     elif label == "bias_torque":
         out[u] = out[u] - s
     return out, out[y] - theta
+
+
+def read(theta: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """What the converter that read theta (N,) makes of another motion (N,)."""
+    step = converter_step(theta)
+    if not step:
+        return moved
+    first = theta[np.isfinite(theta)][0]
+    return first + step * np.round((moved - first) / step)
 
 
 def lagged(t: np.ndarray, theta: np.ndarray, tau: float) -> np.ndarray:
