@@ -36,3 +36,14 @@ def test_a_play_moves_the_model_by_no_more_than_its_width(own, records):
     moved = own.moved("backlash", {"gap": 0.01})
     assert [len(m) for m in moved] == [t.size for t, _, _ in records.values()]
     assert 2e-3 < np.max(np.abs(np.concatenate(moved))) < 0.1
+
+
+def test_touched_or_not_the_measure_is_one(monkeypatch):
+    class Answer:
+        def __init__(self, differ):
+            errors = {"heldout_rmse_after_rad": 0.4, "recalibrated_rmse_after_rad": 0.1}
+            self.document = {"missing": [], "record_state": differ, "fit": errors}
+
+    own = OwnAnswer({})
+    monkeypatch.setattr(own, "_diagnosed", lambda recordings, among: Answer(["gain"] if among is None else []))
+    assert own.error == 0.1 and own.visibility({}) == 0.0

@@ -60,14 +60,21 @@ class OwnAnswer:
     @property
     def error(self) -> float:
         """The held-out error that it leaves [output unit], see ``_left``."""
-        return _left(self._found)
+        return self._left(self._found)
 
     def visibility(self, touched: Mapping[str, str]) -> float:
         """What records that were ``touched`` leave beyond the rig's own, once its names alone are fitted to them, over
         what it leaves as it is: sqrt(e^2 - e_0^2) / e_0 of the held-out errors e, 0 where they leave no more.
         """
-        left = _left(self._diagnosed(recordings_of(touched), self.names))
+        left = self._left(self._diagnosed(recordings_of(touched), self.names))
         return math.sqrt(max(left**2 - self.error**2, 0.0)) / self.error
+
+    def _left(self, found: Found) -> float:
+        """The held-out error [output unit] of an answer by the measure that decides; recalibrated, as it is and
+        touched, where the records as they are differ by more than chance, which says nothing of what was put into them.
+        """
+        differ = self._found.document["record_state"]
+        return float(found.document["fit"]["recalibrated_rmse_after_rad" if differ else "heldout_rmse_after_rad"])
 
     def moved(self, effect: str, values: Mapping[str, float]) -> list[np.ndarray]:
         """By how much an effect moves the output of the model (N,) [output unit] under the input of each record."""
@@ -75,14 +82,6 @@ class OwnAnswer:
         sheet = replace(sheet, effects=(*sheet.effects, (effect, dict(values))))
         with_it = Model(sheet, inductance=self.model.inductance)
         return [self.model.residual(record) - with_it.residual(record) for record in self.records]
-
-
-def _left(found: Found) -> float:
-    """The held-out error [output unit] by the measure that decides; recalibrated where the records differ by more than
-    chance, which says nothing of what was put into them.
-    """
-    fit = found.document["fit"]
-    return float(fit["recalibrated_rmse_after_rad" if found.document["record_state"] else "heldout_rmse_after_rad"])
 
 
 def recordings_of(records: Mapping[str, str]) -> list[Recording]:
