@@ -10,6 +10,7 @@ from servo import NAMES, NOISE, SPARSE, having, recorded, started, trace
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.baseline import Start
 from ers_mj.estimation.fit import fit
+from ers_mj.estimation.scales import free_in
 from ers_mj.selection.confirmation import confirmed, delta_bic, is_a_converters, is_any_wave, may_be_none
 from ers_mj.selection.cross_validation import Score, folds, halves, scored
 from ers_mj.selection.stepwise import Selection
@@ -64,6 +65,18 @@ def test_what_a_refit_alone_buys_is_not_counted_for_an_effect(plain):
     assert not selection.chosen.model.names  # all of what it seemed to explain was the refit's
     left = [scored(fit.model, plain.traces[0]).rmse for fit in (told.base, poor.fit)]
     assert left[0] < 0.5 * left[1]
+
+
+def test_what_holds_the_output_is_judged_against_the_spring_whose_place_it_took(plain):
+    """Gravity in the place of a preloaded spring, beside gains that differ: taken out, it leaves the spring."""
+    spring = plain.fit.model
+    values = {**spring.values, "a_1": 0.0, "c_1": 0.0}
+    bare = replace(plain.fit, model=replace(spring, values=values, free=free_in(values, plain.traces)))
+    hung = having(bare, "gravity_imbalance", [spring.values["a_1"], 0.0])
+    hung = fit(hung.model.with_state("gain", len(plain.traces)), plain.traces)
+    selection, _ = confirmed(plain, Selection(plain.fit, hung, (), 1.0, plain.traces), [], 1)
+    assert "gravity_imbalance" not in selection.chosen.model.names
+    assert selection.chosen.model.values["a_1"] == pytest.approx(spring.values["a_1"], rel=0.1)
 
 
 def test_folds_and_halves_leave_out_what_is_judged(plain):

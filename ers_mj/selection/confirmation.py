@@ -141,9 +141,16 @@ class Court:
         return refits(model, self.parts, self.tau, self.jobs)
 
     def without(self, name: str, model: Model) -> Fit:
-        """The model without an effect, refitted to all training recordings."""
-        traces = self.start.traces
-        return polished(fit(model.without_effect(name), traces, tau=self.tau, steps=STEPS), traces)
+        """The model without an effect, refitted to all training recordings; of what holds the output in a spring's
+        place, the better of none and the spring.
+        """
+        traces, less = self.start.traces, model.without_effect(name)
+        starts = [less]
+        if BY_NAME[name].holds_place:
+            spring = self.start.fit.model
+            starts.append(replace(less, values=spring.values, free=spring.free))
+        found = (polished(fit(start, traces, tau=self.tau, steps=STEPS), traces) for start in starts)
+        return min(found, key=lambda one: one.cost)
 
     def judged(self, name: str, model: Model, after: list[Score]) -> Judged:
         """What held-out data says of one effect; where neither it nor the free runs confirm the effect, by halves of
