@@ -8,6 +8,7 @@ from command_files import T, lay_out
 
 from ers_mj import cli
 from ers_mj.data.recording import read_recording
+from ers_mj.door.simulating import simulate
 from ers_mj.servo.datasheet import read_datasheet
 
 
@@ -107,3 +108,37 @@ def test_a_model_simulates_with_its_own_effects(place):
 
 def read_text_of_table1() -> str:
     return "[parameters]\n" + "".join(f"{key} = {x!r}\n" for key, x in read_datasheet("table1").parameters.items())
+
+
+@pytest.mark.parametrize(
+    ("input_unit", "output_unit", "columns"),
+    [("N m", "rad", "tau_cmd_Nm,theta_rad"), ("%", "V", "u_duty_pct,y_sensor_V"), ("V", "m", "u_V,x_m")],
+)
+def test_a_recording_has_the_units_of_its_model(tmp_path, capsys, input_unit, output_unit, columns):
+    model, signal, out = tmp_path / "model.toml", tmp_path / "in.csv", tmp_path / "out.csv"
+    model.write_text(
+        "[lumped]\na_2 = 5.0\nb = 2.0\nc_2 = 0.1\n"
+        f'[recording]\noutput_unit = "{output_unit}"\ninput_unit = "{input_unit}"\n'
+    )
+    signal.write_text(f"t_s,{columns.split(',')[0]}\n" + "".join(f"{0.01 * k},1.0\n" for k in range(200)))
+    assert cli.main(["simulate", str(model), "--input", str(signal), "--out", str(out)]) == 0
+    assert out.read_text().splitlines()[0] == f"t_s,{columns}"
+    assert ("deg" if output_unit == "rad" else f" {output_unit},") in capsys.readouterr().out
+    assert read_recording(out).output_unit == output_unit and read_recording(out).input_unit in (input_unit, "pct")
+    named = ["simulate", str(model), "--input", "steps", "--out", str(tmp_path / "named.csv")]
+    assert cli.main(named) == (0 if input_unit == "V" else 2)
+    turned = [*named, "--noise-deg", "1"]
+    assert output_unit == "rad" or cli.main(turned) == 2
+
+
+def test_friction_that_creeps_comes_back_from_a_file(tmp_path):
+    """Without the bristle that it has not."""
+    model = tmp_path / "model.toml"
+    model.write_text(
+        '[lumped]\na_2 = 5.0\nb = 2.0\nc_2 = 2.0\n[[effect]]\nname = "presliding"\n'
+        "[effect.parameters]\nv_c = 0.005\nT_c = 0.01\n"
+    )
+    t = 0.001 * np.arange(1000)
+    creeping = simulate(model, (t, np.full(t.size, 0.9)), plant="reduced").theta
+    held = simulate({"lumped": {"a_2": 5.0, "b": 2.0, "c_2": 2.0}}, (t, np.full(t.size, 0.9))).theta
+    assert held[-1] == 0.0 and 1e-3 < creeping[-1] < 0.01

@@ -309,7 +309,7 @@ def test_the_mujoco_twin_follows_the_reduced_servo(side):
         name="model",
     )
     t, r = steps_of(6, 2.0)
-    y = [simulate_loop(sheet, t, r, plant=plant)["theta_rad"] for plant in ("reduced", "mujoco")]
+    y = [simulate_loop(sheet, t, r, plant=plant) for plant in ("reduced", "mujoco")]
     assert np.sqrt(np.mean((y[0] - y[1]) ** 2)) < 0.002
 
 

@@ -8,6 +8,7 @@ import math
 from ers_mj.commands.keeping import keep_file, table_file
 from ers_mj.commands.options import add_model, number, whole
 from ers_mj.door.saving import as_json
+from ers_mj.errors import InputError
 
 PLANTS, LINKAGES, PLAYS = ("reduced", "mujoco"), ("constant", "rod"), ("gap", "printed")
 
@@ -27,7 +28,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add_model(parser, "datasheet or model.toml (default table1)")
     parser.add_argument("--plant", choices=PLANTS, default="reduced", help="what to simulate (default reduced)")
     parser.add_argument(
-        "--input", required=True, metavar="CSV|NAME", help="columns t_s,u_V, or multisine, chirp, ramp, steps, square"
+        "--input",
+        required=True,
+        metavar="CSV|NAME",
+        help="columns t_s,u_V (or what the model is told), or multisine, chirp, ramp, steps, square",
     )
     parser.add_argument("--gap", type=number(least=0), default=0.0, metavar="DEG", help="play of +-DEG (default 0)")
     parser.add_argument(
@@ -76,17 +80,19 @@ def run(arguments: argparse.Namespace) -> int:
         play=arguments.play,
         inductance=arguments.inductance == "on",
     )
+    for option, x in (("--noise-deg", arguments.noise_deg), ("--gap", arguments.gap)):
+        if x and found.output_unit != "rad":
+            raise InputError(f"{option} is an angle, the output of this model is in {found.output_unit}")
     kept = keep_file(out, lambda file: found.save(file, arguments.force))
     summary = {"out": kept.told(arguments.out), **found.to_dict()}
-    print(as_json(summary) if arguments.json else _told(summary))
+    print(as_json(summary) if arguments.json else _told(summary, found.course))
     return kept.code
 
 
-def _told(summary: dict) -> str:
+def _told(summary: dict, course: str) -> str:
     added = [effect["name"] for effect in summary["effects"]]
     added += [f"a play of +-{math.degrees(summary['gap_rad']):.4g} deg"] if summary["gap_rad"] else []
-    low, high = math.degrees(summary["theta_min_rad"]), math.degrees(summary["theta_max_rad"])
     return (
         f"{summary['out']}: {summary['samples']} samples over {summary['duration_s']:.4g} s, "
-        f"{low:.1f} to {high:.1f} deg, {summary['plant']} plant, {', '.join(added) or 'no effect'}"
+        f"{course}, {summary['plant']} plant, {', '.join(added) or 'no effect'}"
     )

@@ -215,6 +215,11 @@ def input_name(unit: str) -> str:
     return contract or f"u_{unit}"
 
 
+def output_name(unit: str) -> str:
+    """The contract name of an output in this unit."""
+    return next(name for name, role in COLUMNS.items() if (role.field, role.unit, role.factor) == ("y", unit, 1.0))
+
+
 def per(unit: str) -> str:
     """A unit as it stands below a stroke: in brackets where it is a product."""
     return f"({unit})" if " " in unit else unit

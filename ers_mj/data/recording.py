@@ -376,8 +376,9 @@ def _array(x: Any, field: str, name: str) -> np.ndarray:
 
 
 @brief
-def read_input(path: str | os.PathLike[str], column: str = "u_V") -> tuple[np.ndarray, np.ndarray]:
-    """Time [s] and input, each (N,), of a CSV or Parquet file with the columns t_s and ``column``.
+def read_input(path: str | os.PathLike[str], names: Sequence[str] = ("u_V",)) -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and input, each (N,), of a CSV or Parquet file with the columns t_s and the first of these ``names``
+    that it has.
 
     Raises:
         InputError: the file is no such thing, or has holes, in one sentence.
@@ -385,7 +386,7 @@ def read_input(path: str | os.PathLike[str], column: str = "u_V") -> tuple[np.nd
     file = Path(path)
     table = load(file, file.name)[0].table
     columns = []
-    for label in ("t_s", column):
+    for label in ("t_s", next((name for name in names if name in table.column_names), names[0])):
         if label not in table.column_names:
             raise InputError(f"{file.name}: there is no column {label}, the columns are {listed(table.column_names)}")
         x = numbers(table[label], label, file.name)

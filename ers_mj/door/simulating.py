@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
+from ers_mj.data.columns import input_name, output_name
 from ers_mj.data.recording import Recording, from_columns, read_input, write_recording
 from ers_mj.door.known import Known, known
 from ers_mj.door.results import frame, framed
@@ -19,6 +20,7 @@ from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
 from ers_mj.position_loop.saved import simulate_loop
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import parse_effect, simulate_recording
+from ers_mj.servo.units import input_unit_of, output_unit_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,14 +48,18 @@ class Simulation:
     """A simulated recording; `simulate` makes it.
 
     Attributes:
-        t, u, theta: time [s], voltage [V], what the sensor reads [rad], each (N,); theta[k] is taken before u[k] acts.
+        t, u, theta: time [s], input [`input_unit`], what the sensor reads [`output_unit`], each (N,); theta[k] is taken
+            before u[k] acts.
+        input_unit: the model's.
+        output_unit: the model's.
     """
 
     t: np.ndarray
     u: np.ndarray
     theta: np.ndarray
     _summary: Mapping[str, Any]
-    _input: str = "u_V"
+    input_unit: str = "V"
+    output_unit: str = "rad"
 
     @property
     def recording(self) -> Recording:
@@ -65,14 +71,14 @@ class Simulation:
         return from_columns(self._columns(), name=f"{self._summary['input']}, simulated")
 
     def _columns(self) -> dict[str, np.ndarray]:
-        return {"t_s": self.t, self._input: self.u, "theta_rad": self.theta}
+        return {"t_s": self.t, input_name(self.input_unit): self.u, output_name(self.output_unit): self.theta}
 
     def to_dict(self) -> dict[str, Any]:
         """What was simulated, and how far it moved: the JSON of the command, less the file."""
         return dict(plain(self._summary))
 
     def to_frame(self) -> pd.DataFrame:
-        """t_s, u_V and theta_rad, a row a sample.
+        """The columns of `save`, a row a sample.
 
         Raises:
             MissingPackage: pandas is not installed.
@@ -81,7 +87,7 @@ class Simulation:
         return frame([dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)])
 
     def save(self, path: str | os.PathLike[str], force: bool = False) -> Path:
-        """Write the recording as CSV.
+        """Write the recording as CSV: t_s, and input and output under the names of their units (u_V, theta_rad).
 
         Args:
             path: the file; in a folder that exists it is called recording.csv.
@@ -98,16 +104,23 @@ class Simulation:
 
     def __repr__(self) -> str:
         s = self._summary
-        low, high = np.degrees(s["theta_min_rad"]), np.degrees(s["theta_max_rad"])
         return (
-            f"<Simulation {s['input']}: {s['samples']} samples over {s['duration_s']:.4g} s,"
-            f" {low:.1f} to {high:.1f} deg, {s['plant']} plant>"
+            f"<Simulation {s['input']}: {s['samples']} samples over {s['duration_s']:.4g} s, {self.course},"
+            f" {s['plant']} plant>"
         )
+
+    @property
+    def course(self) -> str:
+        """From where to where it moved, in words."""
+        if self.output_unit == "rad":
+            return f"{np.degrees(self.theta.min()):.1f} to {np.degrees(self.theta.max()):.1f} deg"
+        return f"{self.theta.min():.4g} to {self.theta.max():.4g} {self.output_unit}"
 
     def _repr_html_(self) -> str:
         from ers_mj.report.notebook import simulation_page
 
-        return framed(simulation_page(repr(self)[1:-1], self.t, self.u, self.theta), 420)
+        units = self.input_unit, self.output_unit
+        return framed(simulation_page(repr(self)[1:-1], self.t, self.u, self.theta, units), 420)
 
 
 def simulate(
@@ -125,10 +138,11 @@ def simulate(
 
     Args:
         model: datasheet or model: a path, "table1", a mapping, a datasheet or a model, with the effects that it holds.
-        input: a name (multisine, chirp, ramp, steps, square), a CSV file (t_s, u_V), (t [s], u [V]) of shape (N,) each,
-            or a recording whose input is taken.
+        input: a name (multisine, chirp, ramp, steps, square) for a servo told a voltage, a CSV file (t_s, u_V; of a
+            model told something else, tau_cmd_Nm, i_cmd_A, u_duty_pct, theta_ref_rad or x_ref_m), (t [s], u) of shape
+            (N,) each, or a recording whose input is taken.
         effects: further ones, (name, {parameter: value}) in SI, or as the command line has them: "stribeck:dF_s=0.1".
-        noise: standard deviation of the sensor's noise [rad].
+        noise: standard deviation of the sensor's noise [output unit].
         seed: of the noise.
         rate_hz: of a named input [Hz]; 1000 by default.
         duration: of a named input [s]; 10 by default.
@@ -148,23 +162,29 @@ def simulate(
     _refuse_options(options, noise)
     sheet = known(model) or Datasheet()
     added = [parse_effect(effect) if isinstance(effect, str) else effect for effect in effects]
-    column = "theta_ref_rad" if sheet.loop else "u_V"
+    output_unit = output_unit_of(sheet.output_unit)
+    input_unit = input_unit_of(sheet.input_unit, None if sheet.input_unit else output_unit if sheet.loop else "V")
     if sheet.loop:
-        _refuse_beside_a_loop(input, added, options)
-    name, t, u = _signal(input, rate_hz, duration, column)
+        _refuse_beside_a_loop(added, options)
+    told_as = input_name(input_unit)
+    _refuse_voltage(input, told_as)
+    name, t, u = _signal(input, rate_hz, duration, [told_as, "theta_ref_rad" if sheet.loop else "u_V"])
     if not t[-1] - t[0] <= LONGEST:
         raise InputError(f"the input {name} lasts {t[-1] - t[0]:.4g} s, at most {LONGEST:g} s were expected")
     if sheet.loop:
-        columns = simulate_loop(sheet, t, u, plant=options.get("plant", "reduced"), noise=noise, seed=seed)
+        y = simulate_loop(sheet, t, u, plant=options.get("plant", "reduced"), noise=noise, seed=seed)
     else:
-        columns = simulate_recording(sheet, t, u, effects=added, noise=noise, seed=seed, **options)
-    asked = {"input": name, "noise_rad": noise, "seed": seed, "effects": [*sheet.effects, *added]}
-    theta = columns["theta_rad"]
-    return Simulation(columns["t_s"], columns[column], theta, _summary(t, theta, asked, options), column)
+        asked = {**options, "is_angle": output_unit == "rad"}
+        y = simulate_recording(sheet, t, u, effects=added, noise=noise, seed=seed, **asked)["theta_rad"]
+    told = {"input": name, "noise_rad": noise, "seed": seed, "effects": [*sheet.effects, *added]}
+    units = {"input_unit": input_unit, "output_unit": output_unit}
+    return Simulation(t, u, y, _summary(t, y, told | units, options), input_unit, output_unit)
 
 
-def _summary(t: np.ndarray, theta: np.ndarray, asked: dict[str, Any], options: PlantOptions) -> dict[str, Any]:
-    """What was simulated, and its course in three numbers."""
+def _summary(t: np.ndarray, y: np.ndarray, asked: dict[str, Any], options: PlantOptions) -> dict[str, Any]:
+    """What was simulated, and its course in three numbers, under the name of the output and its unit."""
+    name = {"rad": "theta", "m": "x"}.get(asked["output_unit"], "y")
+    course = {f"{name}_rms": float(y.std()), f"{name}_min": float(y.min()), f"{name}_max": float(y.max())}
     return asked | {
         "plant": options.get("plant", "reduced"),
         "linkage": options.get("linkage", "constant"),
@@ -174,9 +194,7 @@ def _summary(t: np.ndarray, theta: np.ndarray, asked: dict[str, Any], options: P
         "samples": int(t.size),
         "duration_s": float(t[-1] - t[0]),
         "effects": [{"name": name, "parameters": dict(values)} for name, values in asked["effects"]],
-        "theta_rms_rad": float(theta.std()),
-        "theta_min_rad": float(theta.min()),
-        "theta_max_rad": float(theta.max()),
+        **{f"{what}_{asked['output_unit']}": x for what, x in course.items()},
     }
 
 
@@ -188,19 +206,23 @@ def _refuse_options(options: PlantOptions, noise: float) -> None:
         raise InputError(f"the noise is {noise:g} rad, zero or more was expected")
 
 
-def _refuse_beside_a_loop(given: Voltage, added: Sequence[object], options: PlantOptions) -> None:
+def _refuse_voltage(given: Voltage, column: str) -> None:
+    """Raise InputError for an input by name where the model is told no voltage."""
+    if column != "u_V" and isinstance(given, str) and given in INPUTS:
+        raise InputError(f"--input {given} is a voltage; this model takes a CSV t_s,{column}")
+
+
+def _refuse_beside_a_loop(added: Sequence[object], options: PlantOptions) -> None:
     """Raise InputError for what no model of a position command takes."""
-    if isinstance(given, str) and given in INPUTS:
-        raise InputError(f"--input {given} is a voltage; a model with a [loop] takes a CSV t_s,theta_ref_rad")
     for option, is_given in (("--effect", added), ("--gap", options.get("gap"))):
         if is_given:
             raise InputError(f"{option} is for models without a [loop], this one's effects stand in its file")
 
 
 def _signal(
-    given: Voltage, rate_hz: float | None, duration: float | None, column: str
+    given: Voltage, rate_hz: float | None, duration: float | None, columns: Sequence[str]
 ) -> tuple[str, np.ndarray, np.ndarray]:
-    """Name, times [s] and values of an input, of a file its ``column``."""
+    """Name, times [s] and values of an input, of a file the first of these ``columns`` that it has."""
     if isinstance(given, str) and given in INPUTS:
         rate, seconds, most = rate_hz or RATE_HZ, duration or DURATION, 20_000_000
         if not 2 <= rate * seconds <= most:
@@ -220,7 +242,7 @@ def _signal(
             raise InputError(
                 f"--input {file}: there is no such file and no input of that name; there are {', '.join(INPUTS)}"
             )
-        return str(given), *read_input(file, column)
+        return str(given), *read_input(file, columns)
     return "arrays", *_arrays(given)
 
 

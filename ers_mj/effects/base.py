@@ -10,7 +10,7 @@ is carried as an acceleration [output unit / s^2] and only turned into N m for t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -155,6 +155,10 @@ class Effect:
     def absent(self) -> np.ndarray:
         """Parameter values (k,) at which the effect vanishes, so that models nest."""
         return np.array([p.absent for p in self.parameters])
+
+    def beside(self, given: Collection[str]) -> np.ndarray:
+        """Parameter values (k,) that a file which names only the ``given`` ones means."""
+        return self.absent()
 
     def starts(self, scales: Scales) -> list[np.ndarray]:
         """Parameter vectors (k,) of a visible size from which a fit is begun; empty where the effect cannot apply."""

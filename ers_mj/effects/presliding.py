@@ -44,7 +44,7 @@ class Presliding(Friction):
         "the rudder gives and springs back within the stuck phase, where stribeck and Coulomb friction hold it still"
     )
     parameters = (
-        Parameter("x_s", "position", "level of friction over its stiffness at rest"),
+        Parameter("x_s", "position", "level of friction over its stiffness at rest", absent=math.inf),
         Parameter(
             "zeta", "ratio", "damping ratio of that spring against the inertia", lower=0.005, upper=2.0, absent=0.2
         ),
@@ -66,6 +66,12 @@ class Presliding(Friction):
     tries, dear, step, tangible = 2, True, 0.01, False
     in_loop = ("creep",)
     loop_sentence = "friction creeps below its level, like a damper of {value}"
+
+    def beside(self, given):
+        out = self.absent()
+        if "x_s" not in given:  # what creeps has no bristle to damp
+            out[1] = math.inf
+        return out
 
     def starts(self, scales):
         least, most = 2 * scales.noise, 0.05 * scales.position

@@ -50,20 +50,20 @@ def looped_plant(datasheet: Datasheet, is_angle: bool = True) -> LoopedPlant:
 
 def simulate_loop(
     datasheet: Datasheet, t: np.ndarray, r: np.ndarray, *, plant: str = "reduced", noise: float = 0.0, seed: int = 0
-) -> dict[str, np.ndarray]:
-    """Columns t_s, theta_ref_rad, theta_rad, each (N,), of a servo that rests at the first reference.
+) -> np.ndarray:
+    """What the sensor reads (N,) [output unit] of a servo that rests at the first reference.
 
     Args:
         datasheet: a model.toml with a [loop].
-        t, r: time [s] and reference [rad].
+        t, r: time [s] and reference [output unit], each (N,).
         plant: "reduced", or "mujoco": a stepped controller around the MuJoCo plant.
-        noise, seed: standard deviation [rad] of the sensor's noise, and its seed.
+        noise, seed: standard deviation [output unit] of the sensor's noise, and its seed.
     """
     model, still = model_of(datasheet), np.ones(t.size, bool)
     run = Run("simulated", t - t[0], np.ascontiguousarray(r, float), r, still, still, 1.0, 0.0, (r[0], 0.0), r[0])
     if plant == "mujoco":
-        theta = looped_plant(datasheet).simulate(run.t, run.r, run.start, run.before)
+        is_angle = datasheet.output_unit in ("", "rad")
+        theta = looped_plant(datasheet, is_angle).simulate(run.t, run.r, run.start, run.before)
     else:
         theta = model.predicted(run)
-    theta = theta + noise * np.random.default_rng(seed).standard_normal(t.size)
-    return {"t_s": t, "theta_ref_rad": r, "theta_rad": theta}
+    return theta + noise * np.random.default_rng(seed).standard_normal(t.size)

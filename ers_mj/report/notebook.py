@@ -20,22 +20,25 @@ def model_page(title: str, numbers: Iterable[tuple[str, str, float]]) -> str:
     return page.frame("model", "", f"<h2>{page.text(title)}</h2>{page.table(['of', 'parameter', '>value'], rows)}")
 
 
-def simulation_page(title: str, t: np.ndarray, u: np.ndarray, theta: np.ndarray) -> str:
-    """A simulation's output [rad] over its input [V], both (N,)."""
+def simulation_page(
+    title: str, t: np.ndarray, u: np.ndarray, y: np.ndarray, units: tuple[str, str] = ("V", "rad")
+) -> str:
+    """A simulation's output over its input, both (N,), in ``units`` of the input and the output; an angle in deg."""
     restart_ids()
-    drawn = both_widths(lambda width: _course(t, u, theta, width), "simulated angle and voltage over time")
+    drawn = both_widths(lambda width: _course(t, u, y, units, width), "simulated output and input over time")
     return page.frame("simulation", "", f"<p>{page.text(title)}</p>{page.figure(drawn)}")
 
 
-def _course(t: np.ndarray, u: np.ndarray, theta: np.ndarray, width: float) -> Figure:
+def _course(t: np.ndarray, u: np.ndarray, y: np.ndarray, units: tuple[str, str], width: float) -> Figure:
+    is_angle = units[1] == "rad"
     figure = Figure(figsize=(width, 3.6))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     margins(figure)
     points = 1500 if width == STYLE.wide else 700
-    above.plot(*decimate(t, np.degrees(theta), points), color=STYLE.after, linewidth=1.2)
+    above.plot(*decimate(t, np.degrees(y) if is_angle else y, points), color=STYLE.after, linewidth=1.2)
     below.plot(*decimate(t, u, points), color=STYLE.ink, linewidth=0.8)
-    above.set_ylabel("angle [°]")
-    below.set_ylabel("input [V]")
+    above.set_ylabel("angle [°]" if is_angle else f"output [{units[1]}]")
+    below.set_ylabel(f"input [{units[0]}]")
     below.set_xlabel("time [s]")
     above.margins(x=0)
     return figure

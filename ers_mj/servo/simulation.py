@@ -284,7 +284,11 @@ def _vector(effect: Effect, values: Mapping[str, float], inertia: float, wider: 
     _refuse_lacking(effect, values)
     _refuse_halves(effect, values)
     bounded = [_widened(p, *wider.get(p.name, (p.lower, p.upper))) for p in effect.parameters]
-    given = [_checked(effect, p, float(values[p.name])) if p.name in values else p.absent for p in bounded]
+    lacking = effect.beside(values.keys())
+    given = [
+        _checked(effect, p, float(values[p.name])) if p.name in values else absent
+        for p, absent in zip(bounded, lacking.tolist(), strict=True)
+    ]
     ends = dict(zip(known, given, strict=True))
     if ends.get("lower", -math.inf) >= ends.get("upper", math.inf):
         raise InputError(f"{effect.name}: lower = {ends['lower']:g} is not below upper = {ends['upper']:g}")
