@@ -330,3 +330,11 @@ def test_theta_0_that_cannot_be_told_is_no_combination():
     """Where the rudder is never near theta_0 its bounds, and nothing else, say where it is."""
     told = rows(identify([record(0.01)], OFF, Settings(bounds={"theta_0": (5.0, 6.0)})))
     assert not any("theta_0" in name for name in told if name != "theta_0")
+
+
+def test_a_budget_that_ends_too_early_is_said_to_be_too_small():
+    t = np.arange(0.0, 2.0, 0.002)
+    columns = simulate_recording(read_datasheet("table1"), t, 8.0 * np.sin(6.0 * t))
+    run = from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"])
+    with pytest.raises(InputError, match="within 3 evaluations: allow more"):
+        identify([run], read_datasheet("table1"), Settings(budget=3))

@@ -273,7 +273,7 @@ def _parameters(case: Case) -> dict:
         rows[name] = {
             "value": value,
             "unit": units[name],
-            "ci95": list(errors[("base", name)]) if is_told else [None, None],
+            "ci95": list(errors[("base", name)]) if is_told else ([0.0, 0.0] if absent else [None, None]),
             "datasheet": known.get(name),
             "identifiable": is_told or absent,
         }

@@ -13,7 +13,7 @@ class Inductance(Drive):
     """
 
     name = "inductance"
-    sentence = "the motor current lags by an extra {tau_L}, more winding inductance than the datasheet has"
+    sentence = "the motor current lags by an extra {tau_L}: winding inductance that no datasheet told"
     mjcf = "the inductance of the dcmotor; where it falls with the current it is set step by step"
     apart = (
         "delays torque only, by a first-order lag that the motion smooths; input_delay moves everything by one "

@@ -11,7 +11,7 @@ class SensorDropout(Sensor):
     """
 
     name = "sensor_dropout"
-    sentence = "the sensor drops out {rate} times a second, for {duration} on average"
+    sentence = "the sensor drops out at random, at {rate}, for {duration} on average"
     mjcf = "none: readings are held after the simulation"
     apart = "the same reading held while the motion goes on; seen in the data itself, before any fit"
     tangible, after_noise, holds = False, True, True

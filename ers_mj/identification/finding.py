@@ -138,6 +138,11 @@ def _minimum(search: Search, settings: Settings, simulate: Simulator | None, att
         start=np.clip(search.coordinates(search.unknowns.reference), lower, upper),
     )
     if not np.isfinite(found.value):
+        if settings.budget and found.evaluations >= settings.budget:
+            raise InputError(
+                f"{method.name} found no motion that resembles the recordings within {settings.budget} evaluations:"
+                f" allow more (--evaluations)"
+            )
         raise InputError(
             "no motion that the model can make within these bounds resembles the recordings: check units and signs of"
             " input and output"

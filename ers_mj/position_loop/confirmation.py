@@ -173,10 +173,14 @@ def _judged(
     selector: Selector, selection: Selection, folds: Sequence[Fold], sentence: str, policy: Policy
 ) -> Confirmed:
     base = bare_fit(selector, selection) if selection.named else selection.chosen
+    (*others, lone) = selection.named or (None,)
+    alone = next((x for x in judged(selection) if lone is not None and not others and x.name == lone.name), None)
+    if alone is not None:  # without the only name is without any
+        base = min(base, alone.fit, key=lambda fit: fit.cost)
     models = _refitted(selection.chosen.model, folds)
     bare = _refitted(base.model, folds) if selection.named else models
     after = scored(models, folds)
-    lesser = {x.name: scored(_refitted(x.fit.model, folds), folds) for x in judged(selection)}
+    lesser = {x.name: scored(bare if x is alone else _refitted(x.fit.model, folds), folds) for x in judged(selection)}
     p = {name: _p_value(after, less, policy) for name, less in lesser.items()}
     return Confirmed(tuple(folds), scored(bare, folds), after, lesser, p, tuple(bare), tuple(models), base, sentence)
 

@@ -50,10 +50,11 @@ class Told:
 
 @dataclass(frozen=True)
 class Intervals:
-    """The model whose numbers are told, and the covariance of its transformed numbers with the factor that makes 95 %
-    of a standard deviation.
+    """The model whose numbers are told, ``chosen``, and the one around which their intervals lie, with terms that were
+    left out; the covariance of its transformed numbers with the factor that makes 95 % of a standard deviation.
     """
 
+    chosen: LoopModel
     model: LoopModel
     layout: tuple[Free, ...]
     covariance: np.ndarray
@@ -86,7 +87,7 @@ class Intervals:
         spread += _unseen(model, data, e, j, inverse)
         steps = [_inexact(f, q, rate, model["K"]) for f, q in zip(layout, model.vector(layout), strict=True)]
         spread += np.diag(np.square(steps))
-        return Intervals(model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
+        return Intervals(fit.model, model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
 
     def told(self, owner: str, name: str) -> Told | None:
         """A fitted number."""
@@ -96,8 +97,14 @@ class Intervals:
                 half = self.factor * math.sqrt(max(self.covariance[k, k], 0.0))
                 low, high = f.ends(z[k], half)
                 known = half < DOUBT.told if f.positive else True
-                return Told(f.inside(z[k]), (low, high), known)
+                value = self._chosen(f)
+                return Told(value, (min(low, value), max(high, value)), known)
         return None
+
+    def _chosen(self, f: Free) -> float:
+        """A number of the chosen model."""
+        q = _at(self.chosen).get(_key(f))
+        return self.chosen[f.name] if q is None else f.inside(q)
 
     def combined(self, name: str) -> Told | None:
         """One of COMBINED; None where a part of it is not in the model."""
@@ -139,7 +146,9 @@ class Intervals:
             slope[k] = (ends[0] - ends[1]) / 2e-4
         half = self.factor * math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
         half = min(half, 50.0)
-        return Told(value, (value * math.exp(-half), value * math.exp(half)), half < DOUBT.told)
+        told = rule(self.chosen)
+        around = min(told, value * math.exp(-half)), max(told, value * math.exp(half))
+        return Told(told, around, half < DOUBT.told)
 
 
 def _inexact(f: Free, z: float, rate: float, K: float) -> float:
