@@ -1,11 +1,14 @@
 """A servo that closes its own loop: simulated, identified, diagnosed, written and read again."""
 
+import control
 import numpy as np
 import pytest
 
 from ers_mj.cli import main
 from ers_mj.data.recording import from_arrays, from_columns, write_recording
 from ers_mj.diagnosis.pipeline import diagnose
+from ers_mj.door.known import known
+from ers_mj.door.model import load_model
 from ers_mj.effects.backlash import Backlash
 from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.effects.input_delay import InputDelay
@@ -346,3 +349,17 @@ def test_a_late_drives_damping_reaches_mujoco_as_it_is():
     for D in (-1.8, 1.8):
         motor = looped_plant(Datasheet(lumped={"a_2": 20.0}, loop={"K": 900.0, "D": D, "L": 150.0})).spec().compile()
         assert motor.actuator("motor").biasprm[1:3] == pytest.approx([-900.0, -D])
+
+
+def test_a_model_with_a_loop_becomes_a_system_of_python_control():
+    """From reference to reading, whole and linear; about its rest alone."""
+    sheet = {"lumped": {"a_2": 20.0, "c_2": 1.0}, "loop": {"kind": "P", "K": 900.0, "tau_s": 0.004}}
+    model, t = load_model(sheet), np.arange(400) / 500.0
+    r = np.where(t < 0.1, 0.0, 0.2)
+    whole = control.input_output_response(model.to_nonlinear(500.0), t, r).outputs
+    assert np.max(np.abs(whole - simulate_loop(known(sheet), t, r))) < 3e-3
+    slipping = model.to_control()
+    assert slipping.input_labels == ["theta_ref_rad"] and slipping.dcgain() == pytest.approx(1.0)
+    assert model.to_control(rate_hz=500.0).dt == pytest.approx(0.002)
+    with pytest.raises(InputError, match="about its rest"):
+        model.to_control(theta=0.3)

@@ -8,6 +8,7 @@ import pytest
 from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.thresholds import POLICY
 from ers_mj.decisions.verdict import Shown
+from ers_mj.diagnosis.errors_told import as_named
 from ers_mj.diagnosis.sentences import of_another_day
 
 
@@ -150,3 +151,9 @@ def test_recordings_that_differ_are_judged_by_what_memory_tells():
     case = replace(NONE, recordings_differ=True, free_held=700.0, least_astray=500.0)
     assert rules.verdict(case) == "parameters_only" and rules.is_more_left(case)
     assert rules.verdict(replace(case, left=left(0.2))) == "unexplained"
+
+
+def test_where_nothing_is_named_after_is_before():
+    fits = {"heldout_rmse_before_rad": 2.0, "heldout_rmse_after_rad": 1.5, "measure": "free_run"}
+    assert as_named(fits, ("stribeck",), ("stribeck",)) is fits and as_named(fits, (), ()) is fits
+    assert as_named(fits, ("stribeck",), ()) == fits | {"heldout_rmse_after_rad": 2.0}

@@ -17,6 +17,7 @@ from ers_mj.decisions.confirmation import is_no_size
 from ers_mj.decisions.explained import cost
 from ers_mj.diagnosis import unknown
 from ers_mj.diagnosis.case import Case
+from ers_mj.diagnosis.errors_told import as_named
 from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.diagnosis.latent_force import latent_forces
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
@@ -79,7 +80,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "missing": missing,
         "remainder": _remainder(case),
         "record_state": states,
-        "fit": case.fits | unknown.fits(case),
+        "fit": as_named(case.fits, case.names, case.told_effects) | unknown.fits(case),
         "parameters": _parameters(case),
         "next_recording": _next_recording(case),
         "data": data,
@@ -111,7 +112,10 @@ def _remainder(case: Case) -> dict:
     beyond = beyond_training(case.recordings, case.holdout)
     left_sigma = {kind: math.sqrt(math.expm1(max(left, 0.0))) for kind, left in case.left.items()}
     own = of_its_own(case) if case.verdict == "parameters_only" and case.more_is_left else ""
-    told = remainder(case.explained, case.more_is_left, case.free_held, [*beyond, *unknown.sentences(case)], own)
+    fits = as_named(case.fits, case.names, case.told_effects)
+    explained = case.explained if fits is case.fits else 0.0
+    levels = fits["heldout_rmse_after_rad"] / case.noise
+    told = remainder(explained, case.more_is_left, levels, [*beyond, *unknown.sentences(case)], own)
     return {**told, "left_sigma": left_sigma, "tables": unknown.tables(case)}
 
 
@@ -262,18 +266,20 @@ def _parameters(case: Case) -> dict:
         "emf_share": "-",
         "ampere": f"{y}/s^2/A",
     }
-    rows, errors = {}, case.errors
+    rows: dict[str, dict] = {}
+    errors = case.errors
     for name in BASE:
         fitted = ("base", name) in errors
         is_told = fitted and (name == "theta_0" or not is_no_size(*errors[("base", name)], case.policy))
         if not fitted and name in ("tau_e", "emf_share", "ampere"):
             continue
-        absent = name in ("a_1", "c_1") and case.model.values[name] == 0
-        value = float(case.model.values[name]) if is_told or absent else None
+        told = float(case.answer.values[name])
+        absent = name in ("a_1", "c_1") and told == 0
+        value = told if is_told or absent else None
         rows[name] = {
             "value": value,
             "unit": units[name],
-            "ci95": list(errors[("base", name)]) if is_told else ([0.0, 0.0] if absent else [None, None]),
+            "ci95": _around(told, *errors[("base", name)]) if is_told else 2 * [value],
             "datasheet": known.get(name),
             "identifiable": is_told or absent,
         }
@@ -288,6 +294,11 @@ def _parameters(case: Case) -> dict:
             }
     rows |= _combinations(case, rows)
     return rows
+
+
+def _around(value: float, low: float, high: float) -> list[float]:
+    """An interval with what is told in it: where nothing is named it was found beside what might have been."""
+    return [min(low, value), max(high, value)]
 
 
 def _combinations(case: Case, rows: dict) -> dict:

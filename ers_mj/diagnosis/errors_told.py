@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 Ends = tuple[float | None, float | None]  # before, after
@@ -27,3 +28,12 @@ def errors_told(train: Ends, held: tuple[Held, Held], again: Ends, multibody: En
         "mujoco_heldout_rmse": multibody,
     }
     return {f"{name}_{when}_rad": x for name, pair in ends.items() for when, x in zip(("before", "after"), pair)}
+
+
+def as_named(fits: dict, names: Sequence[str], told: Sequence[str]) -> dict:
+    """The errors of a case whose model has these ``names`` beside what is ``told`` of them: where nothing is, after is
+    before.
+    """
+    if told or not names:
+        return fits
+    return {key: fits[key.replace("_after", "_before")] for key in fits}

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of
+from ers_mj.diagnosis.errors_told import as_named
 from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
 from ers_mj.diagnosis.localisation import Place, Ranked, Samples, places, residual_map, shaded
 from ers_mj.diagnosis.loop_advice import next_recording
@@ -39,6 +40,7 @@ def told(case: LoopCase) -> Diagnosis:
     found, data = _places(case, samples), data_of(case.recordings, case.holdout)
     known = case.datasheet.to_lumped() if case.datasheet is not None else {}
     data["problems"] += [BESIDE] if case.datasheet is not None else []
+    fits = as_named(case.fits, case.names, case.told_effects)
     document = {
         "version": 1,
         "verdict": case.verdict,
@@ -46,10 +48,13 @@ def told(case: LoopCase) -> Diagnosis:
         "where": [place_of(p) for p in found],
         "missing": missing,
         "remainder": remainder(
-            case.explained, case.more_is_left, case.free_held, beyond_training(case.recordings, case.holdout)
+            case.explained if fits is case.fits else 0.0,
+            case.more_is_left,
+            fits["heldout_rmse_after_rad"] / case.noise,
+            beyond_training(case.recordings, case.holdout),
         ),
         "record_state": record_state(case),
-        "fit": case.fits,
+        "fit": fits,
         "parameters": parameters(case.intervals, case.output_unit, case.selector.data, known),
         "next_recording": next_recording(case),
         "data": data,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ers_mj.data.columns import input_name
-from ers_mj.data.recording import Recording
+from ers_mj.data.columns import input_name, output_name
+from ers_mj.data.recording import Recording, read_recording
 from ers_mj.door.known import Known, known
 from ers_mj.door.results import frame, framed
 from ers_mj.door.saving import make_room, plain
@@ -31,11 +31,10 @@ if TYPE_CHECKING:
 
     from ers_mj.control.stepping import Stepper
     from ers_mj.door.exporting import Exported
+    from ers_mj.export.servo import Servo
     from ers_mj.plants.joint import JointLines
     from ers_mj.plants.mechanical import MechanicalPlant
     from ers_mj.plants.reduced import ReducedModel
-
-OUTPUT_NAMES = {"rad": "theta_rad", "m": "x_m", "V": "y_sensor_V"}
 
 
 class Model:
@@ -121,7 +120,6 @@ class Model:
             InputError: it is in other units, or the motion leaves all bounds.
         """
         from ers_mj.data.prepared import trace_of
-        from ers_mj.data.recording import read_recording
         from ers_mj.estimation.initial_state import fitted_start
         from ers_mj.estimation.known_model import model_of
         from ers_mj.servo.simulation import finite
@@ -178,7 +176,7 @@ class Model:
     @property
     def signals(self) -> tuple[str, str]:
         """Names of input and output, with their units."""
-        return input_name(self.input_unit), OUTPUT_NAMES[self.output_unit]
+        return input_name(self.input_unit), output_name(self.output_unit)
 
     def to_control(
         self, theta: float | None = None, omega: float = 1.0, *, rate_hz: float | None = None, pade: int = 4
@@ -194,30 +192,29 @@ class Model:
             rate_hz: of a loop: the plant from sample to sample, dead times exact. None: continuous.
             pade: order of the approximations that stand for dead times in continuous time.
 
+        Of a model with a [loop] the servo with its loop, from reference to reading, about its rest, as `export` writes
+        it.
+
+        Raises:
+            InputError: of such a model, another point than its rest.
+
         Source: Eq. (6) of Energies 2020, linear about the point.
         """
-        from ers_mj.control.frequency.linear import continuous, linearised
+        from ers_mj.control.frequency.linear import continuous, linearised, named
+        from ers_mj.export.python_control import closed
 
+        if self._datasheet.loop:
+            return closed(self._leaving, theta, omega, rate_hz)
         theta = self.plant.coefficients.theta_0 if theta is None else theta
         if rate_hz is None:
-            return self._named(continuous(self.plant, theta, omega, pade))
-        return self._named(linearised(self.plant, rate_hz, theta, omega).held)
-
-    def _named(self, system: control.StateSpace) -> control.StateSpace:
-        import control
-
-        into, out = self.signals
-        y, two, wound = self.output_unit, self.plant.has_motor_side, self.plant.coefficients.tau_e > 0
-        states = [out, f"speed_{y}_s"]
-        states += ["motor_side", "motor_side_speed"] if two else []
-        states += [f"drive_{y}_s2"] if wound else []
-        named = {"states": states} if len(states) == system.nstates else {}  # dead times and sensors add their own
-        return control.ss(
-            system.A, system.B, system.C, system.D, system.dt, inputs=[into], outputs=[out], name="servo", **named
-        )
+            system = continuous(self.plant, theta, omega, pade)
+        else:
+            system = linearised(self.plant, rate_hz, theta, omega).held
+        return named(system, self.plant, self.signals, self.output_unit)
 
     def to_nonlinear(self, rate_hz: float = 1000.0) -> control.NonlinearIOSystem:
-        """The whole plant, all effects, as a discrete python-control system that steps the event-exact reduced plant.
+        """The whole plant, all effects, as a discrete python-control system that steps the event-exact reduced plant;
+        of a model with a [loop] the servo with its loop in the portable steps that `export` writes.
 
         Its state 0, python-control's default, is rest at theta_0. Only lost samples of a sensor are not in it.
 
@@ -232,7 +229,10 @@ class Model:
             (50,)
         """
         from ers_mj.control.stepping import system
+        from ers_mj.export.python_control import built
 
+        if self._datasheet.loop:
+            return built(self._leaving)["plant"](rate_hz)
         return system(self.plant, rate_hz, self.signals)
 
     def to_mujoco(self) -> mujoco.MjSpec:
@@ -282,14 +282,9 @@ class Model:
         J = self._datasheet.parameters.get("J") if inertia is None else inertia
         if J is None:
             raise InputError("the datasheet gives no J, so torques are not known: give inertia=, in kg m^2")
+        is_angle = self.output_unit == "rad"
         return joint_lines(
-            self.plant,
-            float(J),
-            joint=joint,
-            bodies=bodies,
-            timestep=timestep,
-            actuator=actuator,
-            is_angle=self.output_unit == "rad",
+            self.plant, float(J), joint=joint, bodies=bodies, timestep=timestep, actuator=actuator, is_angle=is_angle
         )
 
     def export(self, folder: str | os.PathLike[str], to: Sequence[str] = ("mujoco",), force: bool = False) -> Exported:
@@ -299,10 +294,14 @@ class Model:
             InputError: no such target, or the folder holds files and no `force` is given.
         """
         from ers_mj.door.exporting import export
+
+        return export(self._leaving, folder, to, force)
+
+    @property
+    def _leaving(self) -> Servo:
         from ers_mj.export.servo import servo_of
 
-        servo = servo_of(self._datasheet, self.output_unit, self.input_unit, self.signals, self.inductance)
-        return export(servo, folder, to, force)
+        return servo_of(self._datasheet, self.output_unit, self.input_unit, self.signals, self.inductance)
 
     def losses(self, target: str) -> tuple[str, ...]:
         """What a conversion cannot carry, a sentence each.
@@ -326,6 +325,7 @@ class Model:
             "lumped": sheet.to_lumped(),
             "baseline": sheet.baseline,
             "effect": [{"name": name, "parameters": values} for name, values in sheet.effects],
+            "loop": {"kind": sheet.loop_kind, "sensor": sheet.loop_sensor, **sheet.loop} if sheet.loop else {},
             "output_unit": self.output_unit,
             "input_unit": self.input_unit,
         }

@@ -6,12 +6,17 @@ import re
 from collections.abc import Mapping
 from importlib.resources import files
 from string import Template
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ers_mj.errors import InputError
 from ers_mj.export.base import Target, Written
 from ers_mj.export.portable import STATE, WITHIN, Portable
 from ers_mj.export.servo import Servo
+
+if TYPE_CHECKING:
+    import control
 
 PADE = 4  # order of the approximations that stand for dead times in linear()
 NOT_RECORDED = (
@@ -55,6 +60,27 @@ def module_of(servo: Servo, p: Portable) -> str:
     }
     text = (files("ers_mj.export") / "model_control.txt").read_text(encoding="utf-8")
     return Template(text).substitute(values)
+
+
+def built(servo: Servo) -> dict[str, Any]:
+    """What that module defines: ``plant``, ``linear`` and ``run``."""
+    module: dict[str, Any] = {}
+    exec(compile(module_of(servo, servo.portable), "model_control.py", "exec"), module)
+    return module
+
+
+def closed(servo: Servo, theta: float | None, omega: float, rate_hz: float | None) -> control.StateSpace:
+    """The slipping servo with its firmware's loop, from reference to reading; at ``rate_hz``, held between samples.
+
+    Raises:
+        InputError: another point than its rest is asked for.
+    """
+    import control
+
+    if theta is not None or omega != 1.0:
+        raise InputError("a servo with a [loop] is linear about its rest, theta and omega are not taken")
+    system = built(servo)["linear"]()
+    return system if rate_hz is None else control.sample_system(system, 1.0 / rate_hz)
 
 
 def shown(table: Mapping[str, object]) -> str:

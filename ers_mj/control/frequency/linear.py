@@ -289,3 +289,17 @@ def _lag(T: float, dt: float) -> control.StateSpace:
     decay = np.exp(-1.0 / ratio)
     now, before = 1.0 - ratio * (1.0 - decay), ratio * (1.0 - decay) - decay
     return control.ss(decay, before + decay * now, 1.0, now, dt)
+
+
+def named(
+    system: control.StateSpace, plant: ReducedModel, signals: tuple[str, str], output_unit: str
+) -> control.StateSpace:
+    """A system with the names of its input and output, and of its states where they are the plant's alone."""
+    into, out = signals
+    states = [out, f"speed_{output_unit}_s"]
+    states += ["motor_side", "motor_side_speed"] if plant.has_motor_side else []
+    states += [f"drive_{output_unit}_s2"] if plant.coefficients.tau_e > 0 else []
+    own = {"states": states} if len(states) == system.nstates else {}  # dead times and sensors add their own
+    return control.ss(
+        system.A, system.B, system.C, system.D, system.dt, inputs=[into], outputs=[out], name="servo", **own
+    )
