@@ -44,6 +44,17 @@ def test_clipped_spans_of_input_and_output(columns):
     assert "y looks clipped at 0.2, 0.33" in problem(record, "y looks clipped")
 
 
+@pytest.mark.parametrize(("rail", "shape"), [(0.4, np.sin), (0.501, lambda t: np.tanh(8 * np.sin(t)))])
+def test_what_a_rail_hides_is_left_out(rail, shape):
+    """Where the motion goes well beyond, and where it is noise alone that meets the rail, now and then."""
+    t = 0.01 * np.arange(2000)
+    y = 0.5 * shape(t) + 2e-3 * np.random.default_rng(0).standard_normal(t.size)
+    record = from_arrays(t, np.cos(t), np.minimum(y, rail))
+    (fault,) = [fault for fault in record.faults if fault.kind == "clipped"]
+    assert fault.count == np.sum(y >= rail) and np.array_equal(record.valid, y < rail)
+    assert from_arrays(t, np.cos(t), y).valid.all()
+
+
 @pytest.mark.parametrize("wave", [lambda t: np.sign(np.sin(60 * t)), lambda t: np.round(2 * np.sin(60 * t))])
 def test_squares_and_steps_are_not_clipped(columns, wave):
     t, _, y = columns.values()

@@ -7,6 +7,7 @@ import numpy as np
 
 from ers_mj.data.columns import COLUMNS, CONSTANT, MEASURED
 from ers_mj.data.consistency.sheet import Fault
+from ers_mj.data.rails import rail_spans
 from ers_mj.data.sensor_faults import at_extreme, converter_step, decimal_grain, frozen_spans, held_spans, varied
 from ers_mj.data.tables import listed
 from ers_mj.errors import InputError
@@ -145,7 +146,7 @@ def problems_of(
         *_told_gaps(t, labels["t"]),
         *_told_jitter(t, labels["t"]),
         *_told_clipped("limit", t, u, labels["u"], [s for s in held_spans(u) if at_extreme(u, s) and varied(u, s)]),
-        *_told_clipped("clipped", t, y, labels["y"], [s for s in frozen if at_extreme(y, s)]),
+        *_told_clipped("clipped", t, y, labels["y"], rail_spans(y, step), ", which are left out"),
         *(
             fault
             for field in MEASURED
@@ -199,11 +200,13 @@ def _told_jitter(t: np.ndarray, label: str) -> list[Fault]:
     return [Fault("jitter", label, sentence)] if jitter > LIMITS.least_jitter else []
 
 
-def _told_clipped(kind: str, t: np.ndarray, x: np.ndarray, label: str, spans: list[slice]) -> list[Fault]:
+def _told_clipped(
+    kind: str, t: np.ndarray, x: np.ndarray, label: str, spans: list[slice], done: str = ""
+) -> list[Fault]:
     if not spans:
         return []
     limits = listed(f"{limit:.6g}" for limit in sorted({float(x[span.start]) for span in spans}))
-    sentence = f"{label} looks clipped at {limits}: {_told_spans(spans, len(x))}"
+    sentence = f"{label} looks clipped at {limits}: {_told_spans(spans, len(x))}{done}"
     return [_of_spans(kind, t, label, spans, sentence)]
 
 

@@ -38,6 +38,7 @@ from ers_mj.data.formats import load
 from ers_mj.data.formats.base import Loaded
 from ers_mj.data.inspection import Inspection, inspected
 from ers_mj.data.mapping import Source
+from ers_mj.data.rails import off_rails, rail_spans
 from ers_mj.data.sensor_faults import converter_step
 from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec
 from ers_mj.data.whole import write_whole
@@ -334,22 +335,21 @@ class Read:
         name, labels = self.name, dict(self.labels)
         with np.errstate(all="ignore"):  # a NaN that signals, an infinity: told below, with its row
             values = {field: x * factors[field] for field, x in printed.items()}
-        fields = checked(values, labels, name)
-        step = converter_step(printed["y"])
-        rows = np.arange(fields["t"].size)
-        first = Sheet(name, self.kind, fields, labels, self.units, rows, step * factors["y"], self.sure)
+        fields, step = checked(values, labels, name), converter_step(printed["y"])
+        quantum, rows = step * factors["y"], np.arange(fields["t"].size)
+        first = Sheet(name, self.kind, fields, labels, self.units, rows, quantum, self.sure)
         sheet, faults = consistent(first)
         if faults:
             refuse_still(sheet.y, labels["y"], name)
-        seen = {field: _seen(x[sheet.rows], field, first, sheet, factors[field]) for field, x in printed.items()}
-        told = [*problems_of(dict(sheet.fields), seen, labels, step), *faults, *notes]
+        seen = {f: _seen(x[sheet.rows], f, first, sheet, factors[f]) for f, x in printed.items()}
+        told = [*problems_of(sheet.fields, seen, labels, step), *faults, *notes]
         return {
-            **{field: locked(x) for field, x in sheet.fields.items()},
+            **{field: locked(x) for field, x in off_rails(sheet.fields, rail_spans(seen["y"], step)).items()},
             **constants(values, labels, name),
             "input_kind": self.kind,
             "input_unit": self.units["u"],
             "output_unit": self.units["y"],
-            "quantum": step * factors["y"],
+            "quantum": quantum,
             "name": name,
             "problems": tuple(fault.sentence for fault in told),
             "faults": tuple(fault for fault in told if not fault.is_note),
