@@ -1,6 +1,6 @@
 """What of a recording is refused, and what is worked around and told: the checks that arrays and files get alike."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -134,7 +134,7 @@ def locked(x: np.ndarray) -> np.ndarray:
 
 
 def problems_of(
-    fields: dict[str, np.ndarray], printed: dict[str, np.ndarray], labels: dict[str, str], step: float
+    fields: Mapping[str, np.ndarray], printed: Mapping[str, np.ndarray], labels: Mapping[str, str], step: float
 ) -> list[Fault]:
     """What is told, a sentence each; `printed` are the columns as they stand in the file, `step` the converter's
     there.
