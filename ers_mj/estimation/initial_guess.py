@@ -3,6 +3,9 @@
 Weak form: Eq. (6) is multiplied by a bump that vanishes with its slope at both ends of a window, and integrated by
 parts, so that the output is never differentiated twice. What is left is linear in a_1, a_2, b, c_1, c_2 once theta_0 is
 given, and theta_0 is scanned over the travel; and in the numbers of an effect that stands in a spring's place.
+
+It is solved for the acceleration, and once more for the input: where friction and damping take nearly all that a drive
+gives, the acceleration is a small difference of which the first makes all numbers small alike (of a throttle's by 50).
 """
 
 from __future__ import annotations
@@ -28,11 +31,14 @@ FASTEST = 1e4
 
 
 class Guess(NamedTuple):
-    """Eq. (6)'s letters, and the effects beside them, with which a fit may begin; the ``misfit`` of the regression."""
+    """Eq. (6)'s letters, and the effects beside them, with which a fit may begin; the ``misfit`` of the regression, and
+    whether it was solved for the input (``of_input``).
+    """
 
     misfit: float
     values: Mapping[str, float]
     effects: tuple[tuple[str, np.ndarray], ...] = ()
+    of_input: bool = False
 
     @property
     def held_by(self) -> str:
@@ -82,39 +88,48 @@ def _rows(trace: Trace, window: float, still: float) -> Rows | None:
 
 
 def guesses(traces: Sequence[Trace], holding: Sequence[Effect] = ()) -> list[Guess]:
-    """Starting values of Eq. (6), best regression first: without a spring and with one, with preload, and with each of
-    the effects ``holding`` the output in their place; none of an absurd gain.
+    """Starting values of Eq. (6), best regression first, those for the acceleration before those for the input: without
+    a spring and with one, with preload, and with each of the effects ``holding`` the output in their place; none of an
+    absurd gain.
     """
     y = np.concatenate([t.y[t.valid] for t in traces])
     speed = np.concatenate([np.abs(np.diff(savgol_filter(t.y[t.valid], 9, 2))) / t.sample_time for t in traces])
     still = max(0.02 * float(np.quantile(speed, 0.98)), 1e-12)
-    found = [one for window in WINDOWS for one in _by_window(traces, window, still, y, holding)]
-    found.sort(key=lambda guess: guess.misfit)
     most, peak = FASTEST * float(np.quantile(speed, 0.98)), max(float(np.max(np.abs(t.u))) for t in traces)
-    return [guess for guess in found if abs(guess.values["b"]) * peak <= most]
+    largest = most / max(peak, 1e-300)
+    found = [one for window in WINDOWS for one in _by_window(traces, window, still, y, holding, largest)]
+    found.sort(key=lambda guess: (guess.of_input, guess.misfit))
+    return [guess for guess in found if abs(guess.values["b"]) * peak <= most * (1.0 + 1e-9)]
 
 
 def _by_window(
-    traces: Sequence[Trace], window: float, still: float, y: np.ndarray, holding: Sequence[Effect]
+    traces: Sequence[Trace], window: float, still: float, y: np.ndarray, holding: Sequence[Effect], largest: float
 ) -> list[Guess]:
-    """The regressions over windows of one length [s]."""
+    """The regressions over windows of one length [s], of a gain b that is no ``largest`` one."""
     rows = [r for r in (_rows(t, window, still) for t in traces) if r is not None]
     if not rows:
         return []
     middle = float(np.median(y))
-    joint = Joint(np.concatenate([r.right for r in rows]), np.vstack([r.columns for r in rows]), rows)
+    right, columns = np.concatenate([r.right for r in rows]), np.vstack([r.columns for r in rows])
+    found = []
     with np.errstate(all="ignore"):  # of a constant input next to nothing follows
-        sprung = [joint.sprung(at, spring, middle) for at, spring in ((None, False), (None, True))]
-        preloaded = [joint.sprung(theta_0, True, middle) for theta_0 in np.quantile(y, PLACES)]
-        return [*sprung, *preloaded, *(joint.held(effect, middle) for effect in holding)]
+        for of_input in (False, True):
+            joint = Joint(right, columns, rows, largest if of_input else 0.0)
+            found += [joint.sprung(at, spring, middle) for at, spring in ((None, False), (None, True))]
+            found += [joint.sprung(theta_0, True, middle) for theta_0 in np.quantile(y, PLACES)]
+            found += [joint.held(effect, middle) for effect in holding]
+    return found
 
 
 class Joint(NamedTuple):
-    """The rows of all traces: one regression over every law that is linear in its numbers."""
+    """The rows of all traces: one regression over every law that is linear in its numbers, for the input where a
+    ``largest`` gain b is given.
+    """
 
     right: np.ndarray
     columns: np.ndarray
     rows: Sequence[Rows]
+    largest: float = 0.0
 
     def sprung(self, theta_0: float | None, spring: bool, middle: float) -> Guess:
         """With a preload about ``theta_0`` or without one, with a spring or without."""
@@ -125,7 +140,8 @@ class Joint(NamedTuple):
         a_1 = x[SPRING] if spring else 0.0
         rest = x[CONSTANT] / a_1 if a_1 > 0 else middle
         held = {"a_1": a_1, "c_1": x[-1] if theta_0 is not None else 0.0}
-        return Guess(misfit, {**_moving(x), **held, "theta_0": theta_0 if theta_0 is not None else rest})
+        values = {**_moving(x), **held, "theta_0": theta_0 if theta_0 is not None else rest}
+        return Guess(misfit, values, (), self.largest > 0)
 
     def held(self, effect: Effect, middle: float) -> Guess:
         """With an effect in the spring's place."""
@@ -137,26 +153,40 @@ class Joint(NamedTuple):
         p = x[CONSTANT:]
         least = LEAST * max(float(np.max(np.abs(p))), 1e-12)
         p = np.where(np.abs(p) < least, np.copysign(least, p), p)
-        return Guess(misfit, {**_moving(x), "a_1": 0.0, "c_1": 0.0, "theta_0": middle}, ((effect.name, p),))
+        values = {**_moving(x), "a_1": 0.0, "c_1": 0.0, "theta_0": middle}
+        return Guess(misfit, values, ((effect.name, p),), self.largest > 0)
 
     def _torque(self, torque: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         return np.concatenate([r.of(torque) for r in self.rows])
 
     def _solved(self, design: np.ndarray, signed: list[int]) -> tuple[float, np.ndarray]:
-        """(relative residual, coefficients) of one regression, reweighted towards its smaller residuals; all but the
-        ``signed`` coefficients are positive.
-        """
-        right = self.right
-        size = np.maximum(np.abs(design).max(axis=0), 1e-300)
-        both = np.column_stack([design / size, -design[:, signed] / size[signed]])
-        weight = np.ones(right.size)
-        for _ in range(4):
-            x = nnls(both * weight[:, None], right * weight)[0]
-            x[signed] -= x[design.shape[1] :]
-            x = x[: design.shape[1]] / size
-            e = right - design @ x
-            weight = 1.0 / np.sqrt(1.0 + (e / (2 * np.median(np.abs(e)) + 1e-300)) ** 2)
-        return float(np.median(np.abs(e)) / np.median(np.abs(right))), x
+        """(relative residual, coefficients) of one regression; all but the ``signed`` coefficients are positive."""
+        if not self.largest:
+            return _reweighted(self.right, design, signed)
+        others = [k for k in range(design.shape[1]) if k != GAIN]
+        turned = np.column_stack([self.right, -design[:, others]])
+        free = [1 + others.index(k) for k in signed if k != GAIN]
+        tries = [(way, *_reweighted(way * design[:, GAIN], turned, free)) for way in (1.0, -1.0)]
+        way, misfit, found = min(tries, key=lambda one: one[1])
+        b, x = min(1.0 / max(found[0], 1e-300), self.largest), np.empty(design.shape[1])
+        x[GAIN], x[others] = way * b, b * found[1:]
+        return misfit, x
+
+
+def _reweighted(right: np.ndarray, design: np.ndarray, signed: list[int]) -> tuple[float, np.ndarray]:
+    """(relative residual, coefficients) of a regression, reweighted towards its smaller residuals; all but the
+    ``signed`` coefficients are positive.
+    """
+    size = np.maximum(np.abs(design).max(axis=0), 1e-300)
+    both = np.column_stack([design / size, -design[:, signed] / size[signed]])
+    weight = np.ones(right.size)
+    for _ in range(4):
+        x = nnls(both * weight[:, None], right * weight)[0]
+        x[signed] -= x[design.shape[1] :]
+        x = x[: design.shape[1]] / size
+        e = right - design @ x
+        weight = 1.0 / np.sqrt(1.0 + (e / (2 * np.median(np.abs(e)) + 1e-300)) ** 2)
+    return float(np.median(np.abs(e)) / np.median(np.abs(right))), x
 
 
 def _moving(x: np.ndarray) -> dict[str, float]:

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 OPENING_RATES = (20.0, 5.0)  # observer rates [1/s] of the search from scratch
 OPENING_TAU = 1e3  # and the misfit at which its cost turns to logarithms
-STARTS = 6  # guesses that are refitted
+STARTS = 6, 3  # guesses that are refitted, of the regression for the acceleration and of that for the input
 OPENED = {
-    "preload": STARTS,
+    "preload": STARTS[0],
     "spring": 2,
     "bare": 2,
 }  # of these in a search that is only opened, in which the first has the most terms
@@ -117,7 +117,9 @@ class Kinds:
         pool = [guess for guess in self.guesses if guess.held_by == held_by]
         if not pool and kind not in HOLDING:
             pool = [guess for guess in self.guesses if not guess.effects]
-        places = [(guess.values, guess.effects) for guess in pool[:STARTS]] + [(values, ()) for values in others]
+        either = ([guess for guess in pool if guess.of_input is way] for way in (False, True))
+        chosen = [guess for some, most in zip(either, STARTS, strict=True) for guess in some[:most]]
+        places = [(guess.values, guess.effects) for guess in chosen] + [(values, ()) for values in others]
         return [self._model(kind, values, effects) for values, effects in places]
 
     def _model(self, kind: str, values: Mapping[str, float], effects: tuple) -> Model:

@@ -111,6 +111,8 @@ def _paths(where: str, cell: str, folder: Path) -> tuple[str, ...]:
             found = sorted(glob.glob(pattern, root_dir=folder, recursive=True))
         except (RecursionError, re.error) as error:
             raise InputError(f"{where}: {pattern[:80]!r} is no pattern of files ({reason(error)})") from None
+        if len(pattern) > 4096:  # no file system has such a path
+            raise InputError(f"{where}: {pattern[:80]!r} and so on finds no file, a shorter pattern was expected")
         # what finds nothing is a path that is not there: its row says so, the other rows go on
         out += [path + mark + run for path in found] or [part]
     return tuple(out)

@@ -22,7 +22,6 @@ import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
 
-from ers_mj.data.sensor_faults import converter_step
 from ers_mj.errors import InputError
 from ers_mj.proving.concealed.base import between, spells
 from ers_mj.proving.scoring import class_of, scored
@@ -260,11 +259,25 @@ def conceal(
 
 def read(theta: np.ndarray, moved: np.ndarray) -> np.ndarray:
     """What the converter that read theta (N,) makes of another motion (N,)."""
-    step = converter_step(theta)
+    step = lattice(theta)
     if not step:
         return moved
     first = theta[np.isfinite(theta)][0]
     return first + step * np.round((moved - first) / step)
+
+
+def lattice(theta: np.ndarray) -> float:
+    """The step of which the differences of all readings (N,) are multiples, within a tenth; 0 where few repeat."""
+    seen = theta[np.isfinite(theta)]
+    levels = np.unique(seen)
+    if not 3 <= levels.size <= 0.95 * seen.size:
+        return 0.0
+    apart = np.diff(levels)
+    step = float(np.median(apart[apart < 1.5 * np.quantile(apart, 0.05)]))
+    whole = np.round(apart / step)
+    if np.any(whole < 1) or np.mean(np.abs(apart / step - whole) < 0.1) < 0.9:
+        return 0.0
+    return float(np.sum(apart) / np.sum(whole))
 
 
 def lagged(t: np.ndarray, theta: np.ndarray, tau: float) -> np.ndarray:
