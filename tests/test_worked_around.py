@@ -55,6 +55,13 @@ def test_what_a_rail_hides_is_left_out(rail, shape):
     assert from_arrays(t, np.cos(t), y).valid.all()
 
 
+@pytest.mark.parametrize("stop", [0.4, 0.499])
+def test_a_hard_stop_without_noise_is_no_rail(stop):
+    t = 0.01 * np.arange(3000)
+    record = from_arrays(t, np.cos(t), np.clip(0.5 * np.sin(3 * t), -stop, stop))
+    assert record.valid.all() and not record.faults
+
+
 @pytest.mark.parametrize("wave", [lambda t: np.sign(np.sin(60 * t)), lambda t: np.round(2 * np.sin(60 * t))])
 def test_squares_and_steps_are_not_clipped(columns, wave):
     t, _, y = columns.values()

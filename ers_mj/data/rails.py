@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ers_mj.data.sensor_faults import at_extreme, decimal_grain, frozen_spans, held_spans, noise_sigma
+from ers_mj.data.sensor_faults import at_extreme, decimal_grain, dithered, frozen_spans, held_spans, noise_sigma
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Rails:
     """When readings that are the largest of all, or the least, are a rail's though they never rest there for long."""
 
     fewest: int = 20  # of them
-    visits: int = 5  # spells of them, between which noise takes the reading off
+    visits: int = 5  # spells of them, beside which noise takes the reading off: a hard stop of a simulation has none
     crowded: float = 10.0  # times as many as the next reading has
     fine: float = 1.5  # converter's steps that the noise has: a coarser one repeats its readings anyway
 
@@ -36,7 +36,8 @@ def rail_spans(y: np.ndarray, step: float) -> list[slice]:
         rails |= {
             float(level)
             for level, count, beside in ends
-            if count >= max(RAILS.fewest, RAILS.crowded * beside) and len(at[level]) >= RAILS.visits
+            if count >= max(RAILS.fewest, RAILS.crowded * beside)
+            and np.count_nonzero([dithered(y, span) for span in at[level]]) >= RAILS.visits
         }
     return sorted((span for level in rails for span in at[level]), key=lambda span: span.start)
 

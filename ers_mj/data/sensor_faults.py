@@ -97,7 +97,7 @@ def frozen_spans(y: np.ndarray, grid: float) -> list[slice]:
     by_chance = 0.3 if grid else 1 / len(y)  # a grid below the noise repeats up to 28 % of the samples at rest
     repeats = np.clip(np.mean(np.diff(y) == 0), by_chance, 0.9)
     shortest = max(HOLDS.shortest, int(np.ceil(2 * np.log(len(y)) / -np.log(repeats))))
-    return [s for s in held_spans(y, shortest) if _dithered(y, s) and not _rests(y, s, grid)]
+    return [s for s in held_spans(y, shortest) if dithered(y, s) and not _rests(y, s, grid)]
 
 
 def unmoved_spans(y: np.ndarray, grid: float, sigma: float) -> list[slice]:
@@ -155,7 +155,7 @@ def repeated_spans(y: np.ndarray, grid: float) -> list[slice]:
     alike, near = (int(np.count_nonzero(some)) for some in (changes == 0.0, changes < (cells + 0.5) * grid))
     if not _is_more_than_chance(alike, near, REPEATS.times / (2 * cells + 1)) or alike > REPEATS.most * y.size:
         return []
-    return [slice(s.start + 1, s.stop) for s in held_spans(y, 2) if _dithered(y, s)]
+    return [slice(s.start + 1, s.stop) for s in held_spans(y, 2) if dithered(y, s)]
 
 
 def _is_more_than_chance(seen: int, of: int, p: float) -> bool:
@@ -194,7 +194,7 @@ def varied(x: np.ndarray, span: slice) -> bool:
     return bool(np.count_nonzero(changes) > 0.5 * len(changes))
 
 
-def _dithered(x: np.ndarray, span: slice) -> bool:
+def dithered(x: np.ndarray, span: slice) -> bool:
     """Whether x jerks to and fro on both sides of a span, as noise does whatever the motion under it (4 in 5 turns)."""
     jerks = [np.diff(change, n=2) for change in _around(x, span)]
     return all(np.count_nonzero(jerk[:-1] * jerk[1:] < 0) > 0.4 * max(len(jerk) - 1, 1) for jerk in jerks)

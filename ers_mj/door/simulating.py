@@ -120,7 +120,7 @@ class Simulation:
         from ers_mj.report.notebook import simulation_page
 
         units = self.input_unit, self.output_unit
-        return framed(simulation_page(repr(self)[1:-1], self.t, self.u, self.theta, units), 420)
+        return framed(simulation_page(repr(self)[1:-1], self.t, self.u, self.theta, units), 460)
 
 
 def simulate(
