@@ -113,14 +113,19 @@ class Kinds:
 
     def models(self, kind: str, others: Iterable[Mapping[str, float]] = ()) -> list[Model]:
         """The most promising guesses of a kind, prepared, and others."""
-        held_by = kind if kind in (*HOLDING, "preload") else "spring"
-        pool = [guess for guess in self.guesses if guess.held_by == held_by]
-        if not pool and kind not in HOLDING:
-            pool = [guess for guess in self.guesses if not guess.effects]
+        pool = self._pool(kind)
         either = ([guess for guess in pool if guess.of_input is way] for way in (False, True))
         chosen = [guess for some, most in zip(either, STARTS, strict=True) for guess in some[:most]]
         places = [(guess.values, guess.effects) for guess in chosen] + [(values, ()) for values in others]
         return [self._model(kind, values, effects) for values, effects in places]
+
+    def _pool(self, kind: str) -> list[Guess]:
+        """The guesses that a kind can begin from."""
+        held_by = kind if kind in (*HOLDING, "preload") else "spring"
+        pool = [guess for guess in self.guesses if guess.held_by == held_by]
+        if pool or kind in HOLDING:
+            return pool
+        return [guess for guess in self.guesses if not guess.effects]
 
     def _model(self, kind: str, values: Mapping[str, float], effects: tuple) -> Model:
         prepared = self.prepared(kind, values)

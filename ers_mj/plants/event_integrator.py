@@ -30,7 +30,6 @@ from ers_mj.plants.events import (
     violation,
 )
 from ers_mj.plants.falling import charged, fallen
-from ers_mj.plants.flow import is_linear
 from ers_mj.plants.laws import remember
 from ers_mj.plants.maps import one_body_segment, two_body_segment
 from ers_mj.plants.modes import corrected, start_mode, start_state
@@ -89,7 +88,7 @@ def _smooth_step(c, t, x, m, drive, tau, a_emf, left, dt, h_max):
     speed turns twice within it.
     """
     h = left if m.s == 0 and c.two_body <= 0 else min(left, h_max)
-    span = h if is_linear(c, m) and expand(c, x, m, drive, tau, a_emf, h) else 0.0
+    span = h if expand(c, t, x, m, drive, tau, a_emf, h) else 0.0
     z = state_after(c, t, x, m, drive, tau, a_emf, span, h)
     while h > dt / 40 and turns(c, t, x, z, m, drive, tau, a_emf, h):
         h *= 0.25
@@ -308,18 +307,6 @@ def _event_budget(c, n, cuts):
 
 
 @inline
-def _is_followed(y, gain, every, k):
-    """Whether the observer corrects the state at sample k."""
-    return gain > 0.0 and k % every == 0 and y[k] == y[k]
-
-
-@inline
-def _until(k, n, gain, every):
-    """The sample up to which no observer corrects what begins at sample k."""
-    return min(n - 1, (k // every + 1) * every) if gain > 0.0 else n - 1
-
-
-@inline
 def _calm(t, u, enable, load, c, cuts, e, k, last, x, m, slips, out):
     """(sample, state) up to which nothing happens from sample k on."""
     if m.s == 0:
@@ -339,14 +326,17 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
     extra = np.nan  # what the laws add where a segment ended that holds no event
     x = start_state(c, x0[0], x0[1], x0[2], 0.5 * (c.c_2_plus + c.c_2_minus))
     m, k = start_mode(c, x), 0
+    due = 0 if gain > 0.0 else n  # the sample at which the observer looks next
     written(out, 0, c, x)
     while k < n - 1:
         remember(c, x.theta, x.w, x.j, x.theta_m, x.w_m, t[k + 1] - t[k])
-        if _is_followed(y, gain, every, k):
-            resting, extra = -1, np.nan
-            x, m = corrected(c, t[k], x, m, gain * (y[k] - x.theta))
+        if k == due:
+            due += every
+            if y[k] == y[k]:
+                resting, extra = -1, np.nan
+                x, m = corrected(c, t[k], x, m, gain * (y[k] - x.theta))
         if plain and is_free(c, t[k], x, m):
-            calm, x = _calm(t, u, enable, load, c, cuts, maps.late, k, _until(k, n, gain, every), x, m, slips, out)
+            calm, x = _calm(t, u, enable, load, c, cuts, maps.late, k, min(n - 1, due), x, m, slips, out)
             if calm > k:
                 resting, extra, k = -1, np.nan, calm
                 continue

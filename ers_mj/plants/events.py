@@ -200,10 +200,18 @@ def _narrow(e, c, t, x, m, drive, tau, a_emf, span, dt):
     return low, g_low
 
 
+@inline
+def _kept(ratio):
+    """Share of the value at an end of a bracket to go on with where the other end has moved twice (Anderson and Bjorck,
+    BIT 13, 1973).
+    """
+    return 1.0 - ratio if ratio < 1.0 else 0.5
+
+
 @unit(types.Tuple((F, X))(N, C, F, X, M, F, F, F, F, F, F))
 def locate(e, c, t, x, m, drive, tau, a_emf, span, dt, g_end):
-    """First instant in (0, dt] where event function e vanishes (Illinois method on the flow), and the state there, just
-    beyond: short of it a contact would be lost again as soon as it is made.
+    """First instant in (0, dt] where event function e vanishes (Anderson and Bjorck's method on the flow), and the state
+    there, just beyond: short of it a contact would be lost again as soon as it is made.
     """
     low, g_low = _narrow(e, c, t, x, m, drive, tau, a_emf, span, dt)
     if g_low >= 0.0:
@@ -216,15 +224,13 @@ def locate(e, c, t, x, m, drive, tau, a_emf, span, dt, g_end):
         if 0.0 <= g <= 1e-11 * g_end:
             return at, z
         if g > 0:
-            high, g_high = at, g
             if side == 1:
-                g_low *= 0.5
-            side = 1
+                g_low *= _kept(g / g_high)
+            high, g_high, side = at, g, 1
         else:
-            low, g_low = at, g
             if side == -1:
-                g_high *= 0.5
-            side = -1
+                g_high *= _kept(g / g_low)
+            low, g_low, side = at, g, -1
         if high - low < 1e-14:
             break
     return high, state_after(c, t, x, m, drive, tau, a_emf, span, high)

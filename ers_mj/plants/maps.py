@@ -8,11 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from ers_mj.plants.compiled import compiled, inline, inline_as, unit
-from ers_mj.plants.flow import flow, linear
+from ers_mj.plants.flow import NONE, flow, linear, parabola
 from ers_mj.plants.forces import TRIPLE, beside, extra
 from ers_mj.plants.state import C, F, L, M, Mode, N, State, X, bends, has_bristle, types
 
-GAUSS_X, GAUSS_W = (0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(10)[1])
 # columns of a map: x, a constant, the drive, the side, then a force as a parabola 1, s, s^2 on the rudder, between the
 # bodies, on the motor
 CONSTANT, DRIVE, SIDE = range(5, 8)
@@ -21,16 +20,17 @@ MODES_APART = 27  # of s, s_m and twist
 MAPS = F[:, :, ::1]  # (54, 5, 17), see no_maps
 
 
-@unit(types.void(MAPS, N, N, C, M, F, F, F, X))
-def _add_parabola(e, n, column, c, m, tau, a_emf, h, push):
-    """Add what the accelerations ``push`` of a unit force as 1, s, s^2 (s = t/h) do over h, by Gauss's rule."""
-    for g in range(GAUSS_X.size):
-        z = linear(c, push, m, 0.0, tau, a_emf, h * (1.0 - GAUSS_X[g]), 0.0, 0.0, 0.0)
+@inline
+def _add_parabola(e, n, column, c, m, tau, a_emf, h, of_rudder, of_motor):
+    """Fill in what a force as 1, s, s^2 (s = t/h) does over h, so much of it on the rudder and on the motor."""
+    zero = State(0.0, 0.0, 0.0, 0.0, 0.0)
+    for k in range(3):
+        f = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
+        r = (of_motor * f[0], of_motor * f[1], of_motor * f[2])
+        f = (of_rudder * f[0], of_rudder * f[1], of_rudder * f[2])
+        z = linear(c, zero, m, 0.0, tau, a_emf, h, 0.0, f, r)
         for i in range(5):
-            v = z[i] * h * GAUSS_W[g]
-            e[n, i, column] += v
-            e[n, i, column + 1] += v * GAUSS_X[g]
-            e[n, i, column + 2] += v * GAUSS_X[g] ** 2
+            e[n, i, column + k] = z[i]
 
 
 @inline
@@ -52,24 +52,22 @@ def fill_map(e, n, c, m, tau, a_emf, h, driven):
     motor where it is ``driven`` by laws.
     """
     zero = State(0.0, 0.0, 0.0, 0.0, 0.0)
-    base = linear(c, zero, m, 0.0, tau, a_emf, h, 1.0, 0.0, 0.0)
-    pull = linear(c, zero, m, 1.0, tau, a_emf, h, 1.0, 0.0, 0.0)
+    base = linear(c, zero, m, 0.0, tau, a_emf, h, 1.0, NONE, NONE)
+    pull = linear(c, zero, m, 1.0, tau, a_emf, h, 1.0, NONE, NONE)
     for k in range(5):
-        z = linear(c, _one(k), m, 0.0, tau, a_emf, h, 0.0, 0.0, 0.0)
+        z = linear(c, _one(k), m, 0.0, tau, a_emf, h, 0.0, NONE, NONE)
         for i in range(5):
             e[n, i, k] = z[i]
     for i in range(5):
         e[n, i, CONSTANT], e[n, i, DRIVE] = base[i], pull[i] - base[i]
         for k in range(ON_RUDDER, COLUMNS):
             e[n, i, k] = 0.0
-    of_rudder = 1.0 / (1.0 - c.rho if c.two_body > 0 else 1.0)
     if m.s != 0:
-        _add_parabola(e, n, ON_RUDDER, c, m, tau, a_emf, h, State(0.0, of_rudder, 0.0, 0.0, 0.0))
+        _add_parabola(e, n, ON_RUDDER, c, m, tau, a_emf, h, 1.0, 0.0)
     if c.harden > 0:
-        push = State(0.0, of_rudder if m.s != 0 else 0.0, 0.0, 0.0, -1.0 / c.rho if m.s_m != 0 else 0.0)
-        _add_parabola(e, n, BETWEEN, c, m, tau, a_emf, h, push)
+        _add_parabola(e, n, BETWEEN, c, m, tau, a_emf, h, 1.0, -1.0)
     if driven and m.s_m != 0:
-        _add_parabola(e, n, ON_MOTOR, c, m, tau, a_emf, h, State(0.0, 0.0, 0.0, 0.0, 1.0 / c.rho))
+        _add_parabola(e, n, ON_MOTOR, c, m, tau, a_emf, h, 0.0, 1.0)
     for i in range(5):
         e[n, i, SIDE] = -c.c_1 * e[n, i, ON_RUDDER]
 
@@ -169,12 +167,6 @@ def _mapped_parted(e, n, x, drive, side, f, q, r):
 
 
 @inline
-def _parabola(begin, middle, end):
-    """(3,) of a force over a segment, from its values at three instants."""
-    return begin, 4.0 * middle - 3.0 * begin - end, 2.0 * (end - 2.0 * middle + begin)
-
-
-@inline
 def _rising(begin, middle):
     """(3,) of a force that goes on as it began."""
     return begin, 2.0 * (middle - begin), 0.0
@@ -199,7 +191,7 @@ def one_body_segment(e, step, c, t, x, m, drive, tau, a_emf, load, h, extra_now)
     z = _mapped_one(e, n + MODES_APART, x, drive, m.side, _constant(begin))
     middle = load + extra(c, load, t + 0.5 * h, z, m.s)
     end = extra(c, load, t + h, _mapped_one(e, n, x, drive, m.side, _rising(begin, middle)), m.s)
-    return _mapped_one(e, n, x, drive, m.side, _parabola(begin, middle, load + end)), end
+    return _mapped_one(e, n, x, drive, m.side, parabola(begin, middle, load + end)), end
 
 
 @unit(X(MAPS, N, C, F, X, M, F, F, F))
@@ -210,7 +202,7 @@ def _parted_segment(e, n, c, t, x, m, drive, load, h):
     f_a, q_a, r_a = beside(c, load, t + 0.5 * h, z, m)
     z = _mapped_parted(e, n, x, drive, m.side, _rising(f, f_a), _rising(q, q_a), _rising(r, r_a))
     f_b, q_b, r_b = beside(c, load, t + h, z, m)
-    f, q, r = _parabola(f, f_a, f_b), _parabola(q, q_a, q_b), _parabola(r, r_a, r_b)
+    f, q, r = parabola(f, f_a, f_b), parabola(q, q_a, q_b), parabola(r, r_a, r_b)
     return _mapped_parted(e, n, x, drive, m.side, f, q, r)
 
 
@@ -223,7 +215,7 @@ def _bristle_segment(e, n, c, t, x, m, drive, load, h):
     )
     z = _mapped_two(e, n, x, drive, m.side, _rising(begin, middle))
     end = load + extra(c, load, t + h, z, m.s)
-    return _mapped_two(e, n, x, drive, m.side, _parabola(begin, middle, end))
+    return _mapped_two(e, n, x, drive, m.side, parabola(begin, middle, end))
 
 
 @unit(X(MAPS, F, C, F, X, M, F, F, F, F, F))
