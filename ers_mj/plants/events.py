@@ -210,8 +210,8 @@ def _kept(ratio):
 
 @unit(types.Tuple((F, X))(N, C, F, X, M, F, F, F, F, F, F))
 def locate(e, c, t, x, m, drive, tau, a_emf, span, dt, g_end):
-    """First instant in (0, dt] where event function e vanishes (Anderson and Bjorck's method on the flow), and the state
-    there, just beyond: short of it a contact would be lost again as soon as it is made.
+    """First instant in (0, dt] where event function e vanishes (the method of Anderson and Bjorck on the flow), and the
+    state there, just beyond: short of it a contact would be lost again as soon as it is made.
     """
     low, g_low = _narrow(e, c, t, x, m, drive, tau, a_emf, span, dt)
     if g_low >= 0.0:
