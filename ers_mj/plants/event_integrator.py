@@ -23,6 +23,7 @@ from ers_mj.plants.events import (
     ORDER,
     REVERSAL,
     STOP,
+    Along,
     breakaway,
     locate,
     state_after,
@@ -30,6 +31,7 @@ from ers_mj.plants.events import (
     violation,
 )
 from ers_mj.plants.falling import charged, fallen
+from ers_mj.plants.flow import is_linear
 from ers_mj.plants.laws import remember
 from ers_mj.plants.maps import one_body_segment, two_body_segment
 from ers_mj.plants.modes import corrected, start_mode, start_state
@@ -83,27 +85,35 @@ class Sample(NamedTuple):
 
 
 @inline
-def _smooth_step(c, t, x, m, drive, tau, a_emf, left, dt, h_max):
-    """(length, state after it, span of the expansion that holds it or 0) of a step within the mode, shortened where the
-    speed turns twice within it.
+def _expanded_over(c, t, x, m, drive, tau, a_emf, left, h):
+    """The span of an expansion from x: all that is left of a segment, where no law acts, or the step h of it; 0 where
+    there is none.
     """
-    h = left if m.s == 0 and c.two_body <= 0 else min(left, h_max)
-    span = h if expand(c, t, x, m, drive, tau, a_emf, h) else 0.0
-    z = state_after(c, t, x, m, drive, tau, a_emf, span, h)
-    while h > dt / 40 and turns(c, t, x, z, m, drive, tau, a_emf, h):
-        h *= 0.25
-        z = state_after(c, t, x, m, drive, tau, a_emf, span, h)
-    return h, z, span
+    if h < left and is_linear(c, m) and expand(c, t, x, m, drive, tau, a_emf, left):
+        return left
+    return h if expand(c, t, x, m, drive, tau, a_emf, h) else 0.0
 
 
 @inline
-def _first_event(c, t, x, z, m, drive, tau, a_emf, span, h):
+def _smooth_step(c, t, x, m, drive, tau, a_emf, along, h, dt):
+    """(length, state after it) of a step of at most h within the mode, shortened where the speed turns twice within
+    it.
+    """
+    z = state_after(c, t, x, m, drive, tau, a_emf, along, h)
+    while h > dt / 40 and turns(c, t, x, z, m, drive, tau, a_emf, h):
+        h *= 0.25
+        z = state_after(c, t, x, m, drive, tau, a_emf, along, h)
+    return h, z
+
+
+@inline
+def _first_event(c, t, x, z, m, drive, tau, a_emf, along, h):
     """(event, time after t, state then) of what happens first within h, which ends in z: -1 where nothing does."""
     first, event = h, -1
     for e in ORDER:
         g = violation(e, c, t + first, z, m)
         if g > (ROUNDING if e == CROSSING or e == STOP or e == CONTACT else 0.0):
-            first, z = locate(e, c, t, x, m, drive, tau, a_emf, span, first, g)
+            first, z = locate(e, c, t, x, m, drive, tau, a_emf, along, first, g)
             event = e
     return event, first, z
 
@@ -121,14 +131,17 @@ def advance(c, t, x, m, drive, tau, a_emf, dt, h_max, corner):
         x = with_drive(c, x, drive, tau, a_emf)
         if m.s == 0 and breakaway(c, t, x, m) > 0:
             x, m = switch(BREAKAWAY, c, t, x, m, corner)
-    left, events = dt, 0
+    left, events, along = dt, 0, Along(0.0, 0.0)
     while left > 1e-13 * dt:
-        h, z, span = _smooth_step(c, t, x, m, drive, tau, a_emf, left, dt, h_max)
-        event, first, z = _first_event(c, t, x, z, m, drive, tau, a_emf, span, h)
+        h = left if m.s == 0 and c.two_body <= 0 else min(left, h_max)
+        if along.begun + h > along.span * (1.0 + 1e-12):
+            along = Along(_expanded_over(c, t, x, m, drive, tau, a_emf, left, h), 0.0)
+        h, z = _smooth_step(c, t, x, m, drive, tau, a_emf, along, h, dt)
+        event, first, z = _first_event(c, t, x, z, m, drive, tau, a_emf, along, h)
         if event < 0:
-            x = z
+            x, along = z, Along(along.span, along.begun + h)
         else:
-            events += 1
+            events, along = events + 1, Along(0.0, 0.0)
             x, new = switch(event, c, t + first, z, m, corner)
             tires = events > RELEASE_LIMIT and (event == REVERSAL or event == BREAKAWAY)
             if tires or (first <= 0.0 and event == REVERSAL):

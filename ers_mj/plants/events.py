@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ers_mj.plants.compiled import inline, unit
@@ -174,16 +176,26 @@ def switch(e, c, t, x, m, corner):
     return x, Mode(m.s, m.side, m.stop, m.s_m, side if m.twist == 0 else 0)
 
 
+class Along(NamedTuple):
+    """An expansion of the flow: its span [s], 0 where there is none, and how far into it a state lies."""
+
+    span: float
+    begun: float
+
+
+ALONG = types.NamedUniTuple(F, 2, Along)
+
+
 @inline
-def state_after(c, t, x, m, drive, tau, a_emf, span, h):
-    """The state h after x: of the expansion over ``span`` from there, where there is one."""
-    if span > 0.0:
-        return expanded(c, drive, tau, a_emf, h / span)
+def state_after(c, t, x, m, drive, tau, a_emf, along, h):
+    """The state h after x, which lies along an expansion where there is one."""
+    if along.span > 0.0:
+        return expanded(c, drive, tau, a_emf, (along.begun + h) / along.span)
     return flow(c, t, x, m, drive, tau, a_emf, h)
 
 
 @inline
-def _narrow(e, c, t, x, m, drive, tau, a_emf, span, dt):
+def _narrow(e, c, t, x, m, drive, tau, a_emf, along, dt):
     """(where event function e is negative within dt, its value there), 0 and one not below 0 where it is nowhere.
 
     A body that has just been released starts on the root that it left; the search then begins where it moves.
@@ -195,7 +207,7 @@ def _narrow(e, c, t, x, m, drive, tau, a_emf, span, dt):
         of_bristle = has_bristle(c) and (e == CROSSING or e == MOTOR_BREAKAWAY)
         if not (is_speed or of_bristle) or low < dt / 200:
             return 0.0, g_low
-        z = state_after(c, t, x, m, drive, tau, a_emf, span, low)
+        z = state_after(c, t, x, m, drive, tau, a_emf, along, low)
         g_low = violation(e, c, t + low, z, m)
     return low, g_low
 
@@ -208,18 +220,18 @@ def _kept(ratio):
     return 1.0 - ratio if ratio < 1.0 else 0.5
 
 
-@unit(types.Tuple((F, X))(N, C, F, X, M, F, F, F, F, F, F))
-def locate(e, c, t, x, m, drive, tau, a_emf, span, dt, g_end):
+@unit(types.Tuple((F, X))(N, C, F, X, M, F, F, F, ALONG, F, F))
+def locate(e, c, t, x, m, drive, tau, a_emf, along, dt, g_end):
     """First instant in (0, dt] where event function e vanishes (the method of Anderson and Bjorck on the flow), and the
     state there, just beyond: short of it a contact would be lost again as soon as it is made.
     """
-    low, g_low = _narrow(e, c, t, x, m, drive, tau, a_emf, span, dt)
+    low, g_low = _narrow(e, c, t, x, m, drive, tau, a_emf, along, dt)
     if g_low >= 0.0:
         return 0.0, x
     high, g_high, side = dt, g_end, 0
     for _ in range(60):
         at = high - g_high * (high - low) / (g_high - g_low)
-        z = state_after(c, t, x, m, drive, tau, a_emf, span, at)
+        z = state_after(c, t, x, m, drive, tau, a_emf, along, at)
         g = violation(e, c, t + at, z, m)
         if 0.0 <= g <= 1e-11 * g_end:
             return at, z
@@ -233,4 +245,4 @@ def locate(e, c, t, x, m, drive, tau, a_emf, span, dt, g_end):
             low, g_low, side = at, g, -1
         if high - low < 1e-14:
             break
-    return high, state_after(c, t, x, m, drive, tau, a_emf, span, high)
+    return high, state_after(c, t, x, m, drive, tau, a_emf, along, high)

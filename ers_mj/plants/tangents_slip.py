@@ -150,7 +150,7 @@ def _fed_back(slopes, k, v):
     return slopes[k, 0] * v.a + slopes[k, 1] * v.b + slopes[k, 2] * v.d
 
 
-@unit(CHANGE(MAPS, N, TABLE, N, CHANGE, F, F, F, L, N))
+@inline
 def _slipped(maps, n, slopes, k, v, pull, force, force_1, same, times):
     """The change a sample after v, under forces that go from one to the other and what laws make of it."""
     back = back_1 = _fed_back(slopes, k, v)
@@ -208,6 +208,7 @@ def along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, c_2
     known = Known(0.0, -1, 0)
     most, fastest = limits(path)
     a = b = d = 0.0
+    due = 0 if gain > 0.0 else n  # the sample at which the observer looks next
     for k in range(n):
         out[k, 0], out[k, 1], out[k, 2] = a, b, d
         if k == n - 1:
@@ -216,9 +217,11 @@ def along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, c_2
         remember(c, x.theta, x.w, x.j, x.theta, x.w, h)
         remember(c_2, x.theta, x.w, x.j, x.theta, x.w, h)
         side, side_1 = side_of(c, x.theta), side_of(c, x_1.theta)
+        is_seen = k == due and y[k] == y[k]
+        due += every if k == due else 0
         if is_cornered(c, x):
             a = dc.theta_0
-        elif gain > 0.0 and k % every == 0 and y[k] == y[k]:
+        elif is_seen:
             a += gain * (dy[k] - a)
         drive = pull = tau = a_emf = 0.0
         if enable[k]:
