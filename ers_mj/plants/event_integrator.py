@@ -85,13 +85,16 @@ class Sample(NamedTuple):
 
 
 @inline
-def _expanded_over(c, t, x, m, drive, tau, a_emf, left, h):
-    """The span of an expansion from x: all that is left of a segment, where no law acts, or the step h of it; 0 where
-    there is none.
+def _step_along(c, t, x, m, drive, tau, a_emf, along, left, h_max):
+    """(length of the next step, the expansion along which it goes): the one at hand as far as that goes; else over all
+    that is left of the segment where no law acts, or over the step.
     """
+    h = left if m.s == 0 and c.two_body <= 0 else min(left, h_max)
+    if along.begun + h <= along.span * (1.0 + 1e-12):
+        return h, along
     if h < left and is_linear(c, m) and expand(c, t, x, m, drive, tau, a_emf, left):
-        return left
-    return h if expand(c, t, x, m, drive, tau, a_emf, h) else 0.0
+        return h, Along(left, 0.0)
+    return h, Along(h if expand(c, t, x, m, drive, tau, a_emf, h) else 0.0, 0.0)
 
 
 @inline
@@ -133,9 +136,7 @@ def advance(c, t, x, m, drive, tau, a_emf, dt, h_max, corner):
             x, m = switch(BREAKAWAY, c, t, x, m, corner)
     left, events, along = dt, 0, Along(0.0, 0.0)
     while left > 1e-13 * dt:
-        h = left if m.s == 0 and c.two_body <= 0 else min(left, h_max)
-        if along.begun + h > along.span * (1.0 + 1e-12):
-            along = Along(_expanded_over(c, t, x, m, drive, tau, a_emf, left, h), 0.0)
+        h, along = _step_along(c, t, x, m, drive, tau, a_emf, along, left, h_max)
         h, z = _smooth_step(c, t, x, m, drive, tau, a_emf, along, h, dt)
         event, first, z = _first_event(c, t, x, z, m, drive, tau, a_emf, along, h)
         if event < 0:

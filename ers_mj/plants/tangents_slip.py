@@ -181,6 +181,12 @@ def _after(c, dc, v, z, x, x_1, side, side_1, share, ratio, h):
 
 
 @inline
+def _corrected(c, dc, x, a, dy, gain):
+    """The change of the angle once an observer has moved it towards dy; of theta_0 in the corner."""
+    return dc.theta_0 if is_cornered(c, x) else a + gain * (dy - a)
+
+
+@inline
 def _add_laws(c, dc, differ):
     """Whether what laws add to the force changes with the model."""
     return c.inertias > 0 or c.frictions > 0 and (dc.c_2_plus != 0.0 or dc.c_2_minus != 0.0) or differ
@@ -217,12 +223,8 @@ def along(t, u, du, enable, load, y, dy, path, maps, slopes, gain, every, c, c_2
         remember(c, x.theta, x.w, x.j, x.theta, x.w, h)
         remember(c_2, x.theta, x.w, x.j, x.theta, x.w, h)
         side, side_1 = side_of(c, x.theta), side_of(c, x_1.theta)
-        is_seen = k == due and y[k] == y[k]
+        a = _corrected(c, dc, x, a, dy[k], gain if k == due and y[k] == y[k] else 0.0)
         due += every if k == due else 0
-        if is_cornered(c, x):
-            a = dc.theta_0
-        elif is_seen:
-            a += gain * (dy[k] - a)
         drive = pull = tau = a_emf = 0.0
         if enable[k]:
             drive, tau, a_emf = c.b * u[k], c.tau_e, c.a_emf
