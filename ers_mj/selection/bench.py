@@ -14,6 +14,7 @@ from ers_mj.decisions import explained
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.estimation.fit import Along, fit
 from ers_mj.estimation.objective import Fit
+from ers_mj.estimation.sparse import few_of
 from ers_mj.selection.budget import SEARCH, Budget, Search
 from ers_mj.selection.comparison import Candidate, judged, priced
 from ers_mj.servo.model import Model
@@ -40,6 +41,10 @@ class Bench:
     def without(self, names: Iterable[str]) -> Bench:
         """The bench on which these effects are not looked for either."""
         return replace(self, exclude=(*self.exclude, *names))
+
+    def few(self, base: Fit) -> Bench:
+        """The bench for first steps beside a base: few samples, where that is as far from those as from all."""
+        return replace(self, traces=few_of(base.model, self.traces, self.tau))
 
     @property
     def counts(self) -> np.ndarray:

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 
 from ers_mj.decisions import explained
 from ers_mj.effects import BY_NAME, Effect
-from ers_mj.estimation.fit import Along
+from ers_mj.estimation.fit import Along, fit
 from ers_mj.estimation.jacobian import columns_of
 from ers_mj.estimation.objective import Fit
+from ers_mj.estimation.sparse import few_of
 from ers_mj.selection.comparison import is_clocked, is_dear, kin_of
 from ers_mj.selection.multistart import more_starts
 from ers_mj.selection.refits import Label, Named, Refits, cheapest
@@ -95,17 +96,23 @@ def refit_held_taut(refits: Refits, best: dict[str, Fit], screened: Screened, st
     leader = min(best.values(), key=refits.total, default=None)
     if leader is None or is_dear(base) or not _leaves_much(refits, leader, least):
         return
+
+    def taut(begin: Fit | Begin, steps: int, along: Along) -> Fit:
+        """A fit under such an observer; nothing gives it up."""
+        return fit(begin.model, few, rate=rate, tau=bench.tau, steps=steps, along=along)
+
     names = [name for name in BY_NAME if name not in bench.exclude]
     begun = more_starts(base.model, names, screened.promising(), starts, bench.search)
     rate, quick = bench.search.taut * OBSERVER_RATE, bench.search.quick
-    known = columns_of(base.model, bench.traces, rate)
+    few = few_of(base.model, bench.traces, bench.tau, rate)
+    known = columns_of(base.model, few, rate)
     stages = [
         Stage(
-            lambda item: (item[0], refits.taut(item[1], quick, rate, Along(known=known, renewals=0))),
+            lambda item: (item[0], taut(item[1], quick, Along(known=known, renewals=0))),
             lambda ended: cheapest(ended, bench.search.held),
         ),
         Stage(
-            lambda item: (item[0], refits.taut(item[1], quick, rate, Along(renewals=1))),
+            lambda item: (item[0], taut(item[1], quick, Along(renewals=1))),
             lambda ended: cheapest(ended, bench.search.let_go),
         ),
         Stage(lambda item: (item[0], refits.on(item[1], 6, Along(renewals=1)))),

@@ -8,7 +8,7 @@ from typing import Any
 
 from ers_mj.decisions import explained
 from ers_mj.effects import BY_NAME
-from ers_mj.estimation.fit import Along, fit
+from ers_mj.estimation.fit import Along
 from ers_mj.estimation.objective import Fit
 from ers_mj.selection.bench import Bench
 from ers_mj.selection.comparison import Candidate
@@ -79,10 +79,6 @@ class Refits:
         steps = self.bench.search.quick
         ends = self.mapped(order, lambda begin: self.on(begin, steps, Along(known=begin.known, renewals=0)))
         return {label: min((found for other, found in ends if other == label), key=self.total) for label, _ in starts}
-
-    def taut(self, begin: Fit | Begin, steps: int, rate: float, along: Along) -> Fit:
-        """A fit under an observer of another rate [1/s]; nothing gives it up."""
-        return fit(begin.model, self.bench.traces, rate=rate, tau=self.bench.tau, steps=steps, along=along)
 
     def contending(self, labels: Iterable, ends: Mapping[Any, Fit]) -> list:
         """Those labels that may still be the explanation: all while none explains everything, then the best one's

@@ -16,10 +16,10 @@ from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.jacobian import central_jacobian
 from ers_mj.estimation.objective import Run, residuals
+from ers_mj.estimation.sparse import strides
 from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
-SPARSE = 4e-3  # [s] between the samples that tell a share to first order
 MOST = 0.5  # of what is left, in the recordings by which starts are chosen
 # [sigma] from which a tangent has left its motion, as those of a stiff bristle may, and promises nothing
 RUNAWAY = 1e12
@@ -106,16 +106,15 @@ class View:
         return View(Run(place, self.run.left[rows], motions), fewer, [self.traces[k] for k in records], self.search)
 
     def sparse(self) -> View:
-        """The view with samples SPARSE apart, where they are uniform: enough to choose by among many waves. (Of a
-        friction that follows the current the first order tells nothing at such samples.)
+        """The view with few samples (see estimation.sparse): enough to choose by among many waves. (Of a friction that
+        follows the current the first order tells nothing at such samples.)
         """
-        strides = [max(1, int(SPARSE / t.sample_time + 0.01)) if t.is_uniform else 1 for t in self.traces]
-        strides = [max(1, n - n % trace.refresh) for n, trace in zip(strides, self.traces, strict=True)]
-        if max(strides) == 1:
+        apart = strides(self.traces)
+        if max(apart) == 1:
             return self
         begins = np.cumsum([0, *(trace.rows for trace in self.traces)])
         rows, shares = [], []
-        for begin, stride, trace in zip(begins, strides, self.traces):
+        for begin, stride, trace in zip(begins, apart, self.traces):
             some = np.arange(begin, begin + trace.rows).reshape(-1, trace.t.size)[:, ::stride].ravel()
             rows.append(some)
             shares.append(np.full(some.size, math.sqrt(stride)))
@@ -124,9 +123,9 @@ class View:
             _target(t.root[kept] * weight, t.basis[kept] @ t.slopes * weight[:, None], t.residual[kept] * weight)
             for t in self.targets
         ]
-        motions = tuple(np.ascontiguousarray(motion[::stride]) for motion, stride in zip(self.run.motions, strides))
+        motions = tuple(np.ascontiguousarray(motion[::stride]) for motion, stride in zip(self.run.motions, apart))
         run = Run(self.place, self.run.left[kept], motions)
-        return View(run, fewer, [t.sparse(stride) for t, stride in zip(self.traces, strides)], self.search)
+        return View(run, fewer, [t.sparse(stride) for t, stride in zip(self.traces, apart)], self.search)
 
 
 def _target(root: np.ndarray, slopes: np.ndarray, residual: np.ndarray) -> Target:

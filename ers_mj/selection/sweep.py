@@ -51,9 +51,9 @@ def swept(
     end at their bounds is none: a shaft of 1000 Hz without a resonance. With ``hops`` a refit does not rest in the
     first local minimum of C. Beside a bristle, where a refit takes long, every other start will do.
     """
-    search, known, best = bench.search, {c.name: c.gain for c in ranked}, []
+    search, known, best, few = bench.search, {c.name: c.gain for c in ranked}, [], bench.few(base)
     stages = [
-        Stage(lambda item: bench.fit(item.model, search.sweep_glance), lambda e: _nearest(e, search.go_on)),
+        Stage(lambda item: few.fit(item.model, search.sweep_glance), lambda e: _nearest(e, search.go_on)),
         Stage(lambda item: bench.fit(item.model, search.sweep - search.sweep_glance)),
     ]
     for name, begun in _begun(bench, base, kinds).items():

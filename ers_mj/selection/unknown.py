@@ -20,6 +20,7 @@ from ers_mj.decisions.thresholds import Policy
 from ers_mj.effects import BY_NAME, TABLES
 from ers_mj.estimation.fit import fit
 from ers_mj.estimation.objective import Fit
+from ers_mj.estimation.sparse import few_of
 from ers_mj.selection.cross_validation import Fold, Score, pooled, recalibrated, refits, scored
 from ers_mj.selection.measure import Measure
 from ers_mj.servo.model import Model
@@ -57,9 +58,12 @@ def unknown(
     """Tables beside an answer, whose ``models`` of each part have not seen what is held out there; None where nothing
     buys its price, or held-out data does not confirm it.
     """
-    found = _grown(fit(answer, traces, tau=tau, steps=STEPS), traces, tau)
+    few = few_of(answer, traces, tau)
+    found = _grown(fit(answer, few, tau=tau, steps=STEPS), few, tau)
     if not any(name in TABLES for name in found.model.names):
         return None
+    if few is not traces:
+        found = fit(found.model, traces, tau=tau, steps=STEPS)
     if measure.window_s is not None:  # what is scored as it drifts is fitted over as long
         found = fit(found.model, traces, tau=tau, rate=1.0 / measure.window_s, steps=STEPS)
     with_it = refits(found.model, parts, tau, 1)
