@@ -5,6 +5,7 @@ in between, where a model is as far from those as from all.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ers_mj.data.prepared import Trace
 from ers_mj.estimation.objective import cost_of, is_rough
@@ -30,5 +31,6 @@ def few_of(model: Model, traces: Sequence[Trace], tau: float, rate: float = OBSE
     if max(apart) == 1 or is_rough(traces):
         return traces
     few = [trace.sparse(stride) for trace, stride in zip(traces, apart, strict=True)]
-    whole = cost_of(model, traces, rate, tau)
-    return few if abs(cost_of(model, few, rate, tau) - whole) <= ALIKE * whole else traces
+    asked = replace(model, effort=None)  # no search pays for what is asked before it
+    whole = cost_of(asked, traces, rate, tau)
+    return few if abs(cost_of(asked, few, rate, tau) - whole) <= ALIKE * whole else traces
