@@ -14,6 +14,7 @@ from ers_mj.decisions.confirmation import (
     is_no_closer,
     is_no_size,
     is_none_together,
+    is_one_of_many,
     paired_p,
     pays,
 )
@@ -107,3 +108,15 @@ def test_the_best_of_many_laws_is_offered_something_by_chance():
     assert paired_p(won) == pytest.approx(least)
     assert paired_p(won, alone=True) == pytest.approx(POLICY.null_alone * least)
     assert paired_p(won, once=True) == pytest.approx(math.exp(-3.0 / POLICY.null_gain_once))
+
+
+def test_what_acts_once_leaves_no_other_moment_as_bad():
+    """Of sixty blocks at the noise one is explained; another one that is as bad beside it speaks of a law instead."""
+    after = np.ones(60)
+    without = after.copy()
+    without[7] = 200.0
+    assert not is_one_of_many(after, without)
+    after[40] = without[40] = 150.0
+    assert is_one_of_many(after, without)
+    after[40] = without[40] = 5.0  # half the logarithm is allowed
+    assert not is_one_of_many(after, without)

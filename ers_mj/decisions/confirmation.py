@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
+from ers_mj.decisions.explained import score
 from ers_mj.decisions.thresholds import POLICY, Policy
 
 # errors with and without an effect, recalibrated [output unit]; None where nothing was recorded on another day
@@ -129,6 +130,14 @@ def table_pays(pairs: Sequence[Pair], trained: Pair, noise: float, policy: Polic
 def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:
     """Whether an interval tells no size: it spans zero, or decades."""
     return low <= 0.0 <= high or max(abs(low), abs(high)) > policy.unsure * min(abs(low), abs(high))
+
+
+def is_one_of_many(after: np.ndarray, without: np.ndarray, policy: Policy = POLICY) -> bool:
+    """Whether an impulse takes from its worst block hardly more than is left in another one, by the misfits (B,) with
+    and without it: a law that is missed is as far off in several, what acts once in one.
+    """
+    left, lost = score(after, 1.0), score(without, 1.0)
+    return bool(left.max() > policy.left_elsewhere * (lost - left).max())
 
 
 def is_none_together(sizes: np.ndarray, spread: np.ndarray) -> bool:

@@ -53,10 +53,11 @@ class Confirmed:
 
 @dataclass
 class Judged:
-    """One effect on held-out data: the models without it, the scores with and without it, by halves of a ``record``
-    where that one teaches most of it, and its p-value.
+    """One effect on held-out data: the model ``less`` it, that of each part, the scores with and without it, by halves
+    of a ``record`` where that one teaches most of it, and its p-value.
     """
 
+    less: Model
     lesser_models: list[Model]
     without: Score
     pair: tuple[Sequence[Score], Sequence[Score]]
@@ -161,7 +162,7 @@ class Court:
         less = bare.model if is_lone else self.without(name, model).model
         lesser_models = bare_models if is_lone else self.refits(less)
         lesser = self.scores(lesser_models)
-        one = Judged(lesser_models, pooled(lesser), (after, lesser), self.p_of(name, after, lesser))
+        one = Judged(less, lesser_models, pooled(lesser), (after, lesser), self.p_of(name, after, lesser))
         doubtful = decisions.is_doubtful(self.numbers(one, after), self.policy)
         if doubtful and not self.held and len(self.start.traces) > 1:
             record, *halved = self._halved(model, less, after, lesser)
@@ -213,9 +214,15 @@ class Court:
             return "its size may be none"
         if may_be_none(name, model, traces, self.tau, policy):
             return "it acts where a recording begins or ends"
+        if BY_NAME[name].once and decisions.is_one_of_many(self._left(model), self._left(one.less), policy):
+            return "what it explains in one moment is left in others"
         if is_a_converters(name, model, traces):
             return "it is within half a step of the converter"
         return "a wave fits any remainder as well" if is_any_wave(name, model, with_it, without, policy) else ""
+
+    def _left(self, model: Model) -> np.ndarray:
+        """What a model leaves in each block (B,) of what was fitted."""
+        return np.concatenate([_misfit(model, trace, k) for k, trace in enumerate(self.start.traces)])
 
     def is_unsure(self, name: str, model: Model, after_models: Sequence[Model]) -> bool:
         """Whether the interval of each size of an effect spans zero, or decades where it has a sign, and those without
