@@ -120,3 +120,5 @@ def test_what_acts_once_leaves_no_other_moment_as_bad():
     assert is_one_of_many(after, without)
     after[40] = without[40] = 5.0  # half the logarithm is allowed
     assert not is_one_of_many(after, without)
+    after[7] = 14.0  # of its own moment, where its form may be another
+    assert not is_one_of_many(after, without)

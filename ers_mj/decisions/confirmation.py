@@ -133,11 +133,13 @@ def is_no_size(low: float, high: float, policy: Policy = POLICY) -> bool:
 
 
 def is_one_of_many(after: np.ndarray, without: np.ndarray, policy: Policy = POLICY) -> bool:
-    """Whether an impulse takes from its worst block hardly more than is left in another one, by the misfits (B,) with
-    and without it: a law that is missed is as far off in several, what acts once in one.
+    """Whether another moment is left nearly as bad as those that an impulse explains were, by the misfits (B,) with and
+    without it: a law that is missed is as far off in several, what acts once in one. What is left of its own moments
+    may be its form.
     """
     left, lost = score(after, 1.0), score(without, 1.0)
-    return bool(left.max() > policy.left_elsewhere * (lost - left).max())
+    own = lost - left >= 0.5 * (lost - left).max()
+    return bool(left[~own].max(initial=0.0) > policy.left_elsewhere * lost[own].max())
 
 
 def is_none_together(sizes: np.ndarray, spread: np.ndarray) -> bool:

@@ -290,7 +290,7 @@ class Policy:
     )
     left_elsewhere: float = _threshold(
         0.5,
-        "share of an impulse's gain in its worst block",
+        "share of ln(1 + misfit) that an impulse takes its worst block from",
         "an impulse for one of many moments in which a law is missed",
         "of seeds 8101 and 8401 four true ones leave 0.05 at most, two false ones 0.75 and more",
     )

@@ -1,6 +1,6 @@
 """The smooth flow between two events. Within a mode the plant itself is linear: a Taylor series to machine precision,
-under forces that are parabolas in time as well. What a bristle that bends does, and laws over steps that are too long
-for a series (see series), takes fourth-order Runge-Kutta steps.
+under forces that are parabolas in time as well. What laws add to one body, what a bristle does that bends and a shaft
+that hardens take fourth-order Runge-Kutta steps; for laws on two bodies see series.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from __future__ import annotations
 from ers_mj.plants.compiled import inline, unit
 from ers_mj.plants.flow import NONE, balance, is_linear, is_small, parabola, steps_of, term_after
 from ers_mj.plants.forces import TRIPLE, beside
-from ers_mj.plants.state import MOST_PIECES, MOST_TERMS, C, F, L, M, State, X, bends, with_drive
+from ers_mj.plants.state import MOST_PIECES, MOST_TERMS, C, F, L, M, State, X, is_parted, with_drive
 
 
 @inline
@@ -77,9 +77,10 @@ def _expand_driven(c, t, x, m, drive, tau, a_emf, span):
 
 @inline
 def expand(c, t, x, m, drive, tau, a_emf, span):
-    """Expand the flow from x over a span [s]; False where there is no expansion of it: of a bristle that bends, of a
-    shaft that hardens, which is as stiff as it is twisted.
+    """Expand the flow from x over a span [s]; False where there is no expansion of it: of one body under laws, which
+    may be stiffer than parabolas bear, of a bristle that bends, of a shaft that hardens, which is as stiff as it is
+    twisted.
     """
     if is_linear(c, m):
         return _expand(c, x, m, drive, tau, a_emf, span, NONE, NONE)
-    return not bends(c, m) and c.harden <= 0 and _expand_driven(c, t, x, m, drive, tau, a_emf, span)
+    return is_parted(c) and c.harden <= 0 and _expand_driven(c, t, x, m, drive, tau, a_emf, span)
