@@ -220,6 +220,7 @@ def test_first_or_second_counts_without_the_rig_s_own_names():
     )
     page = proof_report.proof_page(results | {"failures": []}, rows, {})
     assert "named first or second, the rig&#x27;s own set aside, in 1 of 2" in page.replace("'", "&#x27;")
+    assert "named right" not in page  # which counts first names, where the rig's own stand
 
 
 def test_a_rig_as_it_is_raises_no_false_alarm():

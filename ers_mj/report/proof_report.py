@@ -55,13 +55,17 @@ def headline(results: Mapping) -> str:
     return ("; ".join(parts) or f"{results['cases']} cases were diagnosed") + "."
 
 
+def _counted(results: Mapping, name: str) -> tuple[int, int]:
+    """(how many, of how many) a share is; none of what asks for the first name in real records."""
+    is_hidden = name in OF_THE_FIRST and "concealed_in_real" in results
+    return (0, 0) if is_hidden else results["of"].get(name, (0, 0))
+
+
 def table_of(results: Mapping) -> list[tuple[str, str, str]]:
     """(what, counts, share with interval) a line."""
     out = []
     for name, told in TOLD.items():
-        if name in OF_THE_FIRST and "concealed_in_real" in results:
-            continue
-        k, n = results["of"].get(name, (0, 0))
+        k, n = _counted(results, name)
         if n:
             ends = results["ci95"].get(name)
             out.append((told, f"{k} of {n}", f"{k / n:.2f}" + (f" [{ends[0]:.2f}, {ends[1]:.2f}]" if ends else "")))
@@ -134,7 +138,7 @@ def _tiles(results: Mapping) -> list[tuple[str, str]]:
         ("false_alarm_rate", "false positives"),
         ("unexplained_recall", "unknown effects flagged"),
     ):
-        k, n = results["of"].get(name, (0, 0))
+        k, n = _counted(results, name)
         tiles += [(label, f"{100 * k / n:.0f} %")] if n else []
     over, time = results["error_over_floor"].get("median"), results["cpu_s"].get("median")
     tiles += [("held-out error / noise floor", digits(over))] if over else []
