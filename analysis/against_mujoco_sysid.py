@@ -20,7 +20,7 @@ from ers_mj.data.recording import from_arrays
 from ers_mj.identification.estimate import identify
 from ers_mj.identification.finding import Settings
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.plants.reduced import lumped
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 

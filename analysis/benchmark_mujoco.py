@@ -17,12 +17,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import independent_two_mass
 
 from ers_mj.effects import EFFECTS, Scales
+from ers_mj.plants.bare_gap import MOTOR_SHARE
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.mechanical import MechanicalPlant, simulate_many
-from ers_mj.plants.mjcf import mjcf_folder
-from ers_mj.plants.play import MOTOR_SHARE
+from ers_mj.plants.mujoco.bodies import LINKAGES
+from ers_mj.plants.mujoco.mjcf_folder import mjcf_folder
+from ers_mj.plants.mujoco.plant import MechanicalPlant, simulate_many
 from ers_mj.plants.reduced import ReducedModel, lumped
-from ers_mj.plants.skeletons import LINKAGES
 from ers_mj.servo.datasheet import read_datasheet
 
 T = np.arange(0.0, 10.0, 1e-3)

@@ -28,7 +28,8 @@ COMPILE = """
 import importlib, pkgutil
 import numpy as np
 import ers_mj.plants as plants
-modules = [importlib.import_module(f"ers_mj.plants.{m.name}") for m in pkgutil.iter_modules(plants.__path__)]
+there = pkgutil.walk_packages(plants.__path__, "ers_mj.plants.")
+modules = [importlib.import_module(m.name) for m in there]
 kernels = {id(v): v.piece for m in modules for v in vars(m).values() if hasattr(v, "piece")}
 t = np.linspace(0.0, 0.01, 11)
 from ers_mj.plants.printed_play import PrintedPlay
@@ -36,8 +37,8 @@ from ers_mj.plants.reduced import lumped
 PrintedPlay(lumped({"b": 1.0}), 0.1).simulate(t, t)
 if kernels:
     from ers_mj.effects import EFFECTS
-    from ers_mj.plants.compiled import make
-    from ers_mj.plants.laws import SIGNATURES, acting, laid_out
+    from ers_mj.plants.compiling.compiled import make
+    from ers_mj.plants.kernel.laws import SIGNATURES, acting, laid_out
     for piece in kernels.values():
         make(piece)
     on = acting(tuple(e.name for e in EFFECTS if any(getattr(e, kind) for kind in SIGNATURES)), False)

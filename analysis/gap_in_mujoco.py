@@ -17,7 +17,7 @@ import numpy as np
 from ers_mj.data.recording import from_arrays
 from ers_mj.diagnosis.pipeline import diagnose
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.plants.reduced import lumped
 from ers_mj.servo.datasheet import TABLE_1, Datasheet, read_datasheet
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ers_mj.plants.bare_gap import stiff_play
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.play import stiff_play
 from ers_mj.plants.printed_play import PrintedPlay, printed_threshold
 from ers_mj.plants.reduced import Motion, ReducedModel, lumped
 from ers_mj.servo.datasheet import TABLE_1, read_datasheet

@@ -18,6 +18,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -82,36 +84,44 @@ def compare(cases: list[str], before: str, rounds: int) -> int:
     return 0 if statistics.median(ratios) <= MOST else 1
 
 
-def serial_share(one: float, two: float) -> float:
-    """What share of the time of one thread cannot run side by side, by Amdahl, where two threads take ``two``."""
-    return min(max(2.0 * two / one - 1.0, 0.0), 1.0)
+def serial_share(faster: float, apart: float) -> float:
+    """What share of the time of one thread cannot run side by side, by Amdahl, where two threads are ``faster`` and the
+    machine runs two processes ``apart`` times as fast as one after the other.
+    """
+    return min(max((1.0 / faster - 1.0 / apart) / max(1.0 - 1.0 / apart, 1e-9), 0.0), 1.0)
 
 
 def side_by_side(cases: list[str]) -> int:
-    """Print by the clock what one and two threads take, the start-up aside, and what sixteen would; 1 where two are
-    less than TWICE times as fast.
+    """Print by the clock what one and two threads take, the start-up aside, and what sixteen cores would; 1 where two
+    are less than TWICE times as fast. ``apart`` is what two processes at once gain over one after the other: cores that
+    are two threads of one give less than 2.
     """
 
-    def clocked(*arguments: str) -> float:
+    def clocked(*commands: Sequence[str]) -> float:
         begun = time.perf_counter()
-        taken(ROOT, folder / "cache", list(arguments))
+        with ThreadPoolExecutor(len(commands)) as pool:
+            list(pool.map(lambda command: taken(ROOT, folder / "cache", list(command)), commands))
         return time.perf_counter() - begun
 
     gains = []
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        print(f"{'case':12}{'one':>9}{'two':>9}{'faster':>9}{'serial':>9}{'sixteen':>10}   (bar: {TWICE} times)")
+        columns = f"{'case':12}{'one':>9}{'two':>9}{'faster':>9}{'apart':>9}{'serial':>9}{'sixteen':>10}"
+        print(f"{columns}   (bar: {TWICE} times)")
         for name in cases:
             arguments = case_arguments(CONCEALED / name, folder / "out")
             threads = arguments.index("--jobs") + 1
             both = [[*arguments[:threads], jobs, *arguments[threads + 1 :]] for jobs in ("1", "2")]
-            clocked(*both[0])  # compiles
-            start = min(clocked("diagnose", "--help") for _ in range(3))
-            one, two = (clocked(*each) - start for each in both)
-            serial = serial_share(one, two)
+            clocked(both[0])  # compiles
+            start = min(clocked(["diagnose", "--help"]) for _ in range(3))
+            one, two = (clocked(each) - start for each in both)
+            elsewhere = case_arguments(CONCEALED / name, folder / "other")
+            apart = 2.0 * (one + start) / clocked(both[0], elsewhere)
             gains.append(one / two)
+            serial = serial_share(gains[-1], apart)
             sixteen = 1.0 / (serial + (1.0 - serial) / 16)
-            print(f"{name:12}{one:7.1f} s{two:7.1f} s{gains[-1]:9.2f}{serial:9.2f}{sixteen:10.1f}", flush=True)
+            shares = f"{gains[-1]:9.2f}{apart:9.2f}{serial:9.2f}{sixteen:10.1f}"
+            print(f"{name:12}{one:7.1f} s{two:7.1f} s{shares}", flush=True)
     return 0 if statistics.median(gains) >= TWICE else 1
 
 

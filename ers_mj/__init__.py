@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ers_mj.errors import ErsError as ErsError
     from ers_mj.errors import InputError as InputError
     from ers_mj.errors import MissingPackage as MissingPackage
-    from ers_mj.plants.joint import JointLines as JointLines
+    from ers_mj.plants.mujoco.joint import JointLines as JointLines
     from ers_mj.servo.datasheet import Datasheet as Datasheet
 
 __version__ = "0.1.0"
@@ -66,7 +66,7 @@ _HOMES = {
     "door.simulating": ("Simulation", "simulate"),
     "door.validating": ("Validation", "validate"),
     "errors": ("ErsError", "InputError", "MissingPackage"),
-    "plants.joint": ("JointLines",),
+    "plants.mujoco.joint": ("JointLines",),
     "servo.datasheet": ("Datasheet",),
 }
 

@@ -35,7 +35,7 @@ def test_the_cache_is_shown_and_cleared_of_what_is_ours(tmp_path, monkeypatch, c
     code = tmp_path / "ers_mj" / "code"
     code.mkdir(parents=True, mode=0o700)
     (tmp_path / "ers_mj").chmod(0o700)
-    stem = "ers_mj.plants.calm.rest-0123456789abcdef0123.py311"
+    stem = "ers_mj.plants.kernel.calm.rest-0123456789abcdef0123.py311"
     for name in (f"{stem}.nbi", f"{stem}.1.nbc", "notes.nbi", "thesis.txt"):
         (code / name).write_text("x" * 10)
     assert cli.main(["cache"]) == 0

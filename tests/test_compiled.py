@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 from forked import Warm
 
-from ers_mj.plants.code_folder import refusal
-from ers_mj.plants.digest import digest_of
+from ers_mj.plants.compiling.code_folder import refusal
+from ers_mj.plants.compiling.digest import digest_of
 
 ROOT = Path(__file__).resolve().parents[1]
 SMALL = """
 import sys
 from numba import njit, types
-from ers_mj.plants.compiled import address_of, by_address, inline, kernel, unit
+from ers_mj.plants.compiling.compiled import address_of, by_address, inline, kernel, unit
 
 F = types.float64
 {constant}
@@ -136,7 +136,9 @@ def test_a_callee_may_be_declared_after_its_caller_is_kept(home):
 
 
 def test_the_importing_of_plants_compiles_nothing(home):
-    _, said = run(home, "import ers_mj.plants.event_integrator, ers_mj.plants.reduced, ers_mj.plants.tangents")
+    _, said = run(
+        home, "import ers_mj.plants.kernel.event_integrator, ers_mj.plants.reduced, ers_mj.plants.kernel.tangents"
+    )
     assert not said and not kept(home)
 
 
@@ -272,7 +274,7 @@ def test_a_folder_that_others_may_rename_is_refused(tmp_path):
 
 
 WHERE = (
-    "import small; from ers_mj.plants.code_folder import code_folder; print(small.highest(5.0), "
+    "import small; from ers_mj.plants.compiling.code_folder import code_folder; print(small.highest(5.0), "
     "oct(code_folder().stat().st_mode & 0o777), code_folder())"
 )
 

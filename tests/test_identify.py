@@ -17,7 +17,7 @@ from ers_mj.identification.misfit import forgiven, forgiving
 from ers_mj.identification.precision import precision_of
 from ers_mj.identification.structure import structure_of
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.plants.reduced import lumped
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.simulation import build_plant, simulate_recording

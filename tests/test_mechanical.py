@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from ers_mj.errors import InputError
+from ers_mj.plants.bare_gap import MOTOR_SHARE
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.mechanical import MechanicalPlant, simulate_many
-from ers_mj.plants.play import MOTOR_SHARE
+from ers_mj.plants.mujoco.plant import MechanicalPlant, simulate_many
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import read_datasheet
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ers_mj.errors import InputError
-from ers_mj.plants.mechanical import MechanicalPlant
-from ers_mj.plants.mjcf import mjcf_folder
+from ers_mj.plants.mujoco.mjcf_folder import mjcf_folder
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.plants.reduced import lumped
 from ers_mj.servo.datasheet import TABLE_1, read_datasheet
 

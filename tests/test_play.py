@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ers_mj.plants.bare_gap import MOTOR_SHARE, stiff_play
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.play import MOTOR_SHARE, stiff_play
 from ers_mj.plants.printed_play import PrintedPlay
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.servo.datasheet import read_datasheet

@@ -17,9 +17,9 @@ from ers_mj.effects.presliding import Presliding
 from ers_mj.effects.rate_limit import RateLimit
 from ers_mj.effects.voltage_saturation import VoltageSaturation
 from ers_mj.errors import InputError
-from ers_mj.plants.looped_mujoco import LoopedPlant
-from ers_mj.plants.mechanical import MechanicalPlant
-from ers_mj.position_loop.identified import identify_loop
+from ers_mj.plants.mujoco.looped import LoopedPlant
+from ers_mj.plants.mujoco.plant import MechanicalPlant
+from ers_mj.position_loop.identify import identify_loop
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, runs_of
 from ers_mj.position_loop.saved import looped_plant, model_of, simulate_loop

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from ers_mj.effects import EFFECTS
+from ers_mj.plants.bare_gap import MOTOR_SHARE
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.mechanical import MechanicalPlant
-from ers_mj.plants.play import MOTOR_SHARE
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.plants.reduced import lumped
 from ers_mj.proving import case, plans, quick, recorder, scoring
 from ers_mj.proving.catalogue import CATALOGUE, LISTED
@@ -65,7 +65,7 @@ def test_the_generator_knows_nothing_of_the_effects_folder():
     rooms = {p.relative_to(PACKAGE).parts[0].removesuffix(".py") for p in seen}
     assert rooms <= {"proving", "processes", "plants", "errors", "data", "workers", "__init__"}
     assert {p.name for p in seen if p.parent.name == "data"} <= {"__init__.py", "tables.py", "whole.py"}
-    assert {p.name for p in seen if p.parent.name == "plants"} == {"__init__.py", "mjcf.py"}
+    assert {p.name for p in seen if "plants" in p.relative_to(PACKAGE).parts} == {"__init__.py", "mjcf_folder.py"}
 
 
 def test_effects_are_those_of_the_contract_and_their_subsystems_are_right():

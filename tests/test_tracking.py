@@ -16,8 +16,8 @@ from ers_mj.data.streaming import Stream
 from ers_mj.errors import InputError
 from ers_mj.online.horizon import HORIZON
 from ers_mj.online.moving_horizon import Tracker, opening
+from ers_mj.plants.bare_gap import stiff_play
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.play import stiff_play
 from ers_mj.plants.reduced import ReducedModel, lumped
 from ers_mj.report.watch_report import events, screen, units
 from ers_mj.servo.datasheet import Datasheet, read_datasheet

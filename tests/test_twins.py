@@ -6,9 +6,9 @@ from test_mechanical import EQ_1, EQ_5, SHEET, rms_deg
 from test_reduced import SCALES
 
 from ers_mj.effects import BY_NAME, EFFECTS
+from ers_mj.plants.bare_gap import rigid_play
 from ers_mj.plants.inputs import INPUTS
-from ers_mj.plants.mechanical import MechanicalPlant
-from ers_mj.plants.play import rigid_play
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.plants.reduced import ReducedModel
 
 T = np.arange(0.0, 1.2, 1e-3)

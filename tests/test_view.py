@@ -14,7 +14,7 @@ from ers_mj.data.prepared import trace_of
 from ers_mj.data.recording import from_arrays, read_recording, write_recording
 from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.errors import InputError
-from ers_mj.plants.mjcf import mjcf_folder
+from ers_mj.plants.mujoco.mjcf_folder import mjcf_folder
 from ers_mj.report.diagnosis_report import report_page
 from ers_mj.servo.datasheet import Datasheet, read_datasheet
 from ers_mj.servo.model_file import write_model

@@ -23,7 +23,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Show or clear; 0."""
-    from ers_mj.plants.kept_code import clear, kept
+    from ers_mj.plants.compiling.kept_code import clear, kept
 
     found = clear() if arguments.clear else kept()
     document = {

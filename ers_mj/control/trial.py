@@ -26,7 +26,7 @@ from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import EffectSettings, build_plant
 
 if TYPE_CHECKING:
-    from ers_mj.plants.mechanical import MechanicalPlant
+    from ers_mj.plants.mujoco.plant import MechanicalPlant
 
     Plant = ReducedModel | MechanicalPlant  # what a loop can be closed around
 
@@ -108,7 +108,7 @@ def sampled(plant: Plant, rate_hz: float, start: tuple[float, float]) -> Sampled
         from ers_mj.plants.sampled_reduced import SampledReduced
 
         return SampledReduced(plant, rate_hz, start)
-    from ers_mj.plants.sampled_mujoco import SampledMuJoCo
+    from ers_mj.plants.mujoco.sampled import SampledMuJoCo
 
     return SampledMuJoCo(plant, rate_hz, start)
 

@@ -29,8 +29,8 @@ from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
-from ers_mj.plants.looped_mujoco import LoopedPlant
-from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.mujoco.looped import LoopedPlant
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.selection.comparison import kin_of
 from ers_mj.selection.confirmation import delta_bic
 from ers_mj.selection.cross_validation import pooled

@@ -11,9 +11,9 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 from ers_mj.estimation.initial_state import fitted_start
-from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.mujoco.bodies import bodily
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.plants.reduced import lumped
-from ers_mj.plants.skeletons import bodily
 from ers_mj.selection.cross_validation import Fold
 from ers_mj.servo.model import Model
 

@@ -18,7 +18,7 @@ from ers_mj.data.recording import Recording
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.document import Diagnosis, told
-from ers_mj.diagnosis.loop_pipeline import diagnose_loop
+from ers_mj.diagnosis.loop.pipeline import diagnose_loop
 from ers_mj.diagnosis.mujoco_check import Rig
 from ers_mj.diagnosis.unexcited import is_unexcited
 from ers_mj.effects import BY_NAME, SUSPECTS

@@ -10,7 +10,7 @@ from typing import Any, TypedDict, Unpack
 from threadpoolctl import threadpool_limits
 
 from ers_mj.data.recording import Recording
-from ers_mj.diagnosis.loop_rows import improved, parameters
+from ers_mj.diagnosis.loop.rows import improved, parameters
 from ers_mj.door.known import Known, known_plant
 from ers_mj.door.model import Model
 from ers_mj.door.reading import Given, recordings_of
@@ -21,8 +21,8 @@ from ers_mj.errors import InputError, refuse_other
 from ers_mj.identification import estimate
 from ers_mj.identification.answer import Identified
 from ers_mj.identification.finding import BUDGET, Settings
-from ers_mj.position_loop.identified import Identified as LoopFound
-from ers_mj.position_loop.identified import identify_loop
+from ers_mj.position_loop.identify import Identified as LoopFound
+from ers_mj.position_loop.identify import identify_loop
 from ers_mj.servo.model_file import write_model
 
 

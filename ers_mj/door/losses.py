@@ -9,8 +9,8 @@ from ers_mj.effects import BY_NAME
 from ers_mj.errors import refuse_other
 
 if TYPE_CHECKING:
-    from ers_mj.plants.joint import JointLines
-    from ers_mj.plants.mechanical import MechanicalPlant
+    from ers_mj.plants.mujoco.joint import JointLines
+    from ers_mj.plants.mujoco.plant import MechanicalPlant
     from ers_mj.plants.reduced import ReducedModel
 
 TARGETS = ("control", "nonlinear", "mujoco", "joint")

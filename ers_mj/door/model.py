@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from ers_mj.control.stepping import Stepper
     from ers_mj.door.exporting import Exported
     from ers_mj.export.servo import Servo
-    from ers_mj.plants.joint import JointLines
-    from ers_mj.plants.mechanical import MechanicalPlant
+    from ers_mj.plants.mujoco.joint import JointLines
+    from ers_mj.plants.mujoco.plant import MechanicalPlant
     from ers_mj.plants.reduced import ReducedModel
 
 
@@ -277,7 +277,7 @@ class Model:
             >>> lines.joint["armature"], lines.actuator["gear"]
             (0.0031, 0.25132258064516133)
         """
-        from ers_mj.plants.joint import joint_lines
+        from ers_mj.plants.mujoco.joint import joint_lines
 
         J = self._datasheet.parameters.get("J") if inertia is None else inertia
         if J is None:

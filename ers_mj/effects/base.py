@@ -1,6 +1,7 @@
 """What every missing-physics effect declares.
 
-An effect is one file in this folder. Where it acts is its base class, in the order the signal travels:
+An effect is one file in this folder, found by itself; one that may act behind a firmware's loop as well is listed in
+`position_loop/terms.py`. Where it acts is its base class, in the order the signal travels:
 :class:`Drive` -> :class:`Transmission` -> :class:`Load` / :class:`Friction` -> :class:`Sensor`.
 
 Laws work on the lumped model of Eq. (6): every torque is divided by the inertia J, so that a *torque* parameter
@@ -66,7 +67,7 @@ class Effect:
     )
     tries: ClassVar[int] = 1  # starts, the best of the screening first, from which the effect is refitted
     tangible: ClassVar[bool] = (
-        True  # whether tangents of a motion tell what its own numbers do to it (see plants/tangents.py)
+        True  # whether tangents of a motion tell what its own numbers do to it (see plants/kernel/tangents.py)
     )
     dear: ClassVar[bool] = (
         False  # a simulation takes many times as long as others: refitted only where it promises most

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ers_mj.export.mujoco_joint import PER_INERTIA, WEIGHTS, OwnJoint
 from ers_mj.export.servo import Servo
-from ers_mj.plants.joint import FAR
+from ers_mj.plants.mujoco.joint import FAR
 
 
 @dataclass(frozen=True)

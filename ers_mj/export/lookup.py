@@ -18,7 +18,7 @@ from ers_mj.effects import BY_NAME, Effect
 from ers_mj.export.base import Target, Written
 from ers_mj.export.portable import Portable, bare
 from ers_mj.export.servo import Servo
-from ers_mj.plants.looped_mujoco import firmware_alone
+from ers_mj.plants.mujoco.looped import firmware_alone
 
 SPEEDS = np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 120)])  # of a table, as shares of its largest
 FASTEST, WIDEST = 30.0, math.pi  # [rad/s] and [rad] to either side of tables; as many output units where it is no angle

@@ -12,8 +12,8 @@ from ers_mj.export.base import Target, Written
 from ers_mj.export.portable import Portable, bare, clipping
 from ers_mj.export.servo import Servo
 from ers_mj.export.trying import apart, excitation, response
-from ers_mj.plants.joint import JointLines, clip_of, joint_lines, pushed
-from ers_mj.plants.looped_mujoco import firmware_alone
+from ers_mj.plants.mujoco.joint import JointLines, clip_of, joint_lines, pushed
+from ers_mj.plants.mujoco.looped import firmware_alone
 
 TIMESTEP = 5e-4  # [s] of the file
 NEGLIGIBLE = 1e-6  # of the joint's inertia that its body has itself, so that the armature is J

@@ -16,9 +16,9 @@ from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import LEAST_IRON, Effect
 from ers_mj.effects.presliding import Presliding
 from ers_mj.effects.quantities import Coefficients
-from ers_mj.export import scheme
+from ers_mj.export import stepping
 from ers_mj.export.translation import renamed
-from ers_mj.plants.laws import MEMORY
+from ers_mj.plants.kernel.laws import MEMORY
 from ers_mj.plants.position_loop import LoopNumbers
 from ers_mj.plants.reduced import lowered
 
@@ -78,7 +78,7 @@ class Portable:
     @property
     def text(self) -> str:
         """Scheme and laws, as Python."""
-        return scheme.text() + "\n\n\n" + self.laws
+        return stepping.text() + "\n\n\n" + self.laws
 
     @property
     def tables(self) -> dict[str, np.ndarray]:

@@ -17,7 +17,7 @@ from ers_mj.identification.minimisers.ls import MULTISTART
 from ers_mj.identification.misfit import Misfit, Search, Simulator, structure_at
 from ers_mj.identification.structure import Structure
 from ers_mj.identification.unknowns import FACTORS, Unknowns
-from ers_mj.plants.mechanical import TIMESTEP
+from ers_mj.plants.mujoco.plant import TIMESTEP
 
 BUDGET = {"reduced": 10_000, "mujoco": 400}  # evaluations at most where none is asked for
 

@@ -9,9 +9,9 @@ import numpy as np
 from ers_mj.data.prepared import Trace
 from ers_mj.identification.misfit import Simulator
 from ers_mj.identification.unknowns import Unknowns
-from ers_mj.plants.mechanical import TIMESTEP, MechanicalPlant, simulate_many
+from ers_mj.plants.mujoco.bodies import bodily
+from ers_mj.plants.mujoco.plant import TIMESTEP, MechanicalPlant, simulate_many
 from ers_mj.plants.reduced import Motion, lumped
-from ers_mj.plants.skeletons import bodily
 from ers_mj.servo.model import observer_gain
 
 

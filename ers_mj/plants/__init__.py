@@ -1,9 +1,9 @@
 """The electric rudder system as models that turn voltages into motion.
 
-reduced      Eq. (1)/(5)/(6) with effects: event_integrator (the event-exact main loop) over flow, events, modes and
-             maps; fixed_steps where a shaft twists beside a bristle; tangents (how a motion changes with the model)
-mechanical   MuJoCo: skeletons, staging and writing make the MJCF, mujoco_stepping runs it
-compiled     what numba makes of both: pieces called by symbol, laws by address (laws), kept in code_folder
+reduced     Eq. (1)/(5)/(6) with effects, by the event-exact integrator of kernel/; sampled_reduced a sample at a time
+mujoco/     the same plant as MJCF, stepped by MuJoCo
+compiling/  what numba makes of the kernels, and where it is kept
+position_loop runs a servo within its firmware's loop, bare_gap and printed_play are plays of their own kind
 """
 
 from ers_mj.errors import InputError

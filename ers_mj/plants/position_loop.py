@@ -19,12 +19,12 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from ers_mj.plants.bristle import bent, bristle_damping
-from ers_mj.plants.compiled import inline, kernel, record_in, unit
-from ers_mj.plants.forces import stop_at
-from ers_mj.plants.held_reference import mean_reference, switched
-from ers_mj.plants.laws import friction_level, remember, total_torque
-from ers_mj.plants.state import (
+from ers_mj.plants.compiling.compiled import inline, kernel, record_in, unit
+from ers_mj.plants.kernel.bristle import bent, bristle_damping
+from ers_mj.plants.kernel.forces import stop_at
+from ers_mj.plants.kernel.held_reference import mean_reference, switched
+from ers_mj.plants.kernel.laws import friction_level, remember, total_torque
+from ers_mj.plants.kernel.state import (
     READ,
     READ_BOOL,
     RUNAWAY,

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ers_mj.effects.quantities import Coefficients
-from ers_mj.plants.compiled import inline, kernel
+from ers_mj.plants.compiling.compiled import inline, kernel
+from ers_mj.plants.kernel.state import READ, TABLE, F, N, types
 from ers_mj.plants.reduced import Motion
-from ers_mj.plants.state import READ, TABLE, F, N, types
 
 STEP = 2e-6  # [s] at most; half of it moves theta by less than 0.01 deg RMS
 

@@ -11,12 +11,12 @@ import numpy as np
 from ers_mj.effects import BY_NAME, EFFECTS
 from ers_mj.effects.base import Effect
 from ers_mj.effects.quantities import Coefficients
-from ers_mj.plants import event_integrator, fixed_steps
-from ers_mj.plants.before import resting_input
 from ers_mj.plants.effort import Effort
-from ers_mj.plants.laws import Acting, acting, laid_out
-from ers_mj.plants.state import N_CONSTANTS
-from ers_mj.plants.tangents import NUDGE, prepare, tangent
+from ers_mj.plants.kernel import event_integrator, fixed_steps
+from ers_mj.plants.kernel.before import resting_input
+from ers_mj.plants.kernel.laws import Acting, acting, laid_out
+from ers_mj.plants.kernel.state import N_CONSTANTS
+from ers_mj.plants.kernel.tangents import NUDGE, prepare, tangent
 
 EVENT = 1.1  # [us] that an event takes
 # [us] that a simulated second takes: of the plain plant, with laws, of two bodies or on a bristle, of both; of a

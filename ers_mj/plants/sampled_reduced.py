@@ -7,14 +7,14 @@ from __future__ import annotations
 import numpy as np
 
 from ers_mj.effects import BY_NAME
-from ers_mj.plants import fixed_steps
-from ers_mj.plants.compiled import kernel
-from ers_mj.plants.cuts import corner_speed, cut, longest_step
-from ers_mj.plants.event_integrator import advance
-from ers_mj.plants.laws import MEMORY, laid_out, remember
-from ers_mj.plants.modes import start_mode, start_state
+from ers_mj.plants.compiling.compiled import kernel
+from ers_mj.plants.kernel import fixed_steps
+from ers_mj.plants.kernel.cuts import corner_speed, cut, longest_step
+from ers_mj.plants.kernel.event_integrator import advance
+from ers_mj.plants.kernel.laws import MEMORY, laid_out, remember
+from ers_mj.plants.kernel.modes import start_mode, start_state
+from ers_mj.plants.kernel.state import MODES, PLANT, VECTOR, F, Mode, N, State, is_bounded, plant_in, types
 from ers_mj.plants.reduced import ReducedModel
-from ers_mj.plants.state import MODES, PLANT, VECTOR, F, Mode, N, State, is_bounded, plant_in, types
 
 
 @kernel(types.void(VECTOR, VECTOR, MODES))
@@ -34,7 +34,7 @@ def hold(t, h0, before, now, plant, refine, x, m):
     """Move x (5,) and m (5,) over one sample of length h0 from t; a delay leaves ``before`` at the terminals at first,
     ``now`` afterwards.
 
-    The slow road of march.simulate, which goes by the same segments. A motion that runs away becomes NaN.
+    The slow road of event_integrator.simulate, which goes by the same segments. A motion that runs away becomes NaN.
     """
     c = plant_in(plant)
     cuts = cut(c, h0, refine)

@@ -76,6 +76,7 @@ class Selector:
 
     def __init__(self, runs: Sequence[Run], is_angle: bool, jobs: int = 1, policy: Policy = POLICY):
         self.is_angle, self.jobs, self.policy = is_angle, jobs, policy
+        self.logged = tuple(runs)
         self._take(runs)
 
     def _take(self, runs: Sequence[Run]) -> None:
@@ -100,6 +101,7 @@ class Selector:
             if not ranked or not self._is_worth(current, ranked[0]):
                 break
             current = self._formed(ranked[0])
+        current = self._realigned(current)
         progress("leaving out what is not needed", 0.65)
         found = self.pruned(Selection(base, current, tuple(rounds)))
         chosen = found.chosen
@@ -174,15 +176,35 @@ class Selector:
         leaves: what differs between recordings comes before structure.
         """
         for _ in range(EFFORT.alignments if len(self.runs) > 1 else 0):
-            alone = only_letters(base.model, ("offset",))
-            each = [fitted(alone, self.data.alone(run), EFFORT.tried) for run in self.runs]
+            each = self._offsets(base)
             if sum(fit.cost for fit in each) > 0.5 * base.cost or not self._may_gain(base):
                 break
-            first = each[0].model["offset"]
-            runs = [run.shifted(fit.model["offset"] - first) for run, fit in zip(self.runs, each, strict=True)]
-            self._take(runs)
-            base = fitted(base.model, self.data, EFFORT.full)
+            base = self._shifted(base, each)
         return base
+
+    def _offsets(self, base: Fit) -> list[Fit]:
+        """Each run's own offset, all else as it is."""
+        alone = only_letters(base.model, ("offset",))
+        return [fitted(alone, self.data.alone(run), EFFORT.tried) for run in self.runs]
+
+    def _shifted(self, base: Fit, each: Sequence[Fit]) -> Fit:
+        """The loop on runs that are taken to the first one's offset."""
+        first = each[0].model["offset"]
+        self._take([run.shifted(fit.model["offset"] - first) for run, fit in zip(self.runs, each, strict=True)])
+        return fitted(base.model, self.data, EFFORT.full)
+
+    def _realigned(self, found: Fit) -> Fit:
+        """The loop once logs that were aligned are aligned anew: what it lacked then bent their offsets."""
+        for _ in range(EFFORT.alignments):
+            before = self.runs
+            if all(run is log for run, log in zip(before, self.logged, strict=True)):
+                break
+            again = self._shifted(found, self._offsets(found))
+            if gain(found, again) < self.policy.loop_place:
+                self._take(before)
+                break
+            found = again
+        return found
 
     def _levelled(self, base: Fit) -> tuple[Fit, list[tuple[Compared, ...]]]:
         """The loop with what bends all the rest, its logs aligned before that is looked for or after, whichever leaves

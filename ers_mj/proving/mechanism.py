@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ers_mj.plants.mjcf import read_mjcf
+from ers_mj.plants.mujoco.mjcf_folder import read_mjcf
 from ers_mj.proving.plant import TABLE_1
 
 LINKAGES = ("constant", "rod")

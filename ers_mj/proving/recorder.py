@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from ers_mj.plants.mjcf import unlogged
+from ers_mj.plants.mujoco.mjcf_folder import unlogged
 from ers_mj.proving.catalogue import put_effects
 from ers_mj.proving.laws import (
     bristle_rate,

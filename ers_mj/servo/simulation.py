@@ -19,7 +19,7 @@ from ers_mj.effects.input_delay import InputDelay
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.effects.sensor_quantisation import SensorQuantisation
 from ers_mj.errors import InputError
-from ers_mj.plants.play import stiff_play
+from ers_mj.plants.bare_gap import stiff_play
 from ers_mj.plants.printed_play import PrintedPlay, printed_threshold
 from ers_mj.plants.reduced import Motion, ReducedModel, lumped
 from ers_mj.servo.datasheet import Datasheet
@@ -105,7 +105,7 @@ def build_plant(
             three-dimensional rudder system, one with [lumped] alone a single joint.
         plant: "reduced", the event-exact Eq. (1)/(5), or "mujoco".
         effects: (name, {key: value}) in SI (torques in N m; per inertia where the datasheet has no J).
-        gap: half-width of the play [rad], the same two bodies on either plant (see plants/play.py).
+        gap: half-width of the play [rad], the same two bodies on either plant (see plants/bare_gap.py).
         linkage: "constant" or, in MuJoCo, "rod".
         inductance: whether the datasheet's L acts.
         play: "gap", two bodies, or "printed", Eq. (4) around the reduced model.
@@ -128,8 +128,8 @@ def build_plant(
     if play == "printed":
         return _printed(c, plant, chosen, gap)
     if plant == "mujoco":
-        from ers_mj.plants.mechanical import MechanicalPlant
-        from ers_mj.plants.skeletons import bodily
+        from ers_mj.plants.mujoco.bodies import bodily
+        from ers_mj.plants.mujoco.plant import MechanicalPlant
 
         shape = bodily(datasheet.parameters, is_angle, c.b)
         return MechanicalPlant(c, chosen, parameters=shape, linkage=linkage, gap=gap or 0.0, is_angle=is_angle)

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from ers_mj.plants.inputs import DURATION, INPUTS, RATE_HZ
-from ers_mj.plants.mechanical import simulate_many
+from ers_mj.plants.mujoco.plant import simulate_many
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import build_plant, finite, has_play
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from ers_mj.diagnosis.evidence import Evidence, RecordView
 from ers_mj.errors import InputError
-from ers_mj.plants.looped_mujoco import LoopedPlant
-from ers_mj.plants.mechanical import MechanicalPlant
-from ers_mj.plants.staging import rig_of
+from ers_mj.plants.mujoco.looped import LoopedPlant
+from ers_mj.plants.mujoco.plant import MechanicalPlant
+from ers_mj.plants.mujoco.staging import rig_of
 
 ENLARGED = (1, 2, 5, 10, 20, 50)
 

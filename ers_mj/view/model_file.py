@@ -11,8 +11,8 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 from ers_mj.errors import InputError
-from ers_mj.plants.mjcf import unlogged
-from ers_mj.plants.staging import staged
+from ers_mj.plants.mujoco.mjcf_folder import unlogged
+from ers_mj.plants.mujoco.staging import staged
 from ers_mj.view.replay import Replay
 from ers_mj.view.within import parsed, refuse_outside
 

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from ers_mj.errors import InputError
-from ers_mj.plants.staging import CAMERAS
+from ers_mj.plants.mujoco.staging import CAMERAS
 from ers_mj.view.replay import Replay
 
 MEASURED = (1.0, 0.72, 0.10, 0.50)  # of the ghost, translucent: what was measured lies over what was simulated

@@ -12,11 +12,11 @@ import numpy as np
 
 from ers_mj.data.prepared import Trace
 from ers_mj.errors import InputError
-from ers_mj.plants.looped_mujoco import LoopedPlant
-from ers_mj.plants.mechanical import MechanicalPlant
+from ers_mj.plants.mujoco.bodies import bodily
+from ers_mj.plants.mujoco.looped import LoopedPlant
+from ers_mj.plants.mujoco.plant import MechanicalPlant
+from ers_mj.plants.mujoco.staging import staged
 from ers_mj.plants.reduced import lumped
-from ers_mj.plants.skeletons import bodily
-from ers_mj.plants.staging import staged
 from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.simulation import inertia_of, kernel_effects
 

@@ -22,8 +22,8 @@ from ers_mj.effects import BY_NAME
 from ers_mj.effects.base import Effect
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
-from ers_mj.plants.mechanical import MechanicalPlant
-from ers_mj.plants.mjcf import unlogged
+from ers_mj.plants.mujoco.mjcf_folder import unlogged
+from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.plants.reduced import ReducedModel
 
 Move = Callable[[float], tuple[np.ndarray, np.ndarray]]  # time [s] -> (transition, effect of held inputs)
