@@ -55,7 +55,7 @@ def diagnose(
         datasheet: what is known of the servo, or None; under a position command it only stands beside the numbers.
         holdout: looked at only after the selection has ended.
         seed: kept in the document; nothing here draws random numbers.
-        jobs: cores to use; all by default. The result does not depend on it.
+        jobs: threads; all cores by default. The result does not depend on it.
         progress: called with a text and a share of the work done.
         policy: the thresholds that decide.
         search: how far it is searched, and which parts are left out.

@@ -123,7 +123,7 @@ def diagnose(
         holdout: recordings that are opened only after the selection has ended; without them each one is left out in
             turn.
         seed: kept in the document; nothing here draws random numbers.
-        jobs: cores to use; all by default. The result does not depend on it.
+        jobs: threads; all cores by default. The result does not depend on it.
         progress: told (text, share of the work done).
         quick: a first look, which leaves parts out and says which (`left_out`).
 

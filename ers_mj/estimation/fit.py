@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from ers_mj.estimation.descent import Slopes, descended, in_a_search, is_spent
 from ers_mj.estimation.initial_state import with_starts
 from ers_mj.estimation.jacobian import jacobian_of
 from ers_mj.estimation.objective import Fit, begun, residuals
-from ers_mj.processes.side_by_side import each
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 from ers_mj.solvers.successive_halving import Stage, halved
 
@@ -142,7 +141,8 @@ def hopped(
     for _ in range(hops.most):
         if not explained.is_near_noise(found.misfit) or _per_block(found, tau) < hops.quiet:
             break
-        ends = halved(_landings(found, hops), stages, partial(each, jobs=jobs, known=traces))
+        with ThreadPoolExecutor(jobs) as pool:
+            ends = halved(_landings(found, hops), stages, lambda *work: list(pool.map(*work)))
         best, there = min(ends, key=lambda end: end[0].cost)
         if not best.cost < found.cost - hops.gain:
             break

@@ -9,7 +9,6 @@ import numpy as np
 from ers_mj.data.prepared import Trace
 from ers_mj.effects import BY_NAME, Effect
 from ers_mj.estimation.objective import Run, begun, residuals
-from ers_mj.processes.side_by_side import each
 from ers_mj.servo.model import Columns, Free, Model
 
 
@@ -67,18 +66,14 @@ def columns_of(model: Model, traces: Sequence[Trace], rate: float, by_tangents: 
     }
 
 
-def central_jacobian(
-    model: Model, layout, z: np.ndarray, traces: Sequence[Trace], rate: float, jobs: int = 1
-) -> np.ndarray:
+def central_jacobian(model: Model, layout, z: np.ndarray, traces: Sequence[Trace], rate: float) -> np.ndarray:
     """Central differences (N, k) of the residuals: tangents, good to a few per cent each, blur the directions in which
     their columns cancel.
     """
     step = step_of(model)
-
-    def both(row: np.ndarray) -> list[np.ndarray]:
-        return [residuals(model.at(layout, z + way * row), traces, rate) for way in (1, -1)]
-
-    ends = each(both, step * np.eye(z.size), jobs)
+    ends = [
+        [residuals(model.at(layout, z + way * row), traces, rate) for way in (1, -1)] for row in step * np.eye(z.size)
+    ]
     return np.nan_to_num(
         np.column_stack([(ahead - behind) / (2.0 * step) for ahead, behind in ends]), nan=0.0, posinf=0.0, neginf=0.0
     )

@@ -7,12 +7,10 @@ import threading
 
 import numpy as np
 
-from ers_mj.processes.side_by_side import Shared
-
 OVERHEAD = 20  # samples whose handling takes another microsecond
 
 
-class Effort(Shared):
+class Effort:
     """What has been simulated with the models that it was handed to, in the microseconds that it takes a slow core,
     about. A copy in another process begins at nought.
 
@@ -20,7 +18,6 @@ class Effort(Shared):
     """
 
     def __init__(self, within: Effort | None = None, most: float = math.inf):
-        super().__init__()
         self._lock, self._spent, self._is_cut = threading.Lock(), 0, False
         self.within, self.most = within, most
 
@@ -31,14 +28,6 @@ class Effort(Shared):
     def spent(self) -> int:
         """[us]"""
         return self._spent
-
-    @property
-    def tally(self) -> tuple[int, bool]:
-        return self._spent, self._is_cut
-
-    def add_tally(self, count: int, mark: bool) -> None:
-        with self._lock:
-            self._spent, self._is_cut = self._spent + count, self._is_cut or mark
 
     def add(self, t: np.ndarray, per_second: int, beyond: int = 0) -> None:
         """Count a simulation of the samples at t (N,) [s] that takes so many microseconds a second; what its events

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -41,7 +42,6 @@ from ers_mj.position_loop.terms import (
 )
 from ers_mj.position_loop.two_bodies import parted, refitted
 from ers_mj.position_loop.weak_form import SCAN, Rough
-from ers_mj.processes.side_by_side import each
 
 Progress = Callable[[str, float], None]
 GRAVITY = GravityImbalance.name
@@ -357,7 +357,10 @@ class Selector:
         return replace(candidate, fit=fit, gain=gain(current, fit), is_final=True)
 
     def _map(self, call: Callable, items: Sequence):
-        return each(call, items, self.jobs, self.runs)
+        if self.jobs == 1:
+            return map(call, items)
+        with ThreadPoolExecutor(self.jobs) as pool:
+            return list(pool.map(call, items))
 
     # -- leaving out ---------------------------------------------------------------------------------------------------
 

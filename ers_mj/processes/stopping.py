@@ -20,7 +20,6 @@ from ers_mj.processes import passing
 
 GRACE = 1.2  # [s] that a command has to end by itself
 STOPPED = 130  # exit code
-WATCHING = "ers signals"  # the thread that waits for one; it holds no lock meanwhile
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _told = threading.Event()
 
@@ -53,7 +52,7 @@ def guarded(run: Callable[[], int]) -> int:
     for each in heeded:
         signal.signal(each, stop)
     os.register_at_fork(after_in_child=lambda: _forget(heeded))
-    threading.Thread(target=_end, args=(heard,), daemon=True, name=WATCHING).start()
+    threading.Thread(target=_end, args=(heard,), daemon=True).start()
     code = STOPPED
     try:
         code = run()

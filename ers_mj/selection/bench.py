@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -14,7 +15,6 @@ from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.estimation.fit import Along, fit
 from ers_mj.estimation.objective import Fit
 from ers_mj.estimation.sparse import few_of
-from ers_mj.processes.side_by_side import each
 from ers_mj.selection.budget import SEARCH, Budget, Search
 from ers_mj.selection.comparison import Candidate, judged, priced
 from ers_mj.servo.model import Model
@@ -26,7 +26,7 @@ B = TypeVar("B")
 
 @dataclass(frozen=True)
 class Bench:
-    """The traces, the tau at which C is judged, how many cores help (the result does not depend on it), the effects
+    """The traces, the tau at which C is judged, how many threads help (the result does not depend on it), the effects
     that are not looked for, the policy, the sizes of the search, and the budget of simulation.
     """
 
@@ -69,7 +69,10 @@ class Bench:
 
     def each(self, function: Callable[[A], B], items: Iterable[A]) -> list[B]:
         """The function of each item, side by side."""
-        return each(function, items, self.jobs, self.traces)
+        if self.jobs == 1:
+            return list(map(function, items))
+        with ThreadPoolExecutor(self.jobs) as pool:
+            return list(pool.map(function, items))
 
     def carried_on(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,6 @@ from ers_mj.estimation.fit import Along, fit
 from ers_mj.estimation.intervals import half_widths
 from ers_mj.estimation.jacobian import columns_of
 from ers_mj.estimation.objective import residuals, residuals_in, tau_of
-from ers_mj.processes.side_by_side import each
 from ers_mj.selection.measure import FREE_RUN, Measure
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
@@ -196,7 +196,8 @@ def refits(model: Model, parts: Sequence[Fold], tau: float, jobs: int) -> list[M
         mine = model.of_records([fold.record])
         return settled(replace(found, local=mine.local, states=mine.states), fold.held_out, tau)
 
-    return each(one, parts, jobs)
+    with ThreadPoolExecutor(jobs) as pool:
+        return list(pool.map(one, parts))
 
 
 def _beside(slopes: Columns, begun: Model, fold: Fold, traces: Sequence[Trace]) -> Columns:

@@ -84,7 +84,7 @@ def screen(
         run = run_of(place, bench.traces, OBSERVER_RATE)
         if not np.all(np.isfinite(run.left)):
             continue
-        view, known = view_of(run, bench.traces, bench.tau, bench.search, bench.jobs)
+        view, known = view_of(run, bench.traces, bench.tau, bench.search)
         if quiet and not screening.floor:
             screening.floor = 2.0 * bench.search.least_promise * least / view.targets[0].power
         screening.look_from(view, known, names)
@@ -124,8 +124,7 @@ class _Screening:
             scales = replace(scales, waves=waves_of(view.run, self.bench.traces))
         lasting = [BY_NAME[name] for name in names if not BY_NAME[name].once]
         starts = {effect.name: self._starts(effect, scales) for effect in lasting}
-        first = self.bench.each(lambda name: self._told(BY_NAME[name], starts[name], some, sparse), starts)
-        told = dict(zip(starts, first, strict=True))
+        told = {name: self._told(BY_NAME[name], begun, some, sparse) for name, begun in starts.items()}
         shares = {name: max((share for share, _ in each), default=math.inf) for name, each in told.items()}
         for name in sorted(starts, key=lambda name: -shares[name]):
             if shares[name] < self._likely(is_first) and not view.place.plant().bends:
@@ -176,8 +175,9 @@ class _Screening:
         if not told:
             starts = by_recordings(view, effect, starts, tries + self.bench.search.beside_tries)
         some = hopeful(effect, starts, told, tries)
-        promised = self.bench.each(lambda begun: promise(view, effect, *begun), some)
-        found = [(p, k) for k, p in enumerate(promised) if p is not None]
+        found = [
+            (p, k) for k, (start, size) in enumerate(some) if (p := promise(view, effect, start, size)) is not None
+        ]
         found.sort(key=lambda item: -item[0][0])
         likely = [starts[k] for k in sorted(range(len(told)), key=lambda k: -told[k][0])]
         likely = likely or [some[k][0] for _, k in found]

@@ -134,9 +134,7 @@ def _target(root: np.ndarray, slopes: np.ndarray, residual: np.ndarray) -> Targe
     return Target(root, basis, residual, made_up)
 
 
-def view_of(
-    run: Run, traces: Sequence[Trace], tau: float, search: Search = SEARCH, jobs: int = 1
-) -> tuple[View, Columns]:
+def view_of(run: Run, traces: Sequence[Trace], tau: float, search: Search = SEARCH) -> tuple[View, Columns]:
     """What a run shows, and the Jacobian's columns at its place.
 
     A parameter that rests at its bound follows nothing: what would push it further, as an inductance does a time
@@ -145,7 +143,7 @@ def view_of(
     place, e = run.model, run.left
     blocks, layout = Blocks.of(traces), place.layout()
     m = blocks.misfit(e)
-    jacobian = central_jacobian(place, layout, place.vector(layout), traces, OBSERVER_RATE, jobs)  # refits borrow it
+    jacobian = central_jacobian(place, layout, place.vector(layout), traces, OBSERVER_RATE)  # refits borrow it
     free, targets = np.array([not place.at_bound(f) for f in layout], bool), []
     for level in dict.fromkeys((tau, max(tau, float(np.mean(m))))):
         root = np.sqrt(2.0 / ((level + m) * blocks.counts))[blocks.index]
