@@ -7,7 +7,7 @@ of `ers prove --seed 4201`), `foreign` (../shared/foreign), `rigs` (../shared/da
 
 - `replay` makes every decision anew from the tables, in seconds, with ers_mj.decisions and its policy, and prints what
   differs. `--policy NAME=VALUE` asks another policy; `--thresholds` asks each threshold what its absence, a fifth less
-  and a fifth more would have changed.
+  and a fifth more would have changed; `--ranges NAME` between which values of one nothing changes.
 - `ask` diagnoses the recordings anew and prints what differs: verdict, names, parameters, errors. It needs ../shared,
   and for `seeds` the recordings that `make` makes with the generator of commit 581c791 (some 45 s of a core a case).
 """
@@ -44,6 +44,7 @@ COMMIT, SEED = "581c791", 4201
 # rules that the older commit did not have, each with the value at which it decides nothing: what they change is told
 # apart
 SINCE = {"far_off": np.inf, "pays": -1.0}
+FACTORS = np.array([1.05, 1.1, 1.2, 1.3, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0])
 
 
 def tables(sets: list[str]) -> Iterator[tuple[str, dict]]:
@@ -230,6 +231,7 @@ def replay(arguments: argparse.Namespace) -> int:
     print(f"{total} decisions of {cases}: {len(found)} otherwise; {time.perf_counter() - begun:.1f} s")
     if arguments.thresholds:
         tell_thresholds(arguments.sets, found)
+    tell_ranges(arguments.sets, arguments.ranges, found)
     return bool(found)
 
 
@@ -258,6 +260,21 @@ def tell_thresholds(sets: list[str], already: list) -> None:
             except (ValueError, ZeroDivisionError, OverflowError):
                 counts.append("-")
         print(f"{f.name:22}{value:10.4g}" + "".join(f"{count:>8}" for count in counts))
+
+
+def tell_ranges(sets: list[str], names: list[str], already: list) -> None:
+    """Between which values of a threshold, by steps of a few per cent to a factor of 100, no decision changes."""
+    before = {one[:2] for one in already}
+    for name in names:
+        value, ends = getattr(POLICY, name), []
+        for steps in (FACTORS, 1.0 / FACTORS):
+            same = value
+            for way in value * steps:
+                if {one[:2] for one in changed(sets, replace(POLICY, **(SINCE | {name: type(value)(way)})))} - before:
+                    break
+                same = type(value)(way)
+            ends.append(same)
+        print(f"{name:22}{value:10.4g}: the same from {ends[1]:.4g} to {ends[0]:.4g}", flush=True)
 
 
 # -- the cases, asked anew
@@ -368,6 +385,9 @@ def main() -> int:
         if function is replay:
             one.add_argument("--policy", nargs="+", default=[], metavar="NAME=VALUE")
             one.add_argument("--thresholds", action="store_true")
+            one.add_argument(
+                "--ranges", nargs="+", default=[], choices=[f.name for f in fields(Policy)], metavar="NAME"
+            )
         if function is ask:
             one.add_argument("--jobs", type=int, default=1)
             one.add_argument("--case", nargs="+", metavar="SET/CASE")
