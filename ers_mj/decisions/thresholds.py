@@ -148,11 +148,9 @@ class Policy:
         "three blocks won clearly, the rest untouched",
     )
     later_z: float = _threshold(
-        2.0,
-        "paired z-score over blocks",
-        "a second name by a few blocks",
+        2.0, "paired z-score over blocks", "a second name by a few blocks",
         "on tuning seeds; the golden decides the same from 2 to 2.2",
-    )
+    )  # fmt: skip
     lost: float = _threshold(
         0.2,
         "share of the gain",
@@ -220,11 +218,9 @@ class Policy:
         "what a law must explain to come before it",
     )
     alone: float = _threshold(
-        1.5,
-        "factor of gain",
-        "chance, which offers much the same to several laws",
+        1.5, "factor of gain", "chance, which offers much the same to several laws",
         "on tuning seeds; the golden decides the same from 1.5 to 1.57",
-    )
+    )  # fmt: skip
     same: float = _threshold(
         0.5, "share of the gain", "two names for one explanation", "summed difference of block scores"
     )
@@ -341,11 +337,9 @@ class Policy:
         "0.23 noise levels in all recordings but the worst: none of 65 nulls (4133 to 4135) leaves it",
     )
     visible: float = _threshold(
-        1.5,
-        "noise levels of free-run error",
-        "shares of what is not there",
+        1.5, "noise levels of free-run error", "shares of what is not there",
         "on tuning seeds; the golden decides the same from 0.015 to 15",
-    )
+    )  # fmt: skip
     astray: float = _threshold(
         30.0,
         "noise levels of free-run error",
@@ -353,11 +347,9 @@ class Policy:
         "forks lose one recording or another",
     )
     fork_lost: float = _threshold(
-        6.0,
-        "noise levels of free-run error",
-        "shares that one fork decides",
+        6.0, "noise levels of free-run error", "shares that one fork decides",
         "on tuning seeds; the golden decides the same from 3 to 18",
-    )
+    )  # fmt: skip
     nearly_all: float = _threshold(
         0.98, "share of squared error", "a part told as the whole", "another form of the right law"
     )
