@@ -15,11 +15,11 @@ from ers_mj.data.prepared import Trace
 from ers_mj.data.recording import Recording
 from ers_mj.decisions.confirmation import is_no_size
 from ers_mj.decisions.explained import cost
-from ers_mj.diagnosis import unknown
+from ers_mj.diagnosis import unknown_told
 from ers_mj.diagnosis.case import Case
 from ers_mj.diagnosis.errors_told import as_named
 from ers_mj.diagnosis.evidence import Evidence
-from ers_mj.diagnosis.latent_force import latent_forces
+from ers_mj.diagnosis.latent_force_told import latent_forces
 from ers_mj.diagnosis.localisation import Place, gather, over_frequency, places, residual_map
 from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
@@ -80,7 +80,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         "missing": missing,
         "remainder": _remainder(case),
         "record_state": states,
-        "fit": as_named(case.fits, case.names, case.told_effects) | unknown.fits(case),
+        "fit": as_named(case.fits, case.names, case.told_effects) | unknown_told.fits(case),
         "parameters": _parameters(case),
         "next_recording": _next_recording(case),
         "data": data,
@@ -115,8 +115,8 @@ def _remainder(case: Case) -> dict:
     fits = as_named(case.fits, case.names, case.told_effects)
     explained = case.explained if fits is case.fits else 0.0
     levels = fits["heldout_rmse_after_rad"] / case.noise
-    told = remainder(explained, case.more_is_left, levels, [*beyond, *unknown.sentences(case)], own)
-    return {**told, "left_sigma": left_sigma, "tables": unknown.tables(case)}
+    told = remainder(explained, case.more_is_left, levels, [*beyond, *unknown_told.sentences(case)], own)
+    return {**told, "left_sigma": left_sigma, "tables": unknown_told.tables(case)}
 
 
 def _missing(case: Case) -> list[dict]:
@@ -371,13 +371,13 @@ def _improved(case: Case) -> Datasheet:
     extra = {k: float(model.values[k]) for k in ("tau_e", "emf_share")}
     effects = []
     for name in case.told_effects:
-        effects.append((name, unknown.in_readers_units(case, name, dict(model.effects_of())[name])))
+        effects.append((name, unknown_told.in_readers_units(case, name, dict(model.effects_of())[name])))
     effects += [
         (name, {p.name: float(v) for p, v in zip(BY_NAME[name].parameters, values)})
         for name, values in case.sensors.items()
     ]
     tables = case.unknown.tables if case.unknown is not None else []
-    effects += [(name, unknown.in_readers_units(case, name, values)) for name, values in tables]
+    effects += [(name, unknown_told.in_readers_units(case, name, values)) for name, values in tables]
     parameters = dict(case.datasheet.parameters) if case.datasheet is not None else {}
     return Datasheet(parameters=parameters, lumped=lumped, effects=tuple(effects), baseline=extra, name="model.toml")
 

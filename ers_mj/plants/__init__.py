@@ -3,7 +3,7 @@
 reduced     Eq. (1)/(5)/(6) with effects, by the event-exact integrator of kernel/; sampled_reduced a sample at a time
 mujoco/     the same plant as MJCF, stepped by MuJoCo
 compiling/  what numba makes of the kernels, and where it is kept
-position_loop runs a servo within its firmware's loop, bare_gap and printed_play are plays of their own kind
+firmware runs a servo within its firmware's loop, bare_gap and printed_play are plays of their own kind
 """
 
 from ers_mj.errors import InputError

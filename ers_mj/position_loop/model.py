@@ -10,8 +10,8 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.quantities import Coefficients, Parameter, Scales
+from ers_mj.plants.firmware import LoopNumbers, simulate
 from ers_mj.plants.kernel.laws import laid_out
-from ers_mj.plants.position_loop import LoopNumbers, simulate
 from ers_mj.plants.reduced import lowered
 from ers_mj.position_loop.runs import Run
 from ers_mj.servo.simulation import PER_INERTIA

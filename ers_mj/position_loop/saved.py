@@ -6,9 +6,9 @@ import numpy as np
 
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
+from ers_mj.plants.firmware import LoopNumbers
 from ers_mj.plants.mujoco.looped import LoopedPlant
 from ers_mj.plants.mujoco.plant import MechanicalPlant
-from ers_mj.plants.position_loop import LoopNumbers
 from ers_mj.position_loop.model import LETTERS, WIDER, LoopModel
 from ers_mj.position_loop.runs import Run
 from ers_mj.servo.datasheet import Datasheet

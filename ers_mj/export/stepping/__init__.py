@@ -5,7 +5,7 @@
 
 Leapfrog, dampers by the trapezium, a reversal in its instant: of second order in the step h. `c` holds the servo's
 numbers, `x` its state, accelerations per total inertia (see effects/quantities.Coefficients and
-plants/position_loop.LoopNumbers for the letters). What laws of effects do is called here and written by portable.py.
+plants/firmware.LoopNumbers for the letters). What laws of effects do is called here and written by portable.py.
 Only scalars, attributes, `if`, `while` and `math`: that is what translation.py reads. The parts import nothing of each
 other: they are one text in the end.
 """

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 
 from ers_mj.effects.load_dependent_friction import LoadDependentFriction
+from ers_mj.plants.firmware import LoopNumbers
 from ers_mj.plants.mujoco.plant import MAX_DELAY_SAMPLES, MechanicalPlant
 from ers_mj.plants.mujoco.stepping import unlogged
-from ers_mj.plants.position_loop import LoopNumbers
 
 SIDE = [parameter.name for parameter in LoadDependentFriction.parameters].index("side")
 CONTROL_STEP = 5e-4  # [s] for which the stepped controller holds its drive
@@ -37,7 +37,7 @@ class LoopedPlant:
     loop: LoopNumbers
 
     def __post_init__(self):
-        """A gear behind the motor's share of the inertia rubs by what it carries (see plants/position_loop.py)."""
+        """A gear behind the motor's share of the inertia rubs by what it carries (see plants/firmware.py)."""
         if any(name == LoadDependentFriction.name for name, _ in self.plant.effects):
             effects = [(name, _carried(name, values, self.loop.share)) for name, values in self.plant.effects]
             object.__setattr__(self, "plant", replace(self.plant, effects=effects))
