@@ -175,6 +175,8 @@ def _seconds(work):
 
 if __name__ == "__main__":
     sections = {f.__name__: f for f in (reduced, play, step, hold, warnings, twins, speed)}
+    if unknown := [name for name in sys.argv[1:] if name not in sections]:
+        sys.exit(f"there is no section {unknown[0]!r}; there are {', '.join(sections)}")
     for name in sys.argv[1:] or sections:
         print(f"{name}: {sections[name].__doc__}")
         sections[name]()
