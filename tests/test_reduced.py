@@ -1,5 +1,10 @@
 """The event-exact integrator against an independent scheme, against itself at a finer step, and in the stick band."""
 
+import os
+import subprocess
+import sys
+import textwrap
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -368,3 +373,23 @@ def test_a_shaft_that_hardens_without_bound_ends_the_motion():
     plant, t = ReducedModel(table_1().coefficients, [shaft]), np.arange(100) / 200.0
     calm, thrown = (plant.theta(t, np.full(t.size, 4.0), (plant.coefficients.theta_0, speed)) for speed in (0.0, 1e5))
     assert np.isfinite(calm).all() and np.isfinite(thrown[0]) and np.isnan(thrown[-1])
+
+
+def test_a_delay_that_ends_just_before_a_sample_leaves_the_steps_as_long():
+    """Those that look for events within a stiffening shaft: as short as the rest of the sample they took a thousand
+    times as many.
+    """
+    program = """
+    from types import SimpleNamespace
+    from ers_mj.plants.kernel.cuts import cut, longest_step
+    far = float("inf")
+    given = dict(lawful=0, creep=0.0, fall=0.0, two_body=1, k_twist=4e4, rho=0.5, upper=far, lower=-far)
+    for delay in (0.4e-3, 0.9999e-3):
+        c = SimpleNamespace(delay=delay, **given)
+        print(longest_step(c, cut(c, 1e-3, 1), 1) >= 0.5e-3)
+    """
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program)], env=environment, capture_output=True, text=True
+    )
+    assert done.stdout.split() == ["True", "True"], done.stderr

@@ -23,16 +23,17 @@ BRISTLE_CORNER = 0.1  # the same for a rudder that no friction slows: share of c
 
 class Cuts(NamedTuple):
     """Ends (k,) of a sample's segments [s], whether the input of this sample (1) or the one before (0) acts in each,
-    the length of a sample and of its last segment.
+    the length of a sample, of its last segment and of its longest one: a delay may end just before a sample does.
     """
 
     ends: np.ndarray
     fresh: np.ndarray
     h0: float
     last: float
+    longest: float
 
 
-CUTS = types.NamedTuple([VECTOR, MODES, F, F], Cuts)
+CUTS = types.NamedTuple([VECTOR, MODES, F, F, F], Cuts)
 
 
 @inline
@@ -71,15 +72,15 @@ def cut(c, h0, refine):
     """A uniform sample's cuts, ``refine`` times as many."""
     step = _longest(c, h0) / refine
     _, late = split_delay(c, h0)
-    before, after = int(math.ceil(late / step - 1e-9)), int(math.ceil((h0 - late) / step - 1e-9))
+    before, after = int(math.ceil(late / step - 1e-9)), max(int(math.ceil((h0 - late) / step - 1e-9)), 1)
     ends, fresh = np.empty(before + after), np.zeros(before + after, np.int64)
     for k in range(before):
         ends[k] = late * (k + 1) / before
     for k in range(after):
         ends[before + k] = late + (h0 - late) * (k + 1) / after
         fresh[before + k] = 1
-    last = ends[-1] - (ends[-2] if ends.size > 1 else 0.0)
-    return Cuts(ends, fresh, h0, last)
+    last = (h0 - late) / after
+    return Cuts(ends, fresh, h0, last, max(late / max(before, 1), last))
 
 
 @inline
@@ -89,7 +90,7 @@ def longest_step(c, cuts, refine):
     if c.upper < np.inf or c.lower > -np.inf:
         h_max = CONTACT_STEP / (math.sqrt(c.k_stop) + c.d_stop)
     if c.two_body > 0 or c.lawful > 0:
-        h_max = min(h_max, cuts.last / refine)
+        h_max = min(h_max, cuts.longest / refine)
     return h_max
 
 
@@ -98,5 +99,5 @@ def corner_speed(c, cuts, refine):
     """Speed below which a rudder that crosses theta_0 may end there."""
     corner = CORNER * (c.c_1 + c.c_2_plus) * cuts.h0
     if has_bristle(c):
-        corner = max(corner, BRISTLE_CORNER * c.c_1 * cuts.last * refine)
+        corner = max(corner, BRISTLE_CORNER * c.c_1 * cuts.longest * refine)
     return corner
