@@ -185,6 +185,13 @@ def test_bad_input_is_one_sentence(argv, sentence, capsys):
     assert sentence in told and told.count("\n") == 1
 
 
+def test_real_records_are_sought_beside_the_checkout(tmp_path, monkeypatch, capsys):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert main(["prove", "--real", "--cases", "3"]) == 2
+    assert f"{tmp_path / 'here' / '..' / 'shared' / 'data'}" in capsys.readouterr().err
+
+
 def test_a_folder_with_other_files_is_refused(tmp_path, capsys):
     (tmp_path / "mine.txt").write_text("mine")
     assert main(["prove", "--cases", "1", "--out", str(tmp_path)]) == 2

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ers_mj.workers.base import Task
 
 CASES = 20  # of a proof that names no number
+REAL = "../shared/data"  # where the real records lie that no folder is named for
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -55,8 +56,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         "--real",
+        nargs="?",
+        const=REAL,
         metavar="FOLDER",
-        help="conceal in real recordings: the folder that holds emps/, throttle/ and sts3215/",
+        help=f"conceal in real recordings: the folder that holds emps/, throttle/ and sts3215/ (default {REAL})",
     )
     parser.add_argument(
         "--limit", type=number(above=1), default=300.0, metavar="S", help="processor time of a diagnosis (default 300)"

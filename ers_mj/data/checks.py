@@ -134,17 +134,21 @@ def locked(x: np.ndarray) -> np.ndarray:
 
 
 def problems_of(
-    fields: Mapping[str, np.ndarray], printed: Mapping[str, np.ndarray], labels: Mapping[str, str], step: float
+    fields: Mapping[str, np.ndarray],
+    printed: Mapping[str, np.ndarray],
+    rows: np.ndarray,
+    labels: Mapping[str, str],
+    step: float,
 ) -> list[Fault]:
-    """What is told, a sentence each; `printed` are the columns as they stand in the file, `step` the converter's
-    there.
+    """What is told, a sentence each; `printed` are the columns as they stand in these `rows` of the file, `step` the
+    converter's there.
     """
     t, u, y = fields["t"], fields["u"], printed["y"]
     frozen = frozen_spans(y, step or decimal_grain(y[np.isfinite(y)]))
     return [
         *(_told_blanks(t, x, labels[field], field) for field, x in printed.items() if np.isnan(x).any()),
         *_told_gaps(t, labels["t"]),
-        *_told_jitter(t, labels["t"]),
+        *_told_jitter(t, rows, labels["t"]),
         *_told_clipped("limit", t, u, labels["u"], [s for s in held_spans(u) if at_extreme(u, s) and varied(u, s)]),
         *_told_clipped("clipped", t, y, labels["y"], rail_spans(y, step), ", which are left out"),
         *(
@@ -155,7 +159,7 @@ def problems_of(
         ),
         *_told_stuck(t, labels["y"], [s for s in frozen if not at_extreme(y, s) and np.ptp(u[s]) > 0]),
         *_told_constant(t, u, labels["u"]),
-        *_told_converter(labels["y"], step),
+        *_told_converter(t, labels["y"], step),
     ]
 
 
@@ -193,11 +197,16 @@ def _told_gaps(t: np.ndarray, label: str) -> list[Fault]:
     return [Fault("gap", label, sentence, int(gaps.size), _region(t, gaps[0], gaps[-1] + 1))]
 
 
-def _told_jitter(t: np.ndarray, label: str) -> list[Fault]:
-    dt = np.diff(t) / np.median(np.diff(t))
-    jitter = np.sqrt(np.mean((dt[~gaps_in(t)] - 1) ** 2))
+def _told_jitter(t: np.ndarray, rows: np.ndarray, label: str) -> list[Fault]:
+    """Steps that are not alike, between rows that follow each other in the file."""
+    steps = np.flatnonzero(~gaps_in(t) & (np.diff(rows) == 1))
+    off = np.diff(t)[steps] / np.median(np.diff(t)[steps]) - 1.0 if steps.size else np.zeros(1)
+    jitter = float(np.sqrt(np.mean(off**2)))
+    if jitter <= LIMITS.least_jitter:
+        return []
+    at = steps[np.abs(off) > LIMITS.least_jitter]
     sentence = f"the steps of time jitter by {jitter:.1%} rms"
-    return [Fault("jitter", label, sentence)] if jitter > LIMITS.least_jitter else []
+    return [Fault("jitter", label, sentence, int(at.size), _region(t, at[0], at[-1] + 1))]
 
 
 def _told_clipped(
@@ -256,9 +265,9 @@ def _told_constant(t: np.ndarray, u: np.ndarray, label: str) -> list[Fault]:
     return [Fault("constant_input", label, sentence, u.size, _region(t, 0, -1))] if np.ptp(u) == 0 else []
 
 
-def _told_converter(label: str, step: float) -> list[Fault]:
+def _told_converter(t: np.ndarray, label: str, step: float) -> list[Fault]:
     sentence = f"the output {label} moves in steps of {step:.4g}, those of its converter"
-    return [Fault("converter", label, sentence)] if step else []
+    return [Fault("converter", label, sentence, t.size, _region(t, 0, -1))] if step else []
 
 
 def ignored(columns: list[str], taken: Collection[str]) -> list[Fault]:

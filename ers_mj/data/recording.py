@@ -342,7 +342,7 @@ class Read:
         if faults:
             refuse_still(sheet.y, labels["y"], name)
         seen = {f: _seen(x[sheet.rows], f, first, sheet, factors[f]) for f, x in printed.items()}
-        told = [*problems_of(sheet.fields, seen, labels, step), *faults, *notes]
+        told = [*problems_of(sheet.fields, seen, sheet.rows, labels, step), *faults, *notes]
         return {
             **{field: locked(x) for field, x in off_rails(sheet.fields, rail_spans(seen["y"], step)).items()},
             **constants(values, labels, name),

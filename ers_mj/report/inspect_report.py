@@ -19,10 +19,10 @@ HEADS = ("channel", ">refresh", ">lowest", ">highest", ">noise", ">quantum", ">a
 
 def inspect_page(document: Mapping, found: Sequence[Inspection]) -> str:
     """The page as HTML, of what `ers inspect --json` prints and the recordings behind it."""
-    faults = document["faults"]
-    several = ("s"[: len(faults) != 1], "s"[: len(found) != 1])
-    sentence = f"{len(faults)} fault{several[0]} in {len(found)} recording{several[1]}"
-    counts = (("input", document["input_kind"]), ("recordings", len(found)), ("faults", len(faults)))
+    told = len(document["faults"])
+    several = ("s"[: told != 1], "s"[: len(found) != 1])
+    sentence = f"{told} finding{several[0]} on the data of {len(found)} recording{several[1]}"
+    counts = (("input", document["input_kind"]), ("recordings", len(found)), ("findings", told))
     tiles = [(name, page.text(value)) for name, value in counts]
     parts = [page.header("consistent", "Recordings", "ers inspect", sentence, tiles)]
     parts += [_one(one, k) for k, one in enumerate(document["recordings"])]
@@ -59,14 +59,15 @@ def _recorded(inspection: Inspection) -> dict:
     """Output and input over time, and the faults that have a place there."""
     r = inspection.record
     u, y = shown(r.input_unit), shown(r.output_unit)
-    closest = float(r.t[-1] - r.t[0]) / POINTS
+    closest, whole = float(r.t[-1] - r.t[0]) / POINTS, (float(r.t[0]), float(r.t[-1]))
+    places = tuple(f.region for f in r.faults if f.region and f.region != whole)
     return {
         "kind": "recorded",
         "panels": [
             {"name": f"output [{y.label}]", "unit": y.label, "kind": "after", "held": False},
             {"name": f"input [{u.label}]", "unit": u.label, "kind": "input", "held": True},
         ],
-        "shaded": [list(span) for span in merged(tuple(f.region for f in r.faults if f.region), closest)],
+        "shaded": [list(span) for span in merged(places, closest)],
         "levels": [[_series(r.t, y.factor * r.y), _series(r.t, u.factor * r.u)]],
     }
 

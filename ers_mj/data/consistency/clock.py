@@ -75,7 +75,8 @@ def regular(sheet: Sheet) -> Found:
         f"the steps of time jitter by {jitter:.1%} rms about a regular clock of {step:.4g} s, and the output does not"
         " move with them: the ticks of that clock are taken"
     )
-    return sheet.changed(t=sheet.t[0] + _plain(step, ticks[-1]) * ticks), [Fault("jitter", sheet.labels["t"], sentence)]
+    fault = sheet.fault("jitter", "t", np.flatnonzero(off), sentence)
+    return sheet.changed(t=sheet.t[0] + _plain(step, ticks[-1]) * ticks), [fault]
 
 
 def _plain(step: float, count: float) -> float:

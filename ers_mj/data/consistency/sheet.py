@@ -14,8 +14,7 @@ class Fault:
 
     Attributes:
         kind: held, wrap, leap, blackout, torque_off, gap, time_jump, supply, unsigned_input, constant_input, unit,
-            stuck, clipped, blank; or a mere note: jitter, limit (of an input), converter, ignored,
-            read.
+            stuck, clipped, blank, jitter, converter; or a mere note: limit (of an input), ignored, read.
         column: of the file.
         count: samples (or places) concerned.
         region: from the first to the last of them [s], or None.
@@ -30,8 +29,8 @@ class Fault:
 
     @property
     def is_note(self) -> bool:
-        """Whether it is ordinary and only worth a sentence."""
-        return self.kind in ("jitter", "limit", "converter", "ignored", "read")
+        """Whether it is worth a sentence and no row of the faults."""
+        return self.kind in ("limit", "ignored", "read")
 
     def as_document(self, file: str) -> dict:
         """The row of diagnosis.json."""
