@@ -36,4 +36,5 @@ def test_a_diagnosis_names_nothing_and_says_why():
     assert document["missing"] == []
     assert document["verdict"] != "missing_physics"
     assert "a gain cannot be told from a load" in document["sentence"]
-    assert [fault["kind"] for fault in document["data"]["faults"]] == ["constant_input"] * 2
+    faults = [fault["kind"] for fault in document["data"]["faults"]]
+    assert sorted(faults) == ["constant_input", "constant_input", "converter", "converter"]
