@@ -75,6 +75,9 @@ MODELS = {
     "loop, bristle": hobby({"D": 12.0}, presliding={"x_s": 0.03, "zeta": 0.4}),
     "loop, idle bridge": hobby({"D": 12.0, "idle": 3.0}),
     "loop, play": hobby({"R": 2.0, "idle": 2.0}, backlash={"gap": 0.01}),
+    "loop, hard shaft": hobby(
+        {}, shaft_compliance={"f_shaft": 6.0, "rho": 0.4, "twist_2": 0.01}, gravity_imbalance={"g_s": 20.0, "g_c": 15.0}
+    ),
     "loop, gravity": hobby(
         {"kind": "PID", "I": 2000.0, "band": 0.005, "creep": 200.0, "heavy": 10.0}, gravity_imbalance={"g_s": 30.0}
     ),

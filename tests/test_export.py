@@ -33,7 +33,7 @@ COMPILER = shutil.which("cc")
 # all of them: analysis/exported.py
 RUN = (
     "stribeck", "limit and delay", "stops, dead zone", "loop, gravity", "loop, late damping", "loop, stops",
-    "loop, slide",
+    "loop, slide", "loop, hard shaft",
 )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ is carried as an acceleration [output unit / s^2] and only turned into N m for t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -98,6 +98,7 @@ class Effect:
     only_in_loop: ClassVar[bool] = False  # whether it is none without one
     loop_sentence: ClassVar[str] = ""  # what is said of it there, with the {value} of the first of these letters
     is_weight: ClassVar[bool] = False  # its torques grow with a load's moment m l
+    by_lightness: ClassVar[Mapping[str, float]] = {}  # numbers told against the inertia: the power of one over it
     instant: ClassVar[bool] = False  # a sensor whose reading tells the output at the same time (see behind)
     torque: ClassVar[Callable | None] = None
     friction: ClassVar[Callable | None] = None
@@ -281,6 +282,7 @@ class Transmission(Effect):
     """Between the motor and the rudder."""
 
     subsystem = "transmission"
+    by_lightness: ClassVar[Mapping[str, float]] = {"f_shaft": 0.5, "f_contact": 0.5, "zeta": 0.5, "rho": 1.0}
 
 
 class Load(Effect):

@@ -1,5 +1,8 @@
 """Stops that end the travel."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
 from ers_mj.effects.base import Load, Parameter
@@ -19,6 +22,7 @@ class EndStop(Load):
         Parameter("zeta", "ratio", "damping ratio of the contact", lower=0.02, upper=2.0, absent=0.3),
     )
     needs = (("lower", "upper"),)
+    by_lightness: ClassVar[Mapping[str, float]] = {"f_stop": 0.5, "zeta": 0.5}
     tries, tangible = 3, False
 
     def starts(self, scales):

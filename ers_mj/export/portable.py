@@ -18,8 +18,8 @@ from ers_mj.effects.presliding import Presliding
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.export import stepping
 from ers_mj.export.translation import renamed
-from ers_mj.plants.firmware import LoopNumbers
 from ers_mj.plants.kernel.laws import MEMORY
+from ers_mj.plants.loop_numbers import LoopNumbers
 from ers_mj.plants.reduced import lowered
 
 LONGEST = 2e-4  # [s] of a step

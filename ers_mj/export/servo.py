@@ -11,7 +11,7 @@ import numpy as np
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
 from ers_mj.export.portable import Portable, portable
-from ers_mj.plants.firmware import LoopNumbers
+from ers_mj.plants.loop_numbers import LoopNumbers
 from ers_mj.plants.reduced import ReducedModel
 from ers_mj.position_loop.saved import loop_of
 from ers_mj.servo.datasheet import Datasheet

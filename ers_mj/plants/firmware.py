@@ -16,10 +16,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from ers_mj.plants.compiling.compiled import inline, kernel, record_in, unit
+from ers_mj.plants.compiling.compiled import inline, kernel, unit
 from ers_mj.plants.kernel.bristle import bent, bristle_damping
 from ers_mj.plants.kernel.forces import stop_at
 from ers_mj.plants.kernel.held_reference import mean_reference, switched
@@ -38,52 +37,12 @@ from ers_mj.plants.kernel.state import (
     plant_in,
     types,
 )
+from ers_mj.plants.loop_numbers import Q, loop_in
 
 LONGEST = 1e-3  # [s] of a step
 STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
+NEWTON = 8  # steps to the twist of a shaft that hardens
 PAST = 512  # steps of the drive that are kept: the longest dead time
-
-
-class LoopNumbers(NamedTuple):
-    """The firmware's numbers.
-
-    K [1/s^2], D [1/s] and I [1/s^3] of the loop, ``lag`` [s] of the speed that D multiplies, the loop's limit L
-    [output unit/s^2], latency tau [s] of the reference, dead time [s] of the drive, R the limit of the reference's
-    speed; ``band`` the error [output unit] within which the drive sleeps and ``lost`` what is still missing outside
-    it; ``idle`` [output unit/s^2] the drive that the bridge ignores, and loses of more; ``least`` the smallest drive
-    outside the band; ``most`` the largest motor torque; ``creep`` [1/s] the speed's
-    factor below breakaway (infinite: friction holds) and ``heavy`` how much slower the body answers there (MuJoCo's
-    constraint: 10), as ``buried`` within a stop (20); ``share`` the motor's of the inertia, behind which a gear rubs;
-    ``grease`` [1/s] what drags the load along within a play; ``at_motor`` 1 where the loop's sensor sits on the
-    motor's side, ``log_at_motor`` the recording's; ``fresh`` 1 where the integral is empty at the beginning.
-    """
-
-    K: float
-    D: float = 0.0
-    lag: float = 0.0
-    I: float = 0.0
-    L: float = np.inf
-    tau: float = 0.0
-    dead_time: float = 0.0
-    R: float = np.inf
-    band: float = 0.0
-    lost: float = 0.0
-    idle: float = 0.0
-    least: float = 0.0
-    most: float = np.inf
-    creep: float = np.inf
-    heavy: float = 1.0
-    buried: float = 1.0
-    share: float = 0.5
-    grease: float = 0.0
-    at_motor: float = 0.0
-    log_at_motor: float = 0.0
-    fresh: float = 0.0
-
-
-LOOP = np.dtype((np.record, np.dtype([(name, np.float64) for name in LoopNumbers._fields], align=True)))
-loop_in = record_in(LOOP)
-Q = numba.from_dtype(LOOP)
 
 
 class Moving(NamedTuple):
@@ -178,7 +137,8 @@ def _touched(c, q, twist, over):
     """
     if abs(twist) <= c.gap:
         return 0.0, q.grease
-    touch, d = c.k_twist * (twist - math.copysign(c.gap, twist)), c.d_twist + q.grease
+    x = twist - math.copysign(c.gap, twist)
+    touch, d = c.k_twist * x * (1.0 + c.harden * x * x), c.d_twist + q.grease
     if (touch + d * over) * touch < 0.0:
         d = -touch / over
     return touch, d
@@ -331,12 +291,44 @@ def _followed(q, x, seen, rate, h):
 
 
 @inline
-def _started(c, q, theta, w, r):
-    """The state at the beginning: both bodies together, an integral that holds it there, or a ``fresh`` one."""
+def _resting_twist(c, theta):
+    """How far the motor's side is ahead of a load that rests at theta: against a play, and into a shaft, as far as the
+    load's own friction does not hold it.
+    """
     hold = _held(c, theta, 0.0, 0.0, 0.0)
-    v = q.K * (r - theta)
-    xi = _limited(q, -hold) - v if q.I > 0.0 and q.fresh == 0.0 else 0.0
-    return Moving(theta, w, theta, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0, 0.0)
+    pushed = abs(hold) - (1.0 - c.phi) * 0.5 * (c.c_2_plus + c.c_2_minus)
+    if not is_parted(c) or pushed <= 0.0:
+        return 0.0
+    x = even = pushed / c.k_twist if c.k_twist > 0.0 else 0.0
+    for _ in range(NEWTON):  # of k x (1 + harden x^2), from beyond its root
+        x -= (x * (1.0 + c.harden * x * x) - even) / (1.0 + 3.0 * c.harden * x * x)
+    return -math.copysign(c.gap + x, hold)
+
+
+@inline
+def _placed(c, q, seen):
+    """(load's angle, motor side's) of a servo at rest whose log shows ``seen``."""
+    twist = _resting_twist(c, seen)
+    return (seen - twist, seen) if q.log_at_motor > 0.0 else (seen, seen + twist)
+
+
+@kernel(PAIR(F, VECTOR, VECTOR))
+def placed(seen, plant, loop):
+    """(load's angle, motor side's) [output unit] of a servo at rest whose log shows ``seen``; ``plant`` and ``loop`` as
+    for :func:`simulate`.
+    """
+    return _placed(plant_in(plant), loop_in(loop), seen)
+
+
+@inline
+def _started(c, q, seen, w, r):
+    """The state where the log shows ``seen`` at the beginning: both bodies at one speed and placed as at rest; an
+    integral that holds them there, or a ``fresh`` one.
+    """
+    theta, theta_m = _placed(c, q, seen)
+    v = q.K * (r - (theta_m if q.at_motor > 0.0 else theta))
+    xi = _limited(q, -_held(c, theta, 0.0, 0.0, 0.0)) - v if q.I > 0.0 and q.fresh == 0.0 else 0.0
+    return Moving(theta, w, theta_m, w, xi, w, r, _limited(q, v + xi - q.D * w), 0.0, 0.0)
 
 
 @kernel(types.void(READ, READ, READ_BOOL, VECTOR, VECTOR, F, F, F, N, READ, F, TABLE))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from ers_mj.effects import BY_NAME
 from ers_mj.position_loop.fit import Fit
 from ers_mj.position_loop.terms import present
 
@@ -19,6 +20,11 @@ class Compared:
     fit: Fit
     gain: float
     is_final: bool = False
+
+    @property
+    def is_transmission(self) -> bool:
+        """Whether it parts the motor from the load."""
+        return self.name in BY_NAME and BY_NAME[self.name].subsystem == "transmission"
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,10 @@ from scipy.special import stdtrit
 from ers_mj.decisions.thresholds import Policy
 from ers_mj.position_loop import beside
 from ers_mj.position_loop.compared import Selection
-from ers_mj.position_loop.fit import Data, Fit, best, fitted, jacobian
+from ers_mj.position_loop.fit import Data, Fit, best, fitted, gain, jacobian
 from ers_mj.position_loop.model import Free, LoopModel
 from ers_mj.position_loop.terms import lagging, parts, terms
+from ers_mj.position_loop.two_bodies import other_sides
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Doubt:
     clock: float = 0.00075  # [s] and in time
     unseen: float = 2.0  # gain of an effect that is not found
     noise: float = 1.1  # noise variances that noise alone may leave
-    lagged: int = 12  # steps of a refit with a late speed
+    lagged: int = 12  # steps of a refit with a late speed,
+    turned: int = 25  # and of one with the sensors elsewhere
 
 
 DOUBT = Doubt()
@@ -171,6 +173,15 @@ def passed_over(selection: Selection, policy: Policy) -> list[tuple[float, LoopM
     answer = set(parts(selection.chosen.model))
     asked = [c for c in last if c.gain > 0.0 and c.name not in answer and answer <= set(parts(c.fit.model))]
     return [(min(1.0, c.gain / policy.loop_gain), c.fit.model) for c in sorted(asked, key=lambda c: -c.gain)[:1]]
+
+
+def turned_over(fit: Fit, data: Data, policy: Policy) -> list[tuple[float, LoopModel]]:
+    """Two bodies with their sensors on other sides, and how likely they sit there: what is worse by all the gain that
+    is asked for is out of the question.
+    """
+    found = [best(starts, data, DOUBT.turned) for starts in other_sides(fit.model)]
+    chances = [1.0 + min(gain(fit, other), 0.0) / policy.loop_gain for other in found]
+    return [(chance, other.model) for chance, other in zip(chances, found, strict=True) if chance > 0.0]
 
 
 def _with_lag(model: LoopModel, data: Data) -> list[tuple[float, LoopModel]]:

@@ -10,8 +10,9 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME
 from ers_mj.effects.quantities import Coefficients, Parameter, Scales
-from ers_mj.plants.firmware import LoopNumbers, simulate
+from ers_mj.plants.firmware import simulate
 from ers_mj.plants.kernel.laws import laid_out
+from ers_mj.plants.loop_numbers import LoopNumbers
 from ers_mj.plants.reduced import lowered
 from ers_mj.position_loop.runs import Run
 from ers_mj.servo.simulation import PER_INERTIA
@@ -270,14 +271,19 @@ class LoopModel:
 
     @staticmethod
     def _scaled(name: str, values: np.ndarray, light: float, pull: float) -> np.ndarray:
-        """An effect's numbers under another load: torques over the inertia, those of a weight with its moment."""
+        """An effect's numbers under another load: torques over the inertia, those of a weight with its moment; natural
+        frequencies and damping ratios against it, and the motor's share of it.
+        """
         if light == 1.0 and pull == 1.0:
             return values
-        effect = BY_NAME[name]
-        factor = light * (pull if effect.is_weight else 1.0)
-        return np.array(
-            [v * factor if p.kind in PER_INERTIA else v for p, v in zip(effect.parameters, values, strict=True)]
-        )
+        effect, scaled = BY_NAME[name], []
+        for p, v in zip(effect.parameters, values, strict=True):
+            if p.kind in PER_INERTIA:
+                scaled.append(v * light * (pull if effect.is_weight else 1.0))
+            else:
+                other = v * light ** effect.by_lightness.get(p.name, 0.0)
+                scaled.append(min(other, WIDER["rho"][1]) if p.name == "rho" else other)
+        return np.array(scaled)
 
     def motion(self, run: Run, refine: int = 1, following: float = 0.0) -> np.ndarray:
         """Free run (N, 4) from the first sample, or one that follows the log at a rate [1/s]: load's angle and speed,

@@ -6,7 +6,7 @@ import numpy as np
 
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.errors import InputError
-from ers_mj.plants.firmware import LoopNumbers
+from ers_mj.plants.loop_numbers import LoopNumbers
 from ers_mj.plants.mujoco.looped import LoopedPlant
 from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.position_loop.model import LETTERS, WIDER, LoopModel

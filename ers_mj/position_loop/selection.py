@@ -40,7 +40,7 @@ from ers_mj.position_loop.terms import (
     terms,
     ways_round,
 )
-from ers_mj.position_loop.two_bodies import parted, refitted
+from ers_mj.position_loop.two_bodies import other_sides, parted, refitted
 from ers_mj.position_loop.weak_form import SCAN, Rough
 
 Progress = Callable[[str, float], None]
@@ -125,7 +125,9 @@ class Selector:
         """The fit of a candidate, or the better one with that effect in another form, before others stand for that."""
         if not self._may_gain(taken.fit):
             return taken.fit
-        others = [fitted(model, self.data, EFFORT.full) for model in other_forms(taken.fit.model, taken.name)]
+        starts = [[form] for form in other_forms(taken.fit.model, taken.name)]
+        starts += other_sides(taken.fit.model) if taken.is_transmission else []
+        others = [best(one, self.data, EFFORT.full) for one in starts]
         found = max(others, key=lambda fit: gain(taken.fit, fit), default=taken.fit)
         return found if gain(taken.fit, found) > self.policy.loop_place else taken.fit
 

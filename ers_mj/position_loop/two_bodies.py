@@ -13,7 +13,7 @@ import numpy as np
 
 from ers_mj.effects import BY_NAME
 from ers_mj.position_loop.fit import Data, Fit, Halving, best, fitted
-from ers_mj.position_loop.model import LoopModel
+from ers_mj.position_loop.model import SIDES, LoopModel
 from ers_mj.position_loop.terms import SIZES
 
 
@@ -27,9 +27,11 @@ class Parting:
     far: int = 25
     stiffer: int = 10
     following: float = 60.0
+    gains: tuple[float, ...] = (1.0, 2.0, 0.5)  # of the loop, from which one with its sensor elsewhere is begun
 
 
 PARTING = Parting()
+LOOP = ("K", "D", "I", "L", "a_2", "c_2")  # letters that come with the loop's gain
 
 
 def parted(starts: Sequence[LoopModel], data: Data) -> Fit:
@@ -48,6 +50,17 @@ def refitted(starts: Sequence[LoopModel], data: Data, steps: int, enough: float)
     if found.misfit < enough**2 or not found.model.has_two_bodies:
         return found
     return min(found, fitted(best(starts, _followed(data), steps).model, data, steps), key=_cost)
+
+
+def other_sides(model: LoopModel) -> list[list[LoopModel]]:
+    """Starts of two bodies with the sensors of loop and log on each of the other sides, which asks for another gain of
+    much the same loop; none of one body.
+    """
+    if not model.has_two_bodies:
+        return []
+    asked = [x for x in LOOP if x in model.free]
+    stronger = [model.having(**{x: by * model[x] for x in asked}) for by in PARTING.gains]
+    return [[replace(start, side=side) for start in stronger] for side in SIDES if side != model.side]
 
 
 def _followed(data: Data) -> Data:

@@ -12,7 +12,7 @@ from ers_mj.diagnosis.loop.case import LoopCase
 from ers_mj.diagnosis.loop.document import told
 from ers_mj.position_loop.confirmation import confirmed
 from ers_mj.position_loop.fit import polished
-from ers_mj.position_loop.intervals import Intervals, passed_over
+from ers_mj.position_loop.intervals import Intervals, passed_over, turned_over
 from ers_mj.position_loop.runs import runs_of
 from ers_mj.position_loop.selection import Selector
 from ers_mj.servo.datasheet import Datasheet
@@ -39,5 +39,6 @@ def diagnose_loop(
     selection = replace(selection, chosen=polished(selection.chosen, selector.data))
     progress("running the MuJoCo plant", 0.88)
     left_out = found.models if found.folds[0].training is not None and len(runs) > 1 else ()
-    intervals = Intervals.of(selection.chosen, selector.data, left_out, passed_over(selection, policy))
+    rivals = passed_over(selection, policy) + turned_over(selection.chosen, selector.data, policy)
+    intervals = Intervals.of(selection.chosen, selector.data, left_out, rivals)
     return told(LoopCase(recordings, holdout, selector, selection, found, intervals, datasheet, seed, policy))

@@ -55,11 +55,33 @@ def step(c, x, command):
     sense(c, x)
 
 
-def begin(c, x, command):
-    """At rest at theta (set before), the command held before."""
+def place(c, x):
+    """Both bodies at rest, the one that is logged at theta (set before): a weight that the load's friction does not
+    hold lies against the play and twists the shaft.
+    """
     x.theta_m = x.theta
-    x.sensed = x.theta
-    x.before = x.theta
+    if c.looped > 0.0 and c.parted > 0.0:
+        hold = c.bias + c.a_1 * (c.theta_0 - x.theta) + total_torque(c, x, x.theta, 0.0, 0.0, 0.0)
+        pushed = abs(hold) - (1.0 - c.phi) * 0.5 * (c.c_2_plus + c.c_2_minus)
+        x_0 = pushed / c.k_twist if pushed > 0.0 and c.k_twist > 0.0 else 0.0
+        over = x_0
+        k = 0
+        while k < 8:
+            over -= (over * (1.0 + c.harden * over * over) - x_0) / (1.0 + 3.0 * c.harden * over * over)
+            k += 1
+        twist = -sign(hold) * (c.gap + over) if pushed > 0.0 else 0.0
+        if c.log_at_motor > 0.0:
+            x.theta -= twist
+        else:
+            x.theta_m += twist
+
+
+def begin(c, x, command):
+    """At rest where the log shows theta (set before), the command held before."""
+    shown = x.theta
+    place(c, x)
+    x.sensed = shown
+    x.before = shown
     x.r = command
     k = 0
     while k < c.past_kept:
@@ -67,11 +89,11 @@ def begin(c, x, command):
         k += 1
     k = 0
     while k < c.seen_kept:
-        x.seen[k] = x.theta
+        x.seen[k] = shown
         k += 1
     if c.looped > 0.0:
         held = -c.bias - c.a_1 * (c.theta_0 - x.theta) - total_torque(c, x, x.theta, 0.0, 0.0, 0.0)
-        v = c.K * (command - x.theta)
+        v = c.K * (command - (x.theta_m if c.at_motor > 0.0 else x.theta))
         if c.I > 0.0:
             x.xi = limited(held, c.L) - v
         x.drive = limited(v + x.xi, passed(c))

@@ -9,9 +9,12 @@ import mujoco
 import numpy as np
 
 from ers_mj.effects.load_dependent_friction import LoadDependentFriction
-from ers_mj.plants.firmware import LoopNumbers
+from ers_mj.plants.firmware import placed
+from ers_mj.plants.kernel.laws import laid_out
+from ers_mj.plants.loop_numbers import LoopNumbers
 from ers_mj.plants.mujoco.plant import MAX_DELAY_SAMPLES, MechanicalPlant
 from ers_mj.plants.mujoco.stepping import unlogged
+from ers_mj.plants.reduced import lowered
 
 SIDE = [parameter.name for parameter in LoadDependentFriction.parameters].index("side")
 CONTROL_STEP = 5e-4  # [s] for which the stepped controller holds its drive
@@ -97,7 +100,7 @@ class LoopedPlant:
         """What the log shows (N,) of a free run under the reference r (N,), by the stepped controller."""
         q, out = self.loop, np.full(t.size, np.nan)
         stepper = self.plant._stepper()
-        stepper.reset(self.plant._start(start))
+        stepper.reset(self._placed(start))
         firmware = _Firmware(q, t, r, before)
         late = [0.0] * max(1, round(q.dead_time / CONTROL_STEP))
         for k in range(t.size):
@@ -115,6 +118,13 @@ class LoopedPlant:
                 late = late if q.dead_time > 0.0 else late[-1:]
                 stepper.hold([(min(max(drive, -q.most), q.most), stepper._divide(h)[1])], h)
         return out
+
+    def _placed(self, start: tuple[float, float]) -> dict[str, tuple[float, float]]:
+        """{joint: (position, velocity)} of a servo whose log shows ``start`` (angle, speed)."""
+        seen, w = start
+        plant = laid_out(*lowered(self.plant.coefficients, self.plant.effects))
+        theta, theta_m = placed(seen, plant, np.array(self.loop, float))
+        return self.plant.parted_start(theta, theta_m, w)
 
 
 def _carried(name: str, values: np.ndarray, share: float) -> np.ndarray:

@@ -149,9 +149,15 @@ class MechanicalPlant:
 
     def positions(self, theta: float, theta_m: float) -> np.ndarray:
         """Joint positions (nq,) of the model with the output at theta and the drive before the play at theta_m."""
-        start = self._start((theta, 0.0)) | {name: (q, 0.0) for name, (q, _) in self._skeleton.pose(theta_m).items()}
-        start["gap"] = (theta - theta_m, 0.0)
+        start = self.parted_start(theta, theta_m, 0.0)
         return np.array([start.get(self.model.joint(k).name, (0.0, 0.0))[0] for k in range(self.model.njnt)])
+
+    def parted_start(self, theta: float, theta_m: float, omega: float) -> dict[str, tuple[float, float]]:
+        """{joint: (position, velocity)} with the output at theta, the drive before the play at theta_m, and one speed
+        of both.
+        """
+        pose = {name: (q, dq * omega) for name, (q, dq) in self._skeleton.pose(theta_m).items()}
+        return self._start((theta, omega)) | pose | {"gap": (theta - theta_m, 0.0)}
 
     # -- building --
 
