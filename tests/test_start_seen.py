@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ers_mj.data.prepared import start_seen
+from ers_mj.data.beginnings import speed_about, start_seen
 
 
 @pytest.mark.parametrize(
@@ -70,3 +70,18 @@ def test_few_samples_of_a_fast_motion_do_not_refuse_rest():
     thrown = np.array([0.2562, 0.4258, 0.6724, 0.7906, 0.8065, 0.8055, 0.8051, 0.8050])  # rad
     assert start_seen(t, thrown, 8e-4) == (0.0, 0.0)
     assert start_seen(t, 0.2562 + 5.0 * t + 0.02 * np.sin(300.0 * t), 8e-4)[0] > 3.0
+
+
+def test_a_part_that_begins_in_motion_has_the_speed_of_what_lay_before():
+    """Though the input switches at its first sample, which throws it the other way."""
+    t, at = 0.004 * np.arange(60), 30
+    x = t - t[at]
+    y = (
+        -0.7 * x
+        - 4.0 * x**2
+        + np.where(x > 0.0, 180.0 * x**2, 0.0)
+        + 2e-4 * np.random.default_rng(5).standard_normal(60)
+    )
+    low, high = speed_about(t, y, at, 2e-4)
+    assert low < -0.7 < high < 0.0
+    assert speed_about(t, y, 3, 2e-4) is None

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
+from ers_mj.data.beginnings import BEGINNING, speed_about, start_samples, start_seen
 from ers_mj.data.channels import Channel, channels_of, supply_of
 from ers_mj.data.kept import Kept
 from ers_mj.data.quantisation import Converter
@@ -26,20 +26,6 @@ from ers_mj.decisions.thresholds import POLICY
 from ers_mj.errors import InputError
 
 BLOCK = 0.25  # [s]
-START = 0.05  # [s] of a record that its initial state is taken from, or BEGINNING.samples, whichever is longer
-
-
-@dataclass(frozen=True)
-class Beginning:
-    """What a start is told from, where no model is known."""
-
-    samples: int = 10  # or those of START seconds, whichever is longer
-    fewest_seen: int = 6  # samples
-    first: int = 2  # changes by which a speed must show
-    sure: float = 3.0  # standard deviations within which a speed may lie
-
-
-BEGINNING = Beginning()
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +53,8 @@ class Trace:
     spans that its sensor lost.
 
     ``channels`` are what further sensors saw; each is judged in blocks of its own behind those of the output.
-    ``supply`` is the measured one [V] (N,), None where none was measured or it does not vary; ``converter`` the one
+    ``supply`` is the measured one [V] (N,), None where none was measured or it does not vary; ``speeds`` the least and
+    the largest at the first sample where samples before it tell them; ``converter`` the one
     whose steps are coarse for the travel, where there is one; ``input_kind`` the recording's (a torque and a current
     are told, no back-EMF takes from them).
     """
@@ -89,6 +76,7 @@ class Trace:
     supply: np.ndarray | None = None
     converter: Converter | None = None
     input_kind: str = "voltage"
+    speeds: tuple[float, float] | None = None
 
     @property
     def is_coarse(self) -> bool:
@@ -132,15 +120,16 @@ class Trace:
         return self.t.size > 1 and bool(np.ptp(np.diff(self.t)) < 1e-5 * self.sample_time)
 
     def part(self, begin: int, end: int, start: tuple[float, float] | None = None) -> Trace:
-        """Samples begin..end as a trace of their own, which begins in the state ``start``, else as the samples show
-        it.
+        """Samples begin..end as a trace of their own, which begins in the state ``start``, else as the samples there
+        and before show it.
         """
         cut = slice(begin, end)
+        speeds = None if start else speed_about(self.t, self.y, begin, self.sigma)
         pick = lambda a: None if a is None else a[cut]
         signals = self.t[cut], self.u[cut], self.y[cut], self.valid[cut]
         kept = Signals(*signals, pick(self.enable), pick(self.load))
         return replace(
-            make_trace(self.name, kept, self.sigma, self.quantum, start),
+            make_trace(self.name, kept, self.sigma, self.quantum, start, speeds),
             channels=tuple(replace(c, values=c.values[cut]) for c in self.channels),
             supply=pick(self.supply),
             converter=self.converter,
@@ -285,10 +274,15 @@ def counted(traces: Sequence[Trace], travel: float) -> list[Trace]:
 
 
 def make_trace(
-    name: str, s: Signals, sigma: float, quantum: float = 0.0, start: tuple[float, float] | None = None
+    name: str,
+    s: Signals,
+    sigma: float,
+    quantum: float = 0.0,
+    start: tuple[float, float] | None = None,
+    speeds: tuple[float, float] | None = None,
 ) -> Trace:
-    """A trace with its blocks of BLOCK seconds and its initial state, where that is not known as the samples show
-    it.
+    """A trace with its blocks of BLOCK seconds and its initial state, where that is not known as the samples show it:
+    these, or what lay before them (``speeds``, least and largest).
     """
     t = s.t
     block = np.minimum(np.floor((t - t[0]) / BLOCK), max(np.floor((t[-1] - t[0]) / BLOCK) - 1, 0))
@@ -297,63 +291,17 @@ def make_trace(
     block = block.astype(np.int64)
     counts = np.bincount(block[s.valid], minlength=block[-1] + 1).astype(float)
     y = np.where(s.valid, s.y, np.nan)
-    trace = Trace(name, t, s.u, y, s.valid, s.enable, s.load, sigma, quantum, start or (0.0, 0.0), block, counts)
+    signals = name, t, s.u, y, s.valid, s.enable, s.load
+    trace = Trace(*signals, sigma, quantum, start or (0.0, 0.0), block, counts, speeds=speeds)
     return trace if start else replace(trace, start=_started(trace))
 
 
 def _started(trace: Trace) -> tuple[float, float]:
     n = trace.beginning
-    low, high = start_seen(trace.t[:n], trace.y[:n], trace.sigma)
+    low, high = trace.speeds or start_seen(trace.t[:n], trace.y[:n], trace.sigma)
     y = trace.y[:n][trace.valid[:n]]
     still = y[: int(np.argmax(np.append(np.abs(y - y[0]) > 3.0 * trace.sigma, True)))] if y.size else np.zeros(1)
     return float(np.mean(still)) if low == high else float(y[0]), 0.5 * (low + high)
-
-
-def start_samples(t: np.ndarray) -> int:
-    """Number of samples that an initial state is taken from: 50 ms or 10 samples, whichever is longer."""
-    return min(max(BEGINNING.samples, int(np.searchsorted(t, t[0] + START))), t.size)
-
-
-def start_seen(t: np.ndarray, y: np.ndarray, sigma: float) -> tuple[float, float]:
-    """The least and the largest speed at the first of the samples (N,) that they allow, without a model: both 0 where
-    rest is allowed.
-
-    Polynomials of several degrees through heads of several lengths, of which those count that miss the samples by no
-    more than their noise; the best one where none does. A speed against which the very first samples go, or the whole
-    head without one sample that goes along, is none: it is how a polynomial meets a rudder that is thrown from rest.
-    Where none meets the samples, as few of a fast motion, rest is allowed if one without a speed is hardly worse.
-    """
-    known = np.isfinite(y)
-    return _start_seen((t[known] - t[0]).tobytes(), y[known].tobytes(), sigma)
-
-
-@lru_cache(512)  # asked for again and again of the same beginnings
-def _start_seen(times: bytes, outputs: bytes, sigma: float) -> tuple[float, float]:
-    """``start_seen`` of the known samples, from the first on."""
-    t, y = np.frombuffer(times), np.frombuffer(outputs)
-    if t.size < BEGINNING.fewest_seen:
-        return 0.0, 0.0
-    found, at_rest = [], []
-    for n in {max(t.size // part, BEGINNING.fewest_seen) for part in (1, 2, 4, 8)}:
-        for degree in range(1, min(n - 3, 6)):
-            design = np.vander(t[:n] / t[n - 1], degree + 1, increasing=True)
-            coefficient, *_ = np.linalg.lstsq(design, y[:n], rcond=None)
-            missed = math.sqrt(float(np.sum((y[:n] - design @ coefficient) ** 2)) / (n - degree - 1)) / sigma
-            reach = BEGINNING.sure * max(missed, 1.0) * sigma * math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
-            still, *_ = np.linalg.lstsq(rest := np.delete(design, 1, axis=1), y[:n], rcond=None)
-            at_rest.append(math.sqrt(float(np.sum((y[:n] - rest @ still) ** 2)) / (n - degree)) / sigma)
-            found.append(
-                (missed - 2.0 / math.sqrt(n), (coefficient[1] - reach) / t[n - 1], (coefficient[1] + reach) / t[n - 1])
-            )
-    enough = max(1.0, best := min(missed for missed, *_ in found))
-    if best > BEGINNING.sure and min(at_rest) < BEGINNING.sure * best:
-        return 0.0, 0.0
-    low, high = (
-        pick(ends) for pick, ends in zip((min, max), list(zip(*(some for some in found if some[0] <= enough)))[1:])
-    )
-    along, seen = np.sign(low) * (y - y[0]), BEGINNING.sure * math.sqrt(2.0) * sigma
-    thrown = -np.min(along[1 : 1 + BEGINNING.first]) > seen or -along[-1] > seen >= np.max(along)
-    return (0.0, 0.0) if low <= 0.0 <= high or thrown else (float(low), float(high))
 
 
 @dataclass(frozen=True)

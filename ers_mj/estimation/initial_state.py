@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.data.prepared import Trace, start_seen
+from ers_mj.data.beginnings import start_seen
+from ers_mj.data.prepared import Trace
 from ers_mj.data.quantisation import thresholds
 from ers_mj.data.sensor_faults import excursions, held_spans
 from ers_mj.estimation.objective import cost_of, is_rough
@@ -112,7 +113,7 @@ def fitted_start(model: Model, trace: Trace, record: int = 0) -> tuple[float, fl
             x, e = x + move, trial
         return x
 
-    low, high = start_seen(head.t, head.y, head.sigma)
+    low, high = trace.speeds or start_seen(head.t, head.y, head.sigma)
     begun = np.array([trace.start[0], 0.5 * (low + high)])
     fitted = settle(begun, moving=low != high)
     if low <= fitted[1] <= high:

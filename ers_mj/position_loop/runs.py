@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ers_mj.data.prepared import start_seen
+from ers_mj.data.beginnings import start_seen
 from ers_mj.data.recording import Recording
 from ers_mj.data.sensor_faults import converter_step, spikes
 from ers_mj.effects.quantities import Scales

@@ -9,7 +9,8 @@ from functools import cache
 
 import numpy as np
 
-from ers_mj.data.prepared import START, Trace
+from ers_mj.data.beginnings import START
+from ers_mj.data.prepared import Trace
 from ers_mj.decisions import confirmation as decisions
 from ers_mj.decisions.explained import cost, score
 from ers_mj.decisions.thresholds import POLICY, Policy

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ers_mj.data.prepared import Blocks, Trace, start_samples
+from ers_mj.data.beginnings import start_samples
+from ers_mj.data.prepared import Blocks, Trace
 from ers_mj.decisions.explained import cost
 from ers_mj.effects import BY_NAME
 from ers_mj.estimation.fit import Along, fit
@@ -229,10 +230,11 @@ class Recalibrated:
 
 def recalibrated(model: Model, trace: Trace, measure: Measure = FREE_RUN) -> Recalibrated:
     """Gain, friction level and (where the plant feels position) offset fitted on the first 30 % of a recording; the
-    score is taken on the rest. They stay neutral unless they buy their price there.
+    score is taken on the rest. They stay neutral unless they buy their price there, and leave less by the measure that
+    the rest is scored by.
     """
     cut = int(REFIT.recalibrated * trace.t.size)
-    head = trace.part(0, cut)
+    head = trace.part(0, cut, trace.start)
     known = {name: rows[[0, 0]] for name, rows in (model.local or {}).items()}
     held = (*model.names, *(f"{name}, local" for name in known))
     pair = (
@@ -247,6 +249,8 @@ def recalibrated(model: Model, trace: Trace, measure: Measure = FREE_RUN) -> Rec
     misfit = Blocks.of([blank, head]).misfit(residuals(pair, [blank, head], OBSERVER_RATE))
     tau = tau_of(misfit[blank.counts.size :])
     found = fit(pair, [blank, head], tau=tau, steps=10)
-    if cost(misfit, tau) - cost(found.misfit, tau) < 0.5 * found.size:
+    pays = cost(misfit, tau) - cost(found.misfit, tau) >= 0.5 * found.size
+    before, after = (scored(one, head, 1, 0, measure).squares for one in (pair, found.model))
+    if not (pays and after < before):
         found = replace(found, model=pair)
     return Recalibrated(found.model, (blank, head), tau, scored(found.model, trace, 1, cut, measure))
