@@ -232,6 +232,18 @@ def test_a_speed_in_degrees_is_not_used_and_degrees_under_radians_are_refused(dr
 # -- what is commanded -----------------------------------------------------------------------------------------------
 
 
+def test_a_magnitude_that_a_spring_answers_is_refused(put):
+    t, rng = STEP * np.arange(N), np.random.default_rng(11)
+    u, y, w = np.repeat(rng.uniform(-8, 8, size=N // 80 + 1), 80)[:N], np.zeros(N), 0.0
+    for k in range(N - 1):
+        w += STEP * (40.0 * u[k] - 10.0 * w - 60.0 * y[k] - 5.0 * np.sign(w))
+        y[k + 1] = y[k] + STEP * w
+    with pytest.raises(InputError, match=r"never negative and goes with the deflection's magnitude"):
+        read_recording(put({"t_s": t, "u_V": np.abs(u), "theta_rad": y}))
+    lifted = y + 10.0  # a servo that is only told to go one way
+    assert read_recording(put({"t_s": t, "u_V": u + 8.0, "theta_rad": lifted})).u.min() >= 0.0
+
+
 def test_a_magnitude_takes_its_sign_from_the_direction_or_is_refused(drive, put):
     rest = {"t_s": drive["t_s"], "theta_rad": drive["theta_rad"]}
     magnitude = {"u_duty_pct": np.abs(drive["u_V"]) * 10}

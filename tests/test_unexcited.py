@@ -36,5 +36,6 @@ def test_a_diagnosis_names_nothing_and_says_why():
     assert document["missing"] == []
     assert document["verdict"] != "missing_physics"
     assert "a gain cannot be told from a load" in document["sentence"]
+    assert document["parameters"]["b"]["value"] is document["parameters"]["theta_0"]["value"] is None
     faults = [fault["kind"] for fault in document["data"]["faults"]]
     assert sorted(faults) == ["constant_input", "constant_input", "converter", "converter"]

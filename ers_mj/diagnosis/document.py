@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +11,11 @@ import numpy as np
 from ers_mj import __version__
 from ers_mj.data.columns import per
 from ers_mj.data.prepared import Trace
-from ers_mj.data.recording import Recording
 from ers_mj.decisions.confirmation import is_no_size
 from ers_mj.decisions.explained import cost
 from ers_mj.diagnosis import unknown_told
 from ers_mj.diagnosis.case import Case
+from ers_mj.diagnosis.data_told import data_of
 from ers_mj.diagnosis.errors_told import as_named
 from ers_mj.diagnosis.evidence import Evidence
 from ers_mj.diagnosis.latent_force_told import latent_forces
@@ -25,7 +24,7 @@ from ers_mj.diagnosis.record_state import record_state
 from ers_mj.diagnosis.remainder import beyond_training, remainder
 from ers_mj.diagnosis.sentences import of_another_day, of_its_own, sentence, shown
 from ers_mj.diagnosis.told_model import with_diagnosis
-from ers_mj.diagnosis.unexcited import is_unexcited, moving_input
+from ers_mj.diagnosis.unexcited import is_unexcited, moving_input, told_together
 from ers_mj.diagnosis.views import ladder, views
 from ers_mj.effects import BY_NAME, Parameter
 from ers_mj.experiment_design.next_recording import next_recording
@@ -70,8 +69,7 @@ def told(case: Case, held: list[Trace]) -> Diagnosis:
         spectrum,
     )
     changed = of_another_day(case.fits, states, case.output_unit, case.policy) if case.holdout else ""
-    data = data_of(case.recordings, case.holdout)
-    data["problems"] += _degrees(case)
+    data = data_of(case.recordings, case.holdout, case.datasheet)
     document = {
         "version": 1,
         "verdict": verdict,
@@ -268,8 +266,9 @@ def _parameters(case: Case) -> dict:
     }
     rows: dict[str, dict] = {}
     errors = case.errors
+    apart = _apart(case)
     for name in BASE:
-        fitted = ("base", name) in errors
+        fitted = name in apart
         is_told = fitted and (name == "theta_0" or not is_no_size(*errors[("base", name)], case.policy))
         if not fitted and name in ("tau_e", "emf_share", "ampere"):
             continue
@@ -294,6 +293,11 @@ def _parameters(case: Case) -> dict:
             }
     rows |= _combinations(case, rows)
     return rows
+
+
+def _apart(case: Case) -> set[str]:
+    """The baseline's fitted numbers, without those that these recordings tell only together."""
+    return {name for owner, name in case.errors if owner == "base"}.difference(told_together(case.start.traces))
 
 
 def _around(value: float, low: float, high: float) -> list[float]:
@@ -340,28 +344,6 @@ def place_of(p: Place) -> dict:
         "share_of_time": p.share_of_time,
         "sentence": p.sentence,
     }
-
-
-def data_of(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> dict:
-    """What was read, and what was found in it."""
-    every, first = [*recordings, *holdout], recordings[0]
-    return {
-        "files": [r.name for r in every],
-        "sha256": [r.sha256 for r in every],
-        "output_unit": first.output_unit,
-        "input_unit": {"pct": "%"}.get(first.input_unit, first.input_unit),
-        "input_kind": first.input_kind,
-        "problems": [f"{r.name}: {p}" for r in every for p in r.problems],
-        "faults": [fault.as_document(r.name) for r in every for fault in r.faults],
-    }
-
-
-def _degrees(case: Case) -> list[str]:
-    """A travel far beyond the datasheet's rest angle looks like degrees that are named radians."""
-    y = np.concatenate([t.y[t.valid] for t in case.start.traces])
-    if case.output_unit == "rad" and case.datasheet is not None and float(np.max(np.abs(y))) > 2 * math.pi:
-        return [f"the output reaches {np.max(np.abs(y)):.3g} rad, more than a full turn: are these degrees?"]
-    return []
 
 
 def _improved(case: Case) -> Datasheet:

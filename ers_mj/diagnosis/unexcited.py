@@ -19,6 +19,13 @@ def is_unexcited(recordings: Sequence) -> bool:
     return float(np.ptp([end for r in recordings for end in (np.min(r.u), np.max(r.u))])) == 0.0
 
 
+def told_together(traces: Sequence[Trace]) -> tuple[str, ...]:
+    """The numbers that an input which never changes cannot tell: its gain, and where a spring rests unless it is 0."""
+    if not is_unexcited(traces):
+        return ()
+    return ("b", "ampere", "theta_0") if traces[0].u[0] else ("b", "ampere")
+
+
 def moving_input(traces: Sequence[Trace], input_unit: str, output_unit: str) -> dict:
     """The advice of an input that moves, of the size of the one that was held, as `next_recording` gives it."""
     level = float(traces[0].u[0])

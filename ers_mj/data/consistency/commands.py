@@ -17,8 +17,8 @@ class Commands:
 
     share: float = 0.1  # of the time that an output must move either way
     moving: float = 0.1  # of its top speed, from which it moves
-    magnitude: float = 0.5  # correlation of an input with the speed's magnitude, from which it may be one
-    signed: float = 0.25  # correlation with any signed motion, up to which it is one
+    magnitude: float = 0.5  # correlation of an input with the magnitude of a motion, from which it may be one
+    signed: float = 0.6  # share of that, up to which it goes with any signed motion
 
 
 COMMANDS = Commands()
@@ -39,7 +39,9 @@ def directed(sheet: Sheet) -> Found:
 
 
 def unsigned(sheet: Sheet) -> Found:
-    """Refuse an input that goes with the magnitude of the speed and with nothing that has a sign."""
+    """Refuse an input that goes with how fast the output moves, or how far a spring lets it, and far less with anything
+    that has a sign.
+    """
     if "u" in sheet.sure or sheet.kind == "position" or np.min(sheet.u) < 0.0 or np.ptp(sheet.u) == 0.0:
         return sheet, []
     v = speed(sheet)
@@ -49,10 +51,13 @@ def unsigned(sheet: Sheet) -> Found:
     lags = lags_of(sheet)
     acceleration = np.gradient(v, sheet.t)
     signed = max(abs(lagged(sheet.u, x, lags)[1]) for x in (v, sheet.y, acceleration))
-    if signed < COMMANDS.signed and lagged(sheet.u, np.abs(v), lags)[1] > COMMANDS.magnitude:
+    sizes = {"speed": np.abs(v), "deflection": np.abs(sheet.y - np.nanmedian(sheet.y))}
+    size = max(sizes, key=lambda name: lagged(sheet.u, sizes[name], lags)[1])
+    magnitude = lagged(sheet.u, sizes[size], lags)[1]
+    if magnitude > COMMANDS.magnitude and signed < COMMANDS.signed * magnitude:
         column = sheet.labels["u"]
         raise InputError(
-            f"{sheet.name}: {column} is never negative and goes with the speed's magnitude, whichever way the output"
+            f"{sheet.name}: {column} is never negative and goes with the {size}'s magnitude, whichever way the output"
             f" moves: its sign seems to stand elsewhere, give it with --map direction=COLUMN, or insist with --map"
             f' "{_contract(sheet)}={column} [{ {"pct": "%"}.get(sheet.units["u"], sheet.units["u"]) }]"'
         )

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ers_mj.diagnosis.document import Diagnosis, data_of, place_of, versions_of
+from ers_mj.diagnosis.data_told import data_of
+from ers_mj.diagnosis.document import Diagnosis, place_of, versions_of
 from ers_mj.diagnosis.errors_told import as_named
 from ers_mj.diagnosis.evidence import Evidence, RecordView, Rung
 from ers_mj.diagnosis.localisation import Place, Ranked, Samples, places, residual_map, shaded
@@ -37,7 +38,7 @@ def told(case: LoopCase) -> Diagnosis:
     """The document, the evidence, the model and the plant."""
     samples = gather(case)
     missing = [_effect(case, name) for name in case.told_effects]
-    found, data = _places(case, samples), data_of(case.recordings, case.holdout)
+    found, data = _places(case, samples), data_of(case.recordings, case.holdout, None)
     known = case.datasheet.to_lumped() if case.datasheet is not None else {}
     data["problems"] += [BESIDE] if case.datasheet is not None else []
     fits = as_named(case.fits, case.names, case.told_effects)
