@@ -7,6 +7,7 @@ import pytest
 from ers_mj.cli import main
 from ers_mj.data.recording import from_arrays, from_columns, write_recording
 from ers_mj.diagnosis.pipeline import diagnose
+from ers_mj.door.identifying import identify
 from ers_mj.door.known import known
 from ers_mj.door.model import load_model
 from ers_mj.effects.backlash import Backlash
@@ -363,3 +364,20 @@ def test_a_model_with_a_loop_becomes_a_system_of_python_control():
     assert model.to_control(rate_hz=500.0).dt == pytest.approx(0.002)
     with pytest.raises(InputError, match="about its rest"):
         model.to_control(theta=0.3)
+
+
+def test_identify_begins_from_a_model_with_a_loop_and_holds_what_is_told(tmp_path):
+    recordings = recorded(LIMITED)
+    first = identify(recordings, jobs=1)
+    file = tmp_path / "model.toml"
+    write_model(file, first.model.datasheet)
+    again = identify(recordings, file, jobs=1)
+    assert again.parameters["K"] == pytest.approx(first.parameters["K"], rel=1e-3)
+    held = identify(recordings, file, fix={"tau_s": 0.01}, jobs=1).to_dict()["parameters"]
+    assert held["tau_s"] == held["tau_s"] | {"value": 0.01, "fixed": True}
+    with pytest.raises(InputError, match=r"R cannot be fixed: this loop has K, L, tau_s"):
+        identify(recordings, file, fix={"R": 3.0}, jobs=1)
+    with pytest.raises(InputError, match=r"--fix needs --datasheet"):
+        identify(recordings, fix={"K": 900.0}, jobs=1)
+    with pytest.raises(InputError, match=r"takes a model.toml with a \[loop\]"):
+        identify(recordings, "table1", jobs=1)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, TypedDict, Unpack
 
 from threadpoolctl import threadpool_limits
 
 from ers_mj.data.recording import Recording
 from ers_mj.diagnosis.loop.rows import improved, parameters
-from ers_mj.door.known import Known, known_plant
+from ers_mj.door.known import Known, known, known_plant
 from ers_mj.door.model import Model
 from ers_mj.door.reading import Given, recordings_of
 from ers_mj.door.results import Progress, Result, Writers, parameter_rows, silent
@@ -23,6 +24,8 @@ from ers_mj.identification.answer import Identified
 from ers_mj.identification.finding import BUDGET, Settings
 from ers_mj.position_loop.identify import Identified as LoopFound
 from ers_mj.position_loop.identify import identify_loop
+from ers_mj.position_loop.saved import model_of
+from ers_mj.servo.datasheet import Datasheet
 from ers_mj.servo.model_file import write_model
 
 
@@ -89,8 +92,14 @@ class Identification(Result):
 class LoopIdentification(Identification):
     """What an identification of a position loop found."""
 
-    def __init__(self, found: LoopFound, recordings: Sequence[Recording], seed: int):
-        Result.__init__(self, _loop_document(found, recordings, seed))
+    def __init__(
+        self,
+        found: LoopFound,
+        recordings: Sequence[Recording],
+        seed: int,
+        fixed: Mapping[str, float] = MappingProxyType({}),
+    ):
+        Result.__init__(self, _loop_document(found, recordings, seed, fixed))
         self._loop, self._model = found, improved(found.fit.model)
 
     @cached_property
@@ -161,14 +170,24 @@ def identify(
     refuse_twice(given, [])
     refuse_mixed_inputs(given)
     if given[0].input_kind == "position":
-        refuse_beside_a_loop(settings, datasheet is not None)
-        with threadpool_limits(1):
-            return LoopIdentification(identify_loop(given, settings.jobs, progress), given, settings.seed)
+        return _of_a_loop(given, known(datasheet), settings, progress)
     sheet = known_plant(datasheet)
     refuse_other_units(sheet, given)
     with threadpool_limits(1):
         found = estimate.identify(given, sheet, settings, progress)
     return Identification(found, given)
+
+
+def _of_a_loop(
+    given: list[Recording], loop: Datasheet | None, settings: Settings, progress: Progress
+) -> LoopIdentification:
+    """As ``identify``, of recordings of a position command."""
+    refuse_beside_a_loop(settings, loop)
+    refuse_other_units(loop, given)
+    fixed = settings.fixed or {}
+    with threadpool_limits(1):
+        found = identify_loop(given, settings.jobs, progress, None if loop is None else model_of(loop), fixed)
+    return LoopIdentification(found, given, settings.seed, fixed)
 
 
 def _document(found: Identified, recordings: Sequence[Recording]) -> dict[str, Any]:
@@ -207,23 +226,35 @@ def _data(recordings: Sequence[Recording]) -> dict[str, Any]:
     }
 
 
-def refuse_beside_a_loop(settings: Settings, has_datasheet: bool) -> None:
+def refuse_beside_a_loop(settings: Settings, loop: Datasheet | None) -> None:
     """Raise InputError for what the fit of a position loop does not take."""
-    asked = {"--method": settings.method != "ls", "--plant": settings.plant != "reduced", "--fix": bool(settings.fixed)}
-    asked |= {"--bounds": bool(settings.bounds), "--datasheet": has_datasheet}
+    asked = {
+        "--method": settings.method != "ls",
+        "--plant": settings.plant != "reduced",
+        "--bounds": bool(settings.bounds),
+        "--fix": bool(settings.fixed) and loop is None,
+        "--datasheet": loop is not None and not loop.loop,
+    }
+    why = {
+        "--fix": "needs --datasheet with a model.toml whose [loop] has that number",
+        "--datasheet": "takes a model.toml with a [loop] where a position is commanded, or is left out",
+    }
     for option, is_given in asked.items():
         if is_given:
-            raise InputError(f"{option} does not go with a position command, which least squares fit without it")
+            told = why.get(option, "does not go with a position command, which least squares fit without it")
+            raise InputError(f"{option} {told}")
 
 
-def _loop_document(found: LoopFound, recordings: Sequence[Recording], seed: int) -> dict[str, Any]:
+def _loop_document(
+    found: LoopFound, recordings: Sequence[Recording], seed: int, fixed: Mapping[str, float]
+) -> dict[str, Any]:
     words = "explains the recordings" if found.explains else "leaves more than noise: ask ers diagnose what is missing"
     rows = parameters(found.intervals, recordings[0].output_unit, found.data)
     return {
         "method": "ls",
         "plant": "reduced",
         "sentence": f"A {found.fit.model.kind} position loop {words}.",
-        "parameters": {name: row | {"fixed": False} for name, row in rows.items()},
+        "parameters": {name: row | _held(fixed.get(name)) for name, row in rows.items()},
         "fitness": found.fitness,
         "evaluations": found.evaluations,
         "wall_s": found.wall_s,
@@ -234,3 +265,10 @@ def _loop_document(found: LoopFound, recordings: Sequence[Recording], seed: int)
         "seed": seed,
         "versions": versions(),
     }
+
+
+def _held(value: float | None) -> dict[str, Any]:
+    """What a row says of a number that is held there."""
+    if value is None:
+        return {"fixed": False}
+    return {"value": value, "ci95": [value, value], "identifiable": True, "fixed": True}

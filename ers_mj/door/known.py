@@ -51,6 +51,7 @@ def known_plant(given: Known) -> Datasheet | None:
     sheet = known(given)
     if sheet is not None and sheet.loop:
         raise InputError(
-            f"{sheet.name or 'the model'}: closes a position loop of its own ([loop]), which only simulate takes here"
+            f"{sheet.name or 'the model'}: closes a position loop of its own ([loop]), which goes with recordings of a"
+            " position command, and into simulate, view and export"
         )
     return sheet
