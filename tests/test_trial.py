@@ -377,3 +377,15 @@ def test_a_bad_reference_is_refused(text, says, tmp_path, capsys):
     file = tmp_path / "bad.csv"
     file.write_text(text)
     assert cli.main(["trial", "--json", "--case", str(file)]) == 2 and says in capsys.readouterr().err
+
+
+def test_a_model_that_does_not_turn_is_refused_and_one_told_no_volts_is_said(tmp_path, capsys):
+    screw, joint = tmp_path / "screw.toml", tmp_path / "joint.toml"
+    lumped = "[lumped]\na_1 = 0.0\na_2 = 20.0\nb = 3.0\nc_1 = 0.0\nc_2 = 0.5\ntheta_0 = 0.0\n"
+    screw.write_text(lumped + '[recording]\noutput_unit = "m"\n')
+    joint.write_text(lumped + '[recording]\ninput_unit = "N m"\n')
+    asked = ["--controller", "pid", "--rate-hz", "500", "--json"]
+    assert cli.main(["trial", str(screw), *asked]) == 2
+    assert "its output is in m" in capsys.readouterr().err
+    assert cli.main(["trial", str(joint), *asked]) == 0
+    assert "This model is told N m" in json.loads(capsys.readouterr().out)["notes"][0]

@@ -210,6 +210,7 @@ def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished 
     controllers = chosen_controllers(arguments)
     _refuse_cases(arguments)
     datasheet, design = plant_and_design(arguments.model, arguments.design)
+    _refuse_no_angle(datasheet)
     conditions = _conditions(arguments)
     with closing(_crew(arguments)) as hired, Progress() as progress:
         trials = try_out(
@@ -307,12 +308,24 @@ def _conditions(arguments: argparse.Namespace) -> Conditions:
     )
 
 
+def _refuse_no_angle(datasheet: Datasheet) -> None:
+    """Raise InputError for a model whose output is none: the cases are angles."""
+    unit = datasheet.output_unit
+    if unit not in ("", "rad"):
+        raise InputError(
+            f"{datasheet.name}: its output is in {unit}, the cases of a trial are angles: a model in rad was expected"
+        )
+
+
 def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> list[str]:
     """What a reader should know of the references."""
     from ers_mj.control.controllers import Servo
     from ers_mj.control.trial import needed
 
     known, notes = Servo.of(design), []
+    if design.input_unit not in ("", "V"):
+        unit = {"pct": "%"}.get(design.input_unit, design.input_unit)
+        notes.append(f"This model is told {unit}: what is called V here is in {unit}, --umax-V too.")
     for aim in {t.case: t.run.reference for t in trials}.values():
         volts = needed(aim, known)
         if volts > conditions.u_max:
