@@ -21,6 +21,7 @@ from ers_mj.errors import InputError
 from ers_mj.plants.mujoco.looped import LoopedPlant
 from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.position_loop.identify import identify_loop
+from ers_mj.position_loop.intervals import Intervals
 from ers_mj.position_loop.model import LoopModel
 from ers_mj.position_loop.runs import Run, runs_of
 from ers_mj.position_loop.saved import looped_plant, model_of, simulate_loop
@@ -381,3 +382,18 @@ def test_identify_begins_from_a_model_with_a_loop_and_holds_what_is_told(tmp_pat
         identify(recordings, fix={"K": 900.0}, jobs=1)
     with pytest.raises(InputError, match=r"takes a model.toml with a \[loop\]"):
         identify(recordings, "table1", jobs=1)
+
+
+def test_an_overdamped_loop_tells_how_late_it_follows_though_not_how_stiff_it_is():
+    found = identify_loop(recorded({"K": 1600.0, "a_2": 320.0, "c_2": 0.05}, seeds=(1, 2, 3)))
+    slow = found.intervals.combined("(a_2+D)/K")
+    assert slow.identifiable and slow.value == pytest.approx(0.2, rel=0.03)
+    assert slow.ci95[0] < 0.2 < slow.ci95[1] < 0.22
+
+
+def test_a_rival_that_parts_the_damping_moves_none_of_it():
+    found = identify_loop(recorded({"K": 900.0, "a_2": 20.0, "c_2": 8.0}))
+    model = found.fit.model
+    rival = model.having(D=0.7 * model["a_2"], a_2=0.3 * model["a_2"])
+    plain, beside = (Intervals.of(found.fit, found.data, rivals=r).told("", "a_2") for r in ((), [(1.0, rival)]))
+    assert plain.ci95 == pytest.approx(beside.ci95)

@@ -15,7 +15,7 @@ from ers_mj.decisions.thresholds import Policy
 from ers_mj.position_loop import beside
 from ers_mj.position_loop.compared import Selection
 from ers_mj.position_loop.fit import Data, Fit, best, fitted, gain, jacobian
-from ers_mj.position_loop.model import Free, LoopModel
+from ers_mj.position_loop.model import LETTERS, Free, LoopModel
 from ers_mj.position_loop.terms import lagging, parts, terms
 from ers_mj.position_loop.two_bodies import other_sides
 
@@ -87,8 +87,9 @@ class Intervals:
             spread += _jackknife(fit.model, layout, left_out)
         spread += _beside_rivals(fit.model, layout, [*rivals, *_with_lag(fit.model, data)])
         spread += _unseen(model, data, e, j, inverse)
-        steps = [_inexact(f, q, rate, model["K"]) for f, q in zip(layout, model.vector(layout), strict=True)]
-        spread += np.diag(np.square(steps))
+        alike = np.array([0.5 * rate * DOUBT.clock if f.name in RATES else 0.0 for f in layout])
+        own = [_inexact(f, q, model) for f, q in zip(layout, model.vector(layout), strict=True)]
+        spread += np.outer(alike, alike) + np.diag(np.square(own))
         return Intervals(fit.model, model, tuple(layout), spread, float(stdtrit(max(n - len(layout), 1), 0.975)))
 
     def told(self, owner: str, name: str) -> Told | None:
@@ -153,16 +154,19 @@ class Intervals:
         return Told(told, around, half < DOUBT.told)
 
 
-def _inexact(f: Free, z: float, rate: float, K: float) -> float:
-    """Standard deviation of a transformed number by what steps leave untold: a motion that is damped at a ``rate``
-    [1/s] and goes on in steps of h has rates wrong by rate h / 2; a drive that is late by h acts as the damping -K h.
+def _inexact(f: Free, z: float, model: LoopModel) -> float:
+    """Standard deviation of a transformed number by what steps leave untold: a drive that is late by a step h acts as
+    the damping -K h, the firmware's or, where that is not parted from it, the plant's. (A motion that is damped at a
+    rate and goes on in steps has all its rates wrong alike, by half the rate times h.)
     """
+    late = model["K"] * DOUBT.clock
     if f.name == "D":
-        return K * DOUBT.clock / f.size
+        return late / f.size
     if f.name in ("tau_s", "dead_time_s"):
         return DOUBT.clock / f.size
-    relative = math.hypot(DOUBT.inexact, 0.5 * rate * DOUBT.clock) if f.name in RATES else DOUBT.inexact
-    return relative * (1.0 if f.positive else abs(z))
+    if f.name == "a_2" and "D" not in model.free:
+        return math.hypot(DOUBT.inexact, late / model["a_2"])
+    return DOUBT.inexact * (1.0 if f.positive else abs(z))
 
 
 def passed_over(selection: Selection, policy: Policy) -> list[tuple[float, LoopModel]]:
@@ -185,23 +189,23 @@ def turned_over(fit: Fit, data: Data, policy: Policy) -> list[tuple[float, LoopM
 
 
 def _with_lag(model: LoopModel, data: Data) -> list[tuple[float, LoopModel]]:
-    """A loop whose damping has the speed late, which its firmware is sure to do by a little; where nothing parts the
-    firmware's damping from the plant's, with their sum for the plant's.
-    """
+    """A loop whose damping has the speed late, which its firmware is sure to do by a little."""
     if "lag_s" in model.free:
         return []
     if "D" in model.free:
         return [(1.0, best(lagging(model), data, DOUBT.lagged).model)]
     half = 0.5 * model["a_2"]
-    found = best(lagging(model.having(D=half, a_2=half)), data, DOUBT.lagged).model
-    return [(1.0, replace(found, values={**found.values, "a_2": found["a_2"] + found["D"]}))]
+    return [(1.0, best(lagging(model.having(D=half, a_2=half)), data, DOUBT.lagged).model)]
 
 
 def _beside_rivals(model: LoopModel, layout: Sequence[Free], rivals: Sequence[tuple[float, LoopModel]]) -> np.ndarray:
-    """Covariance by how far rivals move the numbers."""
+    """Covariance by how far rivals move the numbers; the plant's damping holds the firmware's where nothing parts the
+    two.
+    """
     own, spread = _at(model), np.zeros((len(layout), len(layout)))
     for likely, rival in rivals:
-        its = _at(rival)
+        whole = {**rival.values, "a_2": max(rival["a_2"] + rival["D"], LETTERS["a_2"].lower)}
+        its = _at(rival if "D" in model.free else replace(rival, values=whole))
         moved = np.array([its[key] - own[key] if key in its and key in own else 0.0 for key in map(_key, layout)])
         spread += likely * np.outer(moved, moved)
     return spread
