@@ -378,6 +378,8 @@ def test_identify_begins_from_a_model_with_a_loop_and_holds_what_is_told(tmp_pat
     assert held["tau_s"] == held["tau_s"] | {"value": 0.01, "fixed": True}
     with pytest.raises(InputError, match=r"R cannot be fixed: this loop has K, L, tau_s"):
         identify(recordings, file, fix={"R": 3.0}, jobs=1)
+    with pytest.raises(InputError, match=r"K cannot be fixed at -5: 0.001 to inf was expected"):
+        identify(recordings, file, fix={"K": -5.0}, jobs=1)
     with pytest.raises(InputError, match=r"--fix needs --datasheet"):
         identify(recordings, fix={"K": 900.0}, jobs=1)
     with pytest.raises(InputError, match=r"takes a model.toml with a \[loop\]"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any, TypedDict, Unpack
 
 from threadpoolctl import threadpool_limits
@@ -92,13 +91,7 @@ class Identification(Result):
 class LoopIdentification(Identification):
     """What an identification of a position loop found."""
 
-    def __init__(
-        self,
-        found: LoopFound,
-        recordings: Sequence[Recording],
-        seed: int,
-        fixed: Mapping[str, float] = MappingProxyType({}),
-    ):
+    def __init__(self, found: LoopFound, recordings: Sequence[Recording], seed: int, fixed: Mapping[str, float]):
         Result.__init__(self, _loop_document(found, recordings, seed, fixed))
         self._loop, self._model = found, improved(found.fit.model)
 

@@ -51,7 +51,7 @@ def identify_loop(
     ``fix`` are held.
 
     Raises:
-        InputError: a number is held that the loop does not have.
+        InputError: a number is held that the loop does not have, or where no loop has it.
     """
     begun = time.perf_counter()
     progress("fitting the loop", 0.1)
@@ -73,9 +73,13 @@ def identify_loop(
 def _begun(known: LoopModel, selector: Selector, fix: Mapping[str, float]) -> LoopModel:
     """A known loop whose numbers are to be fitted, all that it has but those that are held."""
     there = [x for x in LETTERS if math.isfinite(known[x]) and known[x] != LETTERS[x].absent and x not in HELD]
-    for name in fix:
+    for name, value in fix.items():
         if name not in there:
             raise InputError(f"{name} cannot be fixed: this loop has {', '.join(there)}")
+        letter = LETTERS[name]
+        low = letter.lower - letter.late * known["K"]
+        if not low <= value <= letter.upper:
+            raise InputError(f"{name} cannot be fixed at {value:g}: {low:g} to {letter.upper:g} was expected")
     drive = known["L"] if math.isfinite(known["L"]) else 0.0
     scales = scales_of(selector.runs, selector.is_angle, known["c_2"], drive)
     model = replace(known, free=tuple(x for x in there if x not in fix), scales=scales)
