@@ -31,7 +31,7 @@ MAY_READ = {
         "servo",
     ),
     "online": ("data", "estimation", "servo", "solvers"),
-    "control": ("data", "effects", "errors", "plants", "servo", "workers"),
+    "control": ("data", "effects", "errors", "plants", "position_loop", "servo", "workers"),
     "validation": ("plants", "servo"),
     "view": ("data", "diagnosis", "errors", "plants", "position_loop", "servo"),
     "proving": ("data", "errors", "plants", "processes", "workers"),

@@ -105,7 +105,7 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
         "--at-deg",
         type=angle_deg,
         metavar="X",
-        help="angle about which the loops are linearised (default 10 beyond theta_0)",
+        help="angle about which the loops are linearised (default 10 beyond theta_0, 0 of a model with a [loop])",
     )
     parser.add_argument(
         "--rate-hz", type=number(above=0), default=10_000.0, metavar="N", help="sample rate of the loop (default 10000)"
@@ -123,20 +123,25 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, write, tell; 0."""
     place = results_folder(arguments.out, arguments.force, arguments.json, RESULTS)
+    from ers_mj.control.frequency.firmware import study_firmware
     from ers_mj.control.frequency.study import study
-    from ers_mj.control.own_law import law_of
+    from ers_mj.control.trial import sentence_of
 
-    controllers = chosen_controllers(arguments)
     datasheet, design = plant_and_design(arguments.datasheet, arguments.design)
+    controllers = chosen_controllers(arguments, datasheet)
     conditions = _conditions(arguments, datasheet)
     read = reader(arguments)
     recordings = [read(spec) for spec in arguments.recordings]
     with Progress() as progress:
-        found = study(datasheet, controllers, arguments.plant, conditions, recordings, design=design, progress=progress)
+        asked = arguments.plant, conditions, recordings
+        if datasheet.loop:
+            found = study_firmware(datasheet, *asked, progress=progress)
+        else:
+            found = study(datasheet, controllers, *asked, design=design, progress=progress)
         document = plain(
             _document(found, conditions)
             | {
-                "controllers": {name: law_of(name).sentence for name in controllers},
+                "controllers": {name: sentence_of(name, datasheet) for name in controllers},
                 "datasheet": datasheet.name or arguments.datasheet,
                 "design": design.name or arguments.design,
                 "problems": {r.name: list(r.problems) for r in recordings},
@@ -150,7 +155,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _conditions(arguments: argparse.Namespace, datasheet: Datasheet) -> Conditions:
     rest = datasheet.to_lumped().get("theta_0", 0.0)
-    start = rest + math.radians(10.0) if arguments.at_deg is None else math.radians(arguments.at_deg)
+    start = (
+        rest + math.radians(0.0 if datasheet.loop else 10.0)
+        if arguments.at_deg is None
+        else math.radians(arguments.at_deg)
+    )
     return conditions_of(arguments, start=start, rate_hz=arguments.rate_hz)
 
 

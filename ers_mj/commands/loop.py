@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 from ers_mj.commands.options import number, refuse_unknown, small_deg
+from ers_mj.errors import InputError
 
 if TYPE_CHECKING:
     from ers_mj.control.trial import Conditions
@@ -49,12 +50,40 @@ def add_laws(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def chosen_controllers(arguments: argparse.Namespace) -> list[str]:
-    """The names of --controller, all where none is given.
+def refuse_beside_a_loop(arguments: argparse.Namespace, datasheet: Datasheet) -> None:
+    """Raise InputError for an option that a servo with a loop of its own has no place for."""
+    from ers_mj.control.firmware import NAME
+
+    plain: dict[str, object] = {
+        "design": None,
+        "umax": 24.0,
+        "gap": 0.0,
+        "linkage": "constant",
+        "inductance": "off",
+        "effect": [],
+    }
+    laws = {"delay_ms": 0.0, "filter_ms": 0.5, "gains": "", "pid": ""}
+    for name, default in (plain | laws | {"noise_deg": 0.0, "quantum_deg": 0.0, "plants": 0}).items():
+        if getattr(arguments, name, default) != default:
+            option = {"umax": "umax-V"}.get(name, name).replace("_", "-")
+            raise InputError(
+                f"--{option}: {datasheet.name} closes a position loop of its own ([loop]), which is the controller and"
+                " stands in the file with the plant"
+            )
+    refuse_unknown("--controller", arguments.controller or (), (NAME,))
+
+
+def chosen_controllers(arguments: argparse.Namespace, datasheet: Datasheet) -> list[str]:
+    """The names of --controller, all where none is given; of a servo with a loop of its own its firmware.
 
     Raises:
         InputError: there is no controller of that name, or a Python file that is none.
     """
+    from ers_mj.control.firmware import NAME
+
+    if datasheet.loop:
+        refuse_beside_a_loop(arguments, datasheet)
+        return [NAME]
     from ers_mj.control.controllers import CONTROLLERS
     from ers_mj.control.own_law import is_own, law_of
 
@@ -66,10 +95,10 @@ def chosen_controllers(arguments: argparse.Namespace) -> list[str]:
 
 
 def plant_and_design(model: str, design: str | None) -> tuple[Datasheet, Datasheet]:
-    """The plant's datasheet, and what the controllers know of it."""
-    from ers_mj.servo.datasheet import read_plant
+    """The plant's datasheet, its firmware's loop in it where it has one, and what the controllers know of it."""
+    from ers_mj.servo.datasheet import read_datasheet, read_plant
 
-    datasheet = read_plant(model)
+    datasheet = read_datasheet(model)
     return datasheet, datasheet if design is None else read_plant(design)
 
 

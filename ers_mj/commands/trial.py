@@ -202,15 +202,14 @@ def _carried_on(arguments: argparse.Namespace, place: Place | None) -> Iterator[
 
 
 def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished | None) -> int:
-    from ers_mj.control.controllers import Servo
-    from ers_mj.control.own_law import law_of
+    from ers_mj.control.firmware import refuse_other_than_angle
     from ers_mj.control.paper_claims import headline, is_papers
-    from ers_mj.control.trial import gains_of, try_out
+    from ers_mj.control.trial import gains_of, sentence_of, try_out
 
-    controllers = chosen_controllers(arguments)
     _refuse_cases(arguments)
     datasheet, design = plant_and_design(arguments.model, arguments.design)
-    _refuse_no_angle(datasheet)
+    controllers = chosen_controllers(arguments, datasheet)
+    refuse_other_than_angle(datasheet)
     conditions = _conditions(arguments)
     with closing(_crew(arguments)) as hired, Progress() as progress:
         trials = try_out(
@@ -225,8 +224,8 @@ def _run(arguments: argparse.Namespace, place: Place | None, finished: Finished 
                 "robustness": [x.as_document() for x in spreads],
                 "scatter": arguments.scatter,
                 "conditions": conditions.as_document(),
-                "controllers": {name: law_of(name).sentence for name in controllers},
-                "gains": {name: gains_of(name, Servo.of(design), conditions) for name in controllers},
+                "controllers": {name: sentence_of(name, datasheet) for name in controllers},
+                "gains": {name: gains_of(name, design, conditions) for name in controllers},
                 "papers_settings": is_papers(datasheet, design, conditions),
                 "datasheet": datasheet.name or arguments.model,
                 "design": design.name or arguments.design,
@@ -308,20 +307,15 @@ def _conditions(arguments: argparse.Namespace) -> Conditions:
     )
 
 
-def _refuse_no_angle(datasheet: Datasheet) -> None:
-    """Raise InputError for a model whose output is none: the cases are angles."""
-    unit = datasheet.output_unit
-    if unit not in ("", "rad"):
-        raise InputError(
-            f"{datasheet.name}: its output is in {unit}, the cases of a trial are angles: a model in rad was expected"
-        )
-
-
 def _notes(trials: list[Trial], design: Datasheet, conditions: Conditions) -> list[str]:
     """What a reader should know of the references."""
     from ers_mj.control.controllers import Servo
     from ers_mj.control.trial import needed
 
+    if design.loop:
+        return [
+            "What the servo is told is a position: its drive is known as an acceleration, no voltage and no energy."
+        ]
     known, notes = Servo.of(design), []
     if design.input_unit not in ("", "V"):
         unit = {"pct": "%"}.get(design.input_unit, design.input_unit)
@@ -357,6 +351,7 @@ def _write_trace(trial: Trial, file: Path) -> None:
 
     from ers_mj.data.recording import write_recording
 
-    run, ran = trial.run, np.isfinite(trial.run.u)
-    columns = {"t_s": run.reference.t, "theta_ref_rad": run.reference.theta, "u_V": run.u, "theta_rad": run.measured}
+    run, ran = trial.run, np.isfinite(trial.run.measured)
+    columns = {"t_s": run.reference.t, "theta_ref_rad": run.reference.theta}
+    columns |= ({"u_V": run.u} if run.has_volts else {}) | {"theta_rad": run.measured}
     write_recording(file, {name: x[ran] for name, x in columns.items()})

@@ -22,13 +22,15 @@ COLUMNS = (
 def trial_lines(document: dict, kept: Kept) -> list[str]:
     """What a terminal shows when all is done."""
     lines = ["", bold(document["sentence"])]
+    electric = [c for c in COLUMNS[4:] if any(t[c[1]] is not None for t in document["trials"])]
+    told = [*COLUMNS[:4], *electric]
     keys = list(dict.fromkeys((t["case"], t["plant"]) for t in document["trials"]))
     for case, plant in keys:
-        lines += ["", bold(f"{f'{case}, {plant} plant':26}" + "".join(f"{head:>15}" for head, *_ in COLUMNS))]
+        lines += ["", bold(f"{f'{case}, {plant} plant':26}" + "".join(f"{head:>15}" for head, *_ in told))]
         for t in document["trials"]:
             if (t["case"], t["plant"]) == (case, plant):
                 cells = (
-                    "".join(f"{_cell(t, *column):>15}" for column in COLUMNS)
+                    "".join(f"{_cell(t, *column):>15}" for column in told)
                     if t["stable"]
                     else f"{'unstable: it was given up':>30}"
                 )

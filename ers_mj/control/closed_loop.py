@@ -43,8 +43,8 @@ class Sampled(Protocol):
 @dataclass(frozen=True, eq=False)
 class Run:
     """What a loop did, each (N,): the rudder's angle [rad] and speed [rad/s], what was measured of it [rad], the
-    voltage [V], and the drive's acceleration [rad/s^2] at the beginning and at the end of each sample. NaN from where
-    the loop was given up."""
+    voltage [V] (NaN of a firmware's own loop, which does not tell it), and the drive's acceleration [rad/s^2] at the
+    beginning and at the end of each sample. NaN from where the loop was given up."""
 
     reference: Reference
     theta: np.ndarray
@@ -58,6 +58,11 @@ class Run:
     def lost(self) -> bool:
         """Whether the loop ran away."""
         return not np.isfinite(self.theta).all()
+
+    @property
+    def has_volts(self) -> bool:
+        """Whether its voltage is known."""
+        return bool(np.isfinite(self.u).any())
 
 
 class Sensor:

@@ -48,12 +48,12 @@ class Measures:
 
 
 def measured(run: Run, u_max: float, ampere: float | None) -> Measures:
-    """The measures of a run under a limit of ``u_max`` [V]; ``ampere`` is the drive acceleration of 1 A [rad/s^2], None
-    where nothing tells it.
+    """The measures of a run under a limit of ``u_max`` [V], or of its drive [rad/s^2] where no voltage is told;
+    ``ampere`` is the drive acceleration of 1 A [rad/s^2], None where nothing tells it.
     """
     if run.lost:
         return Measures(*(None,) * 10, stable=False)
-    r, u = run.reference, run.u
+    r, u, told = run.reference, run.u, run.has_volts
     error = run.theta - r.theta
     tail = slice(int((1.0 - 0.2) * r.t.size), None)
     return Measures(
@@ -62,10 +62,10 @@ def measured(run: Run, u_max: float, ampere: float | None) -> Measures:
         steady_state_error_rad=float(np.abs(error[tail]).mean()),
         rmse_rad=float(np.sqrt(np.mean(error**2))),
         max_error_rad=float(np.abs(error).max()),
-        peak_u_V=float(np.abs(u).max()),
-        rms_u_V=float(np.sqrt(np.mean(u**2))),
-        saturated_share=float(np.mean(np.abs(u) >= u_max * (1 - 1e-9))),
-        chatter_V=float(np.abs(np.diff(u)).mean()),
+        peak_u_V=float(np.abs(u).max()) if told else None,
+        rms_u_V=float(np.sqrt(np.mean(u**2))) if told else None,
+        saturated_share=float(np.mean(np.abs(u if told else run.drive) >= u_max * (1 - 1e-9))),
+        chatter_V=float(np.abs(np.diff(u)).mean()) if told else None,
         energy_J=energy(run, ampere),
     )
 

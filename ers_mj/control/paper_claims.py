@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from ers_mj.control.firmware import NAME as FIRMWARE
 from ers_mj.control.metrics import Measures
 from ers_mj.control.trial import Conditions, Trial
 from ers_mj.servo.datasheet import TABLE_1, Datasheet
@@ -51,7 +52,13 @@ def is_papers(datasheet: Datasheet, design: Datasheet, conditions: Conditions) -
 
 
 def headline(trials: Sequence[Trial]) -> str:
-    """The trials in one sentence: who is closest where."""
+    """The trials in one sentence: who is closest where, or how far a servo's own loop is from what it is told."""
+    if all(t.controller == FIRMWARE for t in trials):
+        return f"RMS error of the servo's own loop: {_and([_off(t) for t in trials])}."
+    return _closest(trials)
+
+
+def _closest(trials: Sequence[Trial]) -> str:
     won: dict[tuple[str, str], list[str]] = {}
     for case, plant in dict.fromkeys((t.case, t.plant) for t in trials):
         ran = [t for t in trials if (t.case, t.plant) == (case, plant) and t.measures.stable]
@@ -66,6 +73,11 @@ def headline(trials: Sequence[Trial]) -> str:
             on = _and([f"the {case} ({_and(plants)})" for case, plants in places.items()])
         parts.append(f"{law} on {on}")
     return f"Least RMS error: {'; '.join(parts)}."
+
+
+def _off(trial: Trial) -> str:
+    stands = degrees(trial.measures.rmse_rad) if trial.measures.stable else "unstable"
+    return f"{trial.case} ({trial.plant}) {stands}"
 
 
 def _and(words: Sequence[str]) -> str:

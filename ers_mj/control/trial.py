@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from ers_mj.control.closed_loop import Run, Sampled, Sensor, close
 from ers_mj.control.controllers import Controller, Gains, PidGains, Servo
 from ers_mj.control.controllers.base import FILTER_S
+from ers_mj.control.firmware import as_known, largest_drive, run_firmware, told_numbers
 from ers_mj.control.metrics import Measures, measured
 from ers_mj.control.own_law import law_of
 from ers_mj.control.references import CASES, Reference, named, read_reference
@@ -159,7 +160,7 @@ def try_out(
     """Run every combination.
 
     Args:
-        datasheet: the plant.
+        datasheet: the plant; one with a [loop] is run under its own firmware, whatever the controllers.
         controllers, plants, cases: names; a controller may be a Python file, a case a file or a reference.
         conditions: of all trials.
         design: what the controllers know of the plant; the datasheet itself where None.
@@ -168,9 +169,13 @@ def try_out(
     Raises:
         InputError: the datasheet, an effect or a reference cannot be used.
     """
-    known = Servo.of(design or datasheet)
     ampere = datasheet.to_lumped().get("ampere")
-    built = {name: plant_under(conditions, datasheet, name) for name in plants}
+    if datasheet.loop:
+        known, built = as_known(datasheet), {}
+        conditions = replace(conditions, u_max=largest_drive(datasheet))
+    else:
+        known = Servo.of(design or datasheet)
+        built = {name: plant_under(conditions, datasheet, name) for name in plants}
     wanted = [
         (aim, plant, controller)
         for aim in references(cases, known, conditions)
@@ -180,7 +185,10 @@ def try_out(
     trials = []
     for k, (aim, plant, controller) in enumerate(wanted):
         progress(f"{controller} on the {plant} plant, {aim.name}", k / len(wanted))
-        run = run_once(built[plant], controller, known, aim, conditions)
+        if datasheet.loop:
+            run = run_firmware(datasheet, plant, aim, start_of(aim, conditions))
+        else:
+            run = run_once(built[plant], controller, known, aim, conditions)
         trials.append(Trial(controller, plant, aim.name, run, measured(run, conditions.u_max, ampere)))
     return trials
 
@@ -192,19 +200,31 @@ def make_controller(name: str, known: Servo, rate_hz: float, conditions: Conditi
     return law(known, rate_hz, conditions.u_max, filter_s=conditions.filter_s, **options)
 
 
-def gains_of(name: str, known: Servo, conditions: Conditions) -> str:
-    """The gains with which a law of this name runs, in words; empty where it has none."""
+def sentence_of(name: str, datasheet: Datasheet) -> str:
+    """What a law of this name is, on this plant."""
+    return "The servo's own loop, as its [loop] has it." if datasheet.loop else law_of(name).sentence
+
+
+def gains_of(name: str, design: Datasheet, conditions: Conditions) -> str:
+    """The gains with which a law of this name runs that knows this datasheet, in words; empty where it has none."""
+    if design.loop:
+        return told_numbers(design)
     law = law_of(name)
     if not law.takes:
-        return ", ".join(f"{key} {x:.4g}" for key, x in law.told_gains(known).items())
+        return ", ".join(f"{key} {x:.4g}" for key, x in law.told_gains(Servo.of(design)).items())
     told = getattr(conditions, law.takes).as_document()
     return ", ".join(f"{key} {x if isinstance(x, str) else format(x, '.4g')}" for key, x in told.items())
+
+
+def start_of(aim: Reference, conditions: Conditions) -> float:
+    """Where a run begins at rest [rad]."""
+    return conditions.start if aim.name in CASES else float(aim.theta[0])
 
 
 def run_once(plant: Plant, controller: str, known: Servo, aim: Reference, conditions: Conditions) -> Run:
     """One controller, new, on one plant, from rest where the conditions or the reference's file have it begin."""
     law = make_controller(controller, known, aim.rate_hz, conditions)
-    start = conditions.start if aim.name in CASES else float(aim.theta[0])
+    start = start_of(aim, conditions)
     law.reset(start)
     return close(
         law,

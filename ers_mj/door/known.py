@@ -52,6 +52,6 @@ def known_plant(given: Known) -> Datasheet | None:
     if sheet is not None and sheet.loop:
         raise InputError(
             f"{sheet.name or 'the model'}: closes a position loop of its own ([loop]), which goes with recordings of a"
-            " position command, and into simulate, view and export"
+            " position command, and into simulate, trial, frequency, view and export"
         )
     return sheet

@@ -95,32 +95,13 @@ def _number(x: object) -> str:
 
 def linear_of(servo: Servo) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(A, B, C, D) of the slipping servo about its rest, closed by its firmware's loop where it has one."""
-    import control
-
-    from ers_mj.control.frequency.linear import continuous, matrices
+    from ers_mj.control.frequency.firmware import closed_loop
+    from ers_mj.control.frequency.linear import continuous
 
     if servo.loop is None:
         system = continuous(servo.plant, servo.rest, 1.0, PADE)
         return system.A, system.B, system.C, system.D
-    q = servo.loop
-    A, B, C = matrices(servo.plant, servo.rest, 1.0)
-    B, seen = B[:, :1], 2 if q.at_motor > 0 and A.shape[0] >= 4 else 0
-    back = np.zeros((1, A.shape[0]))
-    back[0, seen], back[0, seen + 1] = q.K, 0.0 if q.lag > 0 else q.D
-    shown = np.zeros((1, A.shape[0]))
-    shown[0, 2 if q.log_at_motor > 0 and A.shape[0] >= 4 else 0] = 1.0
-    A, into = A - B @ back, q.K * B
-    if q.I > 0:
-        A = np.block([[A, q.I * B], [-np.eye(1, A.shape[0], seen), np.zeros((1, 1))]])
-        into, shown = np.vstack([into, [[1.0]]]), np.append(shown, [[0.0]], axis=1)
-    if q.lag > 0:
-        size, drive = A.shape[0], np.zeros((A.shape[0], 1))
-        drive[: B.shape[0]] = B
-        A = np.block([[A, -q.D * drive], [np.eye(1, size, seen + 1) / q.lag, np.full((1, 1), -1.0 / q.lag)]])
-        into, shown = np.vstack([into, [[0.0]]]), np.append(shown, [[0.0]], axis=1)
-    system = control.ss(A, into, shown, 0)
-    if q.tau + q.dead_time > 0:
-        system = system * control.ss(control.tf(*control.pade(q.tau + q.dead_time, PADE)))
+    system = closed_loop(servo.plant, servo.loop, servo.rest, PADE)
     return system.A, system.B, system.C, system.D
 
 
@@ -134,7 +115,6 @@ def _linear_losses(servo: Servo) -> list[str]:
     found = {
         "dry friction and preload, constant while it slips, are not in it": dry,
         f"a dead time is Pade's approximation of order {PADE}": late,
-        "the dead time within the firmware's loop stands before it": q is not None and q.dead_time > 0,
         "the firmware's limits and dead band are not in it": limits,
     }
     shaped = [f"{name.replace('_', ' ')} is not in it: it is not linear" for name in left_out(servo.plant)]

@@ -41,8 +41,7 @@ from ers_mj.plants.loop_numbers import Q, loop_in
 
 LONGEST = 1e-3  # [s] of a step
 STIFF = 0.6  # frequency [rad/s] of the stiffest spring times the step
-NEWTON = 8  # steps to the twist of a shaft that hardens
-PAST = 512  # steps of the drive that are kept: the longest dead time
+PAST = 2048  # steps of the drive that are kept: the longest dead time
 
 
 class Moving(NamedTuple):
@@ -300,7 +299,7 @@ def _resting_twist(c, theta):
     if not is_parted(c) or pushed <= 0.0:
         return 0.0
     x = even = pushed / c.k_twist if c.k_twist > 0.0 else 0.0
-    for _ in range(NEWTON):  # of k x (1 + harden x^2), from beyond its root
+    for _ in range(8):  # steps of Newton's to the root of k x (1 + harden x^2), from beyond it
         x -= (x * (1.0 + c.harden * x * x) - even) / (1.0 + 3.0 * c.harden * x * x)
     return -math.copysign(c.gap + x, hold)
 

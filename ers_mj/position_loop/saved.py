@@ -48,6 +48,24 @@ def looped_plant(datasheet: Datasheet, is_angle: bool = True) -> LoopedPlant:
     return LoopedPlant(MechanicalPlant(c, effects, is_angle=is_angle, timestep=MUJOCO_STEP), numbers)
 
 
+def motion_of(
+    datasheet: Datasheet, t: np.ndarray, r: np.ndarray, plant: str, start: tuple[float, float], before: float
+) -> np.ndarray:
+    """Free run (N, 4) of a servo with its loop: load's angle and speed, motor side's angle, drive.
+
+    Args:
+        datasheet: a model.toml with a [loop].
+        t, r: time [s] from 0 and reference [output unit], each (N,).
+        plant: "reduced", or "mujoco": a stepped controller around the MuJoCo plant.
+        start, before: (angle, speed) that the log shows at first, and the reference before the first sample.
+    """
+    if plant == "mujoco":
+        return looped_plant(datasheet, datasheet.output_unit in ("", "rad")).motion(t, r, start, before)
+    still = np.ones(t.size, bool)
+    run = Run("simulated", t, np.ascontiguousarray(r, float), r, still, still, 1.0, 0.0, start, before)
+    return model_of(datasheet).motion(run)
+
+
 def simulate_loop(
     datasheet: Datasheet, t: np.ndarray, r: np.ndarray, *, plant: str = "reduced", noise: float = 0.0, seed: int = 0
 ) -> np.ndarray:
@@ -59,11 +77,5 @@ def simulate_loop(
         plant: "reduced", or "mujoco": a stepped controller around the MuJoCo plant.
         noise, seed: standard deviation [output unit] of the sensor's noise, and its seed.
     """
-    model, still = model_of(datasheet), np.ones(t.size, bool)
-    run = Run("simulated", t - t[0], np.ascontiguousarray(r, float), r, still, still, 1.0, 0.0, (r[0], 0.0), r[0])
-    if plant == "mujoco":
-        is_angle = datasheet.output_unit in ("", "rad")
-        theta = looped_plant(datasheet, is_angle).simulate(run.t, run.r, run.start, run.before)
-    else:
-        theta = model.predicted(run)
-    return theta + noise * np.random.default_rng(seed).standard_normal(t.size)
+    motion = motion_of(datasheet, t - t[0], r, plant, (float(r[0]), 0.0), float(r[0]))
+    return model_of(datasheet).logged(motion) + noise * np.random.default_rng(seed).standard_normal(t.size)

@@ -263,7 +263,12 @@ def _recording(compared: Compared, width: float) -> Figure:
             marker=".",
             label="distortion",
         )
-    for ax, label in ((size, "size [dB rad/V]"), (phase, "phase [°]"), (trust, "coherence"), (levels, "amplitude [°]")):
+    for ax, label in (
+        (size, f"size [dB{compared.unit}]"),
+        (phase, "phase [°]"),
+        (trust, "coherence"),
+        (levels, "amplitude [°]"),
+    ):
         ax.set_ylabel(label)
     levels.set_xlabel("frequency [Hz]")
     levels.legend(loc="best", fontsize=8)

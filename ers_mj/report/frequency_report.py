@@ -32,11 +32,11 @@ def frequency_page(document: Mapping, found: Study) -> str:
     restart_ids()
     sections = [
         _loops(document, found),
-        _plants(document, found),
+        _plants(document, found) if found.plants else page.listed(document["notes"]),
         _cycles(document, found),
         *(_recording(c) for c in found.recordings),
     ]
-    body = "\n".join([_header(document), *sections, _footer(document)])
+    body = "\n".join([_header(document), *sections, _footer(document, found)])
     return page.frame("Loops over frequency", "consistent", body)
 
 
@@ -79,7 +79,7 @@ def _loops(document: Mapping, found: Study) -> str:
     lead = (
         f"The output swings by ±{math.degrees(c['amplitude_rad']):.3g}° about {math.degrees(c['start_rad']):.3g}°:"
         " plant and controller each stand for the first harmonic of what they do then, friction and its compensation"
-        " included; the voltage's limit is left out. The disk margin is that of gain and phase changing at once."
+        " included; the drive's limit is left out. The disk margin is that of gain and phase changing at once."
         " Bandwidth: |T| of the feedback 3 dB below its low end; a feed-forward follows further."
     )
     drawn = (
@@ -140,13 +140,12 @@ def _recording(compared: Compared) -> str:
     )
 
 
-def _footer(document: Mapping) -> str:
+def _footer(document: Mapping, found: Study) -> str:
     c = document["conditions"]
+    told_volts = [f"±{c['u_max_V']:g} V", f"speed filter {1e3 * c['filter_s']:g} ms", *page.rig(c)]
     told = [
         f"{c['rate_hz']:g} Hz",
-        f"±{c['u_max_V']:g} V",
-        f"speed filter {1e3 * c['filter_s']:g} ms",
-        *page.rig(c),
+        *(told_volts if found.plants else ()),
         *(f"effect {_effect(effect)}" for effect in c["effects"]),
         *page.origin(document),
     ]

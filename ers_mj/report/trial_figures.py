@@ -33,7 +33,7 @@ def colour(name: str, order: int = 0) -> str:
 
 def curves(trials: Sequence[Trial]) -> str:
     """All trials of one case on one plant, over all of the time."""
-    return both_widths(lambda width: _curves(trials, width, None), "angle, error and voltage over time")
+    return both_widths(lambda width: _curves(trials, width, None), "angle, error and voltage or drive over time")
 
 
 def close_up(trials: Sequence[Trial]) -> str:
@@ -57,8 +57,8 @@ def span(trials: Sequence[Trial]) -> tuple[float, float]:
 def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | None) -> Figure:
     wide = width == STYLE.wide
     figure = Figure(figsize=(width, 6.0 if wide else 6.4), layout="constrained")
-    angle, error, voltage = figure.subplots(3, 1, sharex=True, height_ratios=(1.7, 1.2, 1.2))
-    reference = trials[0].run.reference
+    angle, error, effort = figure.subplots(3, 1, sharex=True, height_ratios=(1.7, 1.2, 1.2))
+    reference, volts = trials[0].run.reference, trials[0].run.has_volts
     inside = slice(None) if over is None else slice(*np.searchsorted(reference.t, over))
     t, points = reference.t[inside], POINTS[wide]
     angle.plot(
@@ -80,24 +80,35 @@ def _curves(trials: Sequence[Trial], width: float, over: tuple[float, float] | N
             zorder=3,
         )
         error.plot(*decimate(t, off, points), color=shade, linewidth=1.0)
-        voltage.plot(*decimate(t, trial.run.u[inside], points), color=shade, linewidth=0.8)
+        told = trial.run.u if volts else trial.run.drive
+        effort.plot(*decimate(t, told[inside], points), color=shade, linewidth=0.8)
         if np.isfinite(off).any():
             largest.append(float(np.nanmax(np.abs(off))))
     ends = np.degrees([*reference.theta[inside], trials[0].run.theta[inside][0]])
-    room = 0.2 * (np.ptp(ends) or 1.0)
-    angle.set_ylim(ends.min() - room, ends.max() + room)
+    angle.set_ylim(*_reach(ends, [np.degrees(trial.run.theta[inside]) for trial in trials]))
     if largest:
         limit = error_limit(largest) or 1.0
         error.set_ylim(-limit, limit)
-    for ax, label in ((angle, "angle [°]"), (error, "error [°]"), (voltage, "voltage [V]")):
+    for ax, label in (
+        (angle, "angle [°]"),
+        (error, "error [°]"),
+        (effort, "voltage [V]" if volts else "drive [rad/s²]"),
+    ):
         ax.set_ylabel(label, color=STYLE.ink)
         ax.margins(x=0)
-    voltage.set_xlabel("time [s]")
+    effort.set_xlabel("time [s]")
     handles, labels = angle.get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside upper left", ncols=7 if wide else 3, handlelength=1.6, columnspacing=1.2
     )
     return figure
+
+
+def _reach(ends: np.ndarray, ran: Sequence[np.ndarray]) -> tuple[float, float]:
+    """How far an axis of angles goes: beyond the reference as far as the trials; those that run away leave it."""
+    span = float(np.ptp(ends)) or 1.0
+    near = np.concatenate([ends, *(x[np.abs(x - ends.mean()) < span] for x in ran)])
+    return float(near.min()) - 0.2 * span, float(near.max()) + 0.2 * span
 
 
 def error_limit(largest: Sequence[float]) -> float:

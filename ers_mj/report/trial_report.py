@@ -31,7 +31,7 @@ def trial_page(document: Mapping, trials: Sequence[Trial], spreads: Sequence[Spr
         _robustness(document, spreads),
         _laws(document),
     ]
-    body = "\n".join([_header(document, trials), *sections, _footer(document)])
+    body = "\n".join([_header(document, trials), *sections, _footer(document, trials[0].run.has_volts)])
     return page.frame("Controllers on trial", "consistent", body)
 
 
@@ -153,14 +153,13 @@ def _laws(document: Mapping) -> str:
     )
 
 
-def _footer(document: Mapping) -> str:
+def _footer(document: Mapping, has_volts: bool) -> str:
     c = document["conditions"]
+    electric = [f"±{c['u_max_V']:g} V", f"noise {math.degrees(c['noise_rad']):.3g}°", *page.rig(c)]
     told = [
         f"amplitude {math.degrees(c['amplitude_rad']):.4g}° from rest at {math.degrees(c['start_rad']):.4g}°",
         f"{c['rate_hz']:g} Hz",
-        f"±{c['u_max_V']:g} V",
-        f"noise {math.degrees(c['noise_rad']):.3g}°",
-        *page.rig(c),
+        *(electric if has_volts else ()),
         *(f"effect {effect['name']}" for effect in c["effects"]),
         *page.origin(document),
     ]

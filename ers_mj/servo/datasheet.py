@@ -216,8 +216,8 @@ def read_plant(path: str | os.PathLike[str]) -> Datasheet:
     sheet = read_datasheet(path)
     if sheet.loop:
         raise InputError(
-            f"{path}: closes a position loop of its own ([loop]), which diagnose, identify, simulate, view and export"
-            " take"
+            f"{path}: closes a position loop of its own ([loop]), which diagnose, identify, simulate, trial, frequency,"
+            " view and export take"
         )
     return sheet
 

@@ -100,9 +100,11 @@ def _surface(f_hz: np.ndarray, E: np.ndarray, values: np.ndarray) -> Callable[[f
     )
 
 
-def residual(c: Coefficients, h: float, centre: float, C: complex, f_hz: float, E: float) -> complex:
+def residual(
+    c: Coefficients, h: float, centre: float, C: complex, f_hz: float, E: float, at_motor: bool = False
+) -> complex:
     """What the balance leaves [1/s^2], over E: 0 for a cycle; NaN where no twist passes the torque that the rudder
-    takes.
+    takes. The controller sees the rudder, or the motor's side.
     """
     w = 2.0 * math.pi * f_hz
     s = 1j * w
@@ -116,7 +118,8 @@ def residual(c: Coefficients, h: float, centre: float, C: complex, f_hz: float, 
     through = passed(c, w, abs(Z_l) * E)
     if through is None:
         return complex(math.nan, math.nan)
-    return complex(Z_m * (1.0 + Z_l / through) + Z_l + held * C)
+    turned = 1.0 + Z_l / through  # the motor's side over the rudder
+    return complex(Z_m * turned + Z_l + held * C * (turned if at_motor else 1.0))
 
 
 def passed(c: Coefficients, w: float, torque: float) -> complex | None:

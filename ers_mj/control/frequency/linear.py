@@ -71,7 +71,8 @@ def linearised(plant: ReducedModel | MechanicalPlant, rate_hz: float, theta: flo
         load = control.ss(A, B[:, 1:], C, 0)
         move, name = _flow(A, B[:, :1]), "reduced"
     else:
-        A, B, C, step = transitions(plant, rate_hz, theta, omega)
+        A, B, shown, step = transitions(plant, rate_hz, theta, omega)
+        C = shown[:1]
         load = control.ss(A, B[:, 1:], C, 0, step)
         move, name = _steps(A, B[:, :1], step), "mujoco"
     held = _held(move, C, 1.0 / rate_hz, c.delay)
@@ -178,8 +179,8 @@ def _slopes(model: ReducedModel, c: Coefficients, theta: float, omega: float) ->
 def transitions(
     plant: MechanicalPlant, rate_hz: float, theta: float, omega: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """A (n, n), B (n, 2) of voltage [V] and load [rad/s^2], C (1, n), from one step of MuJoCo to the next, and that
-    step [s].
+    """A (n, n), B (n, 2) of voltage [V] and load [rad/s^2], C (2, n) of the rudder and of the motor's side, from one
+    step of MuJoCo to the next, and that step [s].
 
     By `mjd_transitionFD`, after a motion under the voltage that holds the speed, so that contacts and couplings carry
     their loads. Of its differences the first that the rigid contacts bear, which give little under their loads: a
@@ -210,8 +211,10 @@ def transitions(
             f"MuJoCo's derivatives at {theta:.4g} rad and {omega:.3g} rad/s are those of no motion: its contacts carry"
             " too little load there"
         )
-    C = np.zeros((1, n))
-    C[0, [stepper.rocker, *([stepper.gap] if stepper.gap is not None else [])]] = 1.0
+    C = np.zeros((2, n))
+    C[:, stepper.rocker] = 1.0
+    if stepper.gap is not None:
+        C[0, stepper.gap] = 1.0
     return A, B[:, [stepper.motor, stepper.load]] * [1.0, J], C, model.opt.timestep
 
 

@@ -83,11 +83,14 @@ class Cycles:
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """A recording's response beside models (name -> (F,)), and how far each is."""
+    """A recording's response beside models (name -> (F,)), how far each is, and the unit of output over input, nothing
+    where they are alike.
+    """
 
     response: Response
     models: dict[str, np.ndarray]
     gaps: dict[str, Gap | None]
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,11 +126,7 @@ def study(
     Raises:
         InputError: the datasheet, an effect, a recording or the sample rate cannot be used.
     """
-    if not SCOPE.slowest_hz <= conditions.rate_hz <= SCOPE.fastest_hz:
-        raise InputError(
-            f"the loop's sample rate is {conditions.rate_hz:g} Hz, {SCOPE.slowest_hz:g} Hz to {SCOPE.fastest_hz:g} Hz"
-            " was expected"
-        )
+    refuse_rate(conditions.rate_hz)
     known = Servo.of(design or datasheet)
     responses = [_response(r, datasheet) for r in recordings]  # what cannot be used is refused before anything runs
     built = {name: plant_under(conditions, datasheet, name) for name in plants}
@@ -150,6 +149,14 @@ def study(
         tuple(cycles),
         tuple(_compare(*pair, built, c) for pair in zip(recordings, responses, strict=True)),
     )
+
+
+def refuse_rate(rate_hz: float) -> None:
+    """Raise InputError for a sample rate [Hz] at which no loop is analysed."""
+    if not SCOPE.slowest_hz <= rate_hz <= SCOPE.fastest_hz:
+        raise InputError(
+            f"the loop's sample rate is {rate_hz:g} Hz, {SCOPE.slowest_hz:g} Hz to {SCOPE.fastest_hz:g} Hz was expected"
+        )
 
 
 def _views(linear: dict[str, LinearPlant], c: Coefficients, conditions: Conditions) -> tuple[PlantView, ...]:
@@ -203,4 +210,5 @@ def _compare(recording: Recording, response: Response, built: dict[str, Plant], 
         models[f"{name}, slipping"] = linear.response(f_hz)
         if c.c_2_plus > 0 or c.c_1 > 0:
             models[f"{name}, friction described"] = plant_response(linear, f_hz, N)
-    return Compared(response, models, {name: gap(response, model) for name, model in models.items()})
+    gaps, unit = {name: gap(response, model) for name, model in models.items()}, recording.input_unit
+    return Compared(response, models, gaps, f" {recording.output_unit}/{'%' if unit == 'pct' else unit}")

@@ -28,9 +28,8 @@ def headline(found: Study) -> str:
 def notes(found: Study) -> list[str]:
     """What a reader should know of the plants."""
     out = []
-    first = found.plants[0].linear.name
     for view in found.plants:
-        if view.linear.name != first:
+        if (first := found.plants[0].linear.name) != view.linear.name:
             out.append(
                 f"The {view.linear.name} plant's linear response is within {view.off[0]:.2g} dB and {view.off[1]:.2g}°"
                 f" of the {first} plant's up to {SCOPE.compared_hz:g} Hz."

@@ -96,16 +96,18 @@ class LoopedPlant:
         return f"<!-- ers-mj plant with its position loop. {note} -->\n{self.spec().to_xml()}"
 
     @unlogged()
-    def simulate(self, t: np.ndarray, r: np.ndarray, start: tuple[float, float], before: float) -> np.ndarray:
-        """What the log shows (N,) of a free run under the reference r (N,), by the stepped controller."""
-        q, out = self.loop, np.full(t.size, np.nan)
+    def motion(self, t: np.ndarray, r: np.ndarray, start: tuple[float, float], before: float) -> np.ndarray:
+        """Free run (N, 4) under the reference r (N,), by the stepped controller: load's angle and speed, motor side's
+        angle, drive; NaN from where it runs away.
+        """
+        q, out = self.loop, np.full((t.size, 4), np.nan)
         stepper = self.plant._stepper()
         stepper.reset(self._placed(start))
         firmware = _Firmware(q, t, r, before)
-        late = [0.0] * max(1, round(q.dead_time / CONTROL_STEP))
+        late, drive = [0.0] * max(1, round(q.dead_time / CONTROL_STEP)), 0.0
         for k in range(t.size):
             theta, w, theta_m, w_m, _ = stepper._observe()
-            out[k] = theta_m if q.log_at_motor > 0.0 else theta
+            out[k] = theta, w, theta_m, drive
             if k == t.size - 1 or not abs(theta) < 1e9:
                 break
             steps = max(1, math.ceil((t[k + 1] - t[k]) / CONTROL_STEP - 1e-9))
@@ -118,6 +120,10 @@ class LoopedPlant:
                 late = late if q.dead_time > 0.0 else late[-1:]
                 stepper.hold([(min(max(drive, -q.most), q.most), stepper._divide(h)[1])], h)
         return out
+
+    def simulate(self, t: np.ndarray, r: np.ndarray, start: tuple[float, float], before: float) -> np.ndarray:
+        """What the log shows (N,) of that run."""
+        return self.motion(t, r, start, before)[:, 2 if self.loop.log_at_motor > 0.0 else 0]
 
     def _placed(self, start: tuple[float, float]) -> dict[str, tuple[float, float]]:
         """{joint: (position, velocity)} of a servo whose log shows ``start`` (angle, speed)."""
