@@ -91,8 +91,9 @@ class Scales:
     behind a known gear, ``drive`` the largest drive acceleration of the refitted baseline, ``supply`` the median [V] of
     one that was seen to vary, ``hot`` the spans (recording, begin [s], length [s]) where the model at hand fails most,
     ``pushed`` the pushes (recording, begin [s], length [s], acceleration) that it asks for there, ``waves`` the (kind,
-    period) of what it leaves along the travel: of a "torque", a "friction" or the "reading", ``is_held`` whether a
-    load holds the output with a torque of its own: a weight, or a spring that pulls harder than friction.
+    period) of what it leaves along the travel: of a "torque", a "friction" or the "reading", ``rings`` the frequencies
+    [Hz] that stand out of what it leaves over time, ``is_held`` whether a load holds the output with a torque of its
+    own: a weight, or a spring that pulls harder than friction.
     """
 
     position: float
@@ -114,6 +115,7 @@ class Scales:
     hot: tuple[tuple[int, float, float], ...] = ()
     pushed: tuple[tuple[int, float, float, float], ...] = ()
     waves: tuple[tuple[str, float], ...] = ()
+    rings: tuple[float, ...] = ()
     is_held: bool = False
 
     def finer_waves(self, kind: str, most: float) -> list[float]:

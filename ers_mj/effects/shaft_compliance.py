@@ -27,7 +27,7 @@ class ShaftCompliance(Transmission):
         Parameter(
             "f_shaft", "frequency", "natural frequency of the shaft's spring", lower=2.0, upper=1000.0, absent=np.inf
         ),
-        Parameter("zeta", "ratio", "damping ratio of the shaft", lower=0.005, upper=0.7, absent=0.05),
+        Parameter("zeta", "ratio", "damping ratio of the shaft", lower=0.001, upper=0.7, absent=0.05),
         Parameter("rho", "ratio", "motor side's share of the inertia", lower=LIGHTEST, upper=0.9, absent=0.5),
         Parameter(
             "phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1
@@ -45,7 +45,9 @@ class ShaftCompliance(Transmission):
 
     def starts(self, scales):
         highest = 0.2 / scales.sample_time
-        return [np.array([min(f, highest), 0.1, 0.6, 0.2, np.inf]) for f in (10.0, 20.0, 40.0, 80.0)]
+        wide = [np.array([min(f, highest), 0.1, 0.6, 0.2, np.inf]) for f in (10.0, 20.0, 40.0, 80.0)]
+        # two halves swing against one another at twice what the spring makes of both
+        return wide + [np.array([0.5 * f, 0.02, 0.5, 0.2, np.inf]) for f in scales.rings]
 
     def grown(self, name, p, scales):
         """A shaft that hardens, from one that does not: it takes twice the torque at three times the twist that the

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ers_mj.plants.compiling.compiled import inline, kernel, unit
+from ers_mj.plants.kernel.before import twist_at_rest
 from ers_mj.plants.kernel.bristle import bent, bristle_damping
 from ers_mj.plants.kernel.forces import stop_at
 from ers_mj.plants.kernel.held_reference import mean_reference, switched
@@ -290,24 +291,9 @@ def _followed(q, x, seen, rate, h):
 
 
 @inline
-def _resting_twist(c, theta):
-    """How far the motor's side is ahead of a load that rests at theta: against a play, and into a shaft, as far as the
-    load's own friction does not hold it.
-    """
-    hold = _held(c, theta, 0.0, 0.0, 0.0)
-    pushed = abs(hold) - (1.0 - c.phi) * 0.5 * (c.c_2_plus + c.c_2_minus)
-    if not is_parted(c) or pushed <= 0.0:
-        return 0.0
-    x = even = pushed / c.k_twist if c.k_twist > 0.0 else 0.0
-    for _ in range(8):  # steps of Newton's to the root of k x (1 + harden x^2), from beyond it
-        x -= (x * (1.0 + c.harden * x * x) - even) / (1.0 + 3.0 * c.harden * x * x)
-    return -math.copysign(c.gap + x, hold)
-
-
-@inline
 def _placed(c, q, seen):
     """(load's angle, motor side's) of a servo at rest whose log shows ``seen``."""
-    twist = _resting_twist(c, seen)
+    twist = twist_at_rest(c, 0.0, seen) if is_parted(c) else 0.0
     return (seen - twist, seen) if q.log_at_motor > 0.0 else (seen, seen + twist)
 
 

@@ -13,7 +13,7 @@ from ers_mj.effects.base import Effect
 from ers_mj.effects.quantities import Coefficients
 from ers_mj.plants.effort import Effort
 from ers_mj.plants.kernel import event_integrator, fixed_steps
-from ers_mj.plants.kernel.before import resting_input
+from ers_mj.plants.kernel.before import resting_input, resting_twist
 from ers_mj.plants.kernel.laws import Acting, acting, laid_out
 from ers_mj.plants.kernel.state import N_CONSTANTS
 from ers_mj.plants.kernel.tangents import NUDGE, prepare, tangent
@@ -175,7 +175,8 @@ class ReducedModel:
         out = np.empty((t.size, 4))
         enable, load, y = held.beside(t)
         refine *= 2 if any(BY_NAME[name].follows_current for name, _ in self.effects) else 1
-        x0 = np.array([start[0], start[1], start[2] if len(start) > 2 else 0.0])
+        x0 = np.zeros(5)
+        x0[: len(start)] = start
         by_steps = self.bends and self.has_motor_side
         run = fixed_steps.simulate if by_steps else event_integrator.simulate
         plant = self._laid_out.copy()
@@ -188,7 +189,8 @@ class ReducedModel:
         """What the sensor reads (N,) at the sample times t (N,) [s]; the observer form where ``gain`` > 0 (see
         event_integrator.simulate).
 
-        ``start`` is (theta, omega[, drive acceleration]); ``load`` (N,) an acceleration; ``enable`` (N,) bool. An
+        ``start`` is (theta, omega[, drive acceleration[, twist, its speed]]), both bodies alike where no twist of the
+        motor's side is given; ``load`` (N,) an acceleration; ``enable`` (N,) bool. An
         observer beside a sensor effect that is not ``instant`` runs twice: what the sensor adds on the first way is
         taken off the measurement on the second.
         """
@@ -332,6 +334,10 @@ class ReducedModel:
         rest (``start`` is theta, omega) what holds it so.
         """
         return u if start[1] != 0.0 else resting_input(t, u, start[0], self._laid_out.copy())
+
+    def resting_twist(self, t: float, theta: float) -> float:
+        """How far the motor's side is ahead of a load that rests at theta at t [s]."""
+        return resting_twist(t, theta, self._laid_out.copy()) if self.has_motor_side else 0.0
 
     def _late(self, t: np.ndarray, u: np.ndarray, start: np.ndarray) -> np.ndarray:
         """The input (N + 1,) that a dead time lets through by whole samples, from the sample before the first on."""

@@ -23,7 +23,7 @@ def begin(plant, x, m):
     bristle bent.
     """
     c = plant_in(plant)
-    z = start_state(c, x[0], x[1], x[2], c.c_2_plus)
+    z = start_state(c, x[0], x[1], x[2], 0.0, 0.0, c.c_2_plus)
     mode = start_mode(c, z)
     for i in range(5):
         x[i], m[i] = z[i], mode[i]

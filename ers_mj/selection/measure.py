@@ -50,7 +50,15 @@ class Measure:
         count = max(1, round((trace.t[-1] - trace.t[0]) / self.window_s))
         ends = np.linspace(0, trace.t.size, count + 1).astype(int)
         followed = model.observed(trace, record, OBSERVER_RATE)[1]
-        return np.concatenate([_in_window(model, trace.part(a, b), record, followed[a, :2]) for a, b in pairwise(ends)])
+        twist = followed[:, 3] - followed[:, 0]
+        twisted = np.column_stack([twist, np.gradient(twist, trace.t)])
+        first = model.staged(trace, record, 0.0, None)[1]["start"][3:]  # as a recording begins
+        return np.concatenate(
+            [
+                _in_window(model, trace.part(a, b), record, followed[a, :2], twisted[a] if a else first)
+                for a, b in pairwise(ends)
+            ]
+        )
 
 
 FREE_RUN = Measure()
@@ -89,14 +97,16 @@ def _hangs(model: Model, traces: Sequence[Trace]) -> bool:
     return turns.size == 0
 
 
-def _in_window(model: Model, trace: Trace, record: int, begun: np.ndarray) -> np.ndarray:
+def _in_window(
+    model: Model, trace: Trace, record: int, begun: np.ndarray, twisted: Sequence[float] | np.ndarray
+) -> np.ndarray:
     """Simulated output (N,) from the output and speed that fit the whole of it best, looked for from those (2,) of an
-    observer.
+    observer; the motor's side is ``twisted`` by so much and at such a speed.
     """
     scale = np.array([WINDOWS.nudge * trace.sigma, WINDOWS.nudge * trace.sigma / (trace.t[-1] - trace.t[0])])
 
     def misses(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        run = model.predict(trace, record, start=(x[0], x[1]))
+        run = model.predict(trace, record, start=(*x, *twisted))
         return run, np.nan_to_num(np.where(trace.valid, trace.y - run, 0.0), nan=1e3 * trace.sigma)
 
     x = np.where(np.isfinite(begun), begun, (trace.start[0], 0.0))

@@ -18,7 +18,7 @@ from ers_mj.selection.budget import SEARCH, Search
 from ers_mj.selection.impulse_search import NEARING, impulses
 from ers_mj.selection.latent_force import pushes
 from ers_mj.selection.secants import View, by_recordings, first_order, hopeful, of_each_form, promise, view_of
-from ers_mj.selection.spectrum import waves_of
+from ers_mj.selection.spectrum import rings_of, waves_of
 from ers_mj.servo.model import OBSERVER_RATE, Columns, Model
 
 HOTTEST, LENGTHS = 3, (0.08, 0.25)  # blocks in which an impulse is looked for, and lengths [s] from which it is fitted
@@ -121,7 +121,8 @@ class _Screening:
         is_first, scales, some = view.place is self.first, view.place.scales, view.foremost
         sparse = some.sparse()
         if is_first and self.bent:
-            scales = replace(scales, waves=waves_of(view.run, self.bench.traces))
+            found = view.run, self.bench.traces
+            scales = replace(scales, waves=waves_of(*found), rings=rings_of(*found))
         lasting = [BY_NAME[name] for name in names if not BY_NAME[name].once]
         starts = {effect.name: self._starts(effect, scales) for effect in lasting}
         told = {name: self._told(BY_NAME[name], begun, some, sparse) for name, begun in starts.items()}

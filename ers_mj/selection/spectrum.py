@@ -1,5 +1,5 @@
-"""Which waves along the travel does what a model leaves hold? A spectrum over the angle, up to what speed and rate
-resolve.
+"""What does that hold which a model leaves: waves along the travel, by a spectrum over the angle up to what speed and
+rate resolve, and what rings, by one over time.
 """
 
 from __future__ import annotations
@@ -70,6 +70,66 @@ def waves_of(run: Run, traces: Sequence[Trace], sizes: Sizes = SIZES) -> tuple[t
         share = np.abs(hit) ** 2 / np.maximum(power, 1e-300)
         found += [(kind, float(travel / orders[k])) for k in _peaks(share, sizes)]
     return tuple(found)
+
+
+@dataclass(frozen=True)
+class Band:
+    """Where what rings is looked for: [Hz] and turns in the longest recording from which, share of the sample rate up
+    to which; by what factor two frequencies are apart, over what factor a line is averaged, and how far its neighbours
+    lie; by what factor it stands above those below and those above, and how many are told.
+    """
+
+    lowest: float = 3.0
+    turns: float = 8.0
+    highest: float = 0.4
+    apart: float = 1.02
+    line: float = 1.03
+    beside: tuple[float, float] = (1.15, 2.0)
+    stands_out: float = 4.0
+    most: int = 2
+
+
+BAND = Band()
+
+
+def rings_of(run: Run, traces: Sequence[Trace], band: Band = BAND) -> tuple[float, ...]:
+    """The frequencies [Hz] that stand out of what a run leaves, the clearest first: of a body that swings on a spring,
+    however little it is damped.
+    """
+    longest = max(float(trace.t[-1] - trace.t[0]) for trace in traces)
+    first, last = max(band.lowest, band.turns / longest), band.highest / max(trace.sample_time for trace in traces)
+    f_hz = first * band.apart ** np.arange(max(0.0, math.log(last / first) / math.log(band.apart)))
+    power, begin = np.zeros(f_hz.size), 0
+    for trace in traces:
+        left = run.left[begin : begin + trace.t.size]
+        begin += trace.rows
+        if np.all(np.isfinite(left)):
+            power += left.size * _around(left, trace.sample_time, f_hz, band.line)
+    outstanding = np.zeros(f_hz.size)
+    near, far = band.beside
+    for k, f in enumerate(f_hz):
+        below, above = power[(f_hz > f / far) & (f_hz < f / near)], power[(f_hz > f * near) & (f_hz < f * far)]
+        if min(below.size, above.size) > 4:
+            outstanding[k] = power[k] / max(float(np.median(below)), float(np.median(above)), 1e-300)
+    inner = np.flatnonzero((outstanding[1:-1] >= outstanding[:-2]) & (outstanding[1:-1] >= outstanding[2:])) + 1
+    high = inner[outstanding[inner] > band.stands_out]
+    high = high[np.argsort(-outstanding[high], kind="stable")]
+    told: list[float] = []
+    for f in f_hz[high].tolist():
+        if all(abs(math.log(f / other)) > math.log(near) for other in told):
+            told.append(f)
+    return tuple(told[: band.most])
+
+
+def _around(left: np.ndarray, h: float, f_hz: np.ndarray, line: float) -> np.ndarray:
+    """Power (F,) of a signal (N,) about each frequency [Hz], averaged over its line."""
+    window = np.hanning(left.size)
+    spectrum = np.abs(np.fft.rfft((left - left.mean()) * window)) ** 2 / (window @ window)
+    at = np.fft.rfftfreq(left.size, h)
+    summed = np.concatenate([[0.0], np.cumsum(spectrum)])
+    end = np.minimum(np.maximum(np.searchsorted(at, f_hz * line), np.searchsorted(at, f_hz / line) + 2), spectrum.size)
+    begin = np.minimum(np.searchsorted(at, f_hz / line), end - 1)
+    return (summed[end] - summed[begin]) / (end - begin)
 
 
 def _compared(left: np.ndarray, trace: Trace, rates: np.ndarray, a_2: float) -> list[tuple[np.ndarray, np.ndarray]]:

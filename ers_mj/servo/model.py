@@ -320,18 +320,21 @@ class Model:
         return changes.T
 
     def staged(self, trace: Trace, record: int, rate: float, start) -> tuple[ReducedModel, dict]:
-        """The plant of a recording, and how it is run along it; ``start`` is the (reading, speed) it begins with, the
-        trace's own if None.
+        """The plant of a recording, and how it is run along it; ``start`` is the (reading, speed[, twist, its speed])
+        it begins with, the trace's own if None. A servo that begins at rest is twisted as its load has left it.
         """
         (gain, every), shift, plant = (
             observer_gain(rate, trace.sample_time, trace.refresh),
             self.offset(record),
             self.plant(record, trace.supply),
         )
-        theta, omega = trace.start if start is None else start
+        theta, omega, *twisted = trace.start if start is None else start
+        theta = plant.behind(theta - shift)
         drive = 0.0 if omega == 0 else plant.coefficients.b * trace.u[0] - plant.coefficients.a_emf * omega
+        if omega == 0 and not twisted:
+            twisted = [plant.resting_twist(trace.t[0], theta), 0.0]
         return plant, {
-            "start": (plant.behind(theta - shift), omega, drive),
+            "start": (theta, omega, drive, *twisted),
             "enable": trace.enable,
             "load": trace.load,
             "y": trace.followed - shift if gain > 0 else None,

@@ -338,7 +338,7 @@ def _march(t, u, enable, load, y, gain, every, c, refine, x0, cuts, maps, leaps,
     most = budget = _event_budget(c, n, cuts)
     resting = -1  # the sample that begins in a rest which was checked already
     extra = np.nan  # what the laws add where a segment ended that holds no event
-    x = start_state(c, x0[0], x0[1], x0[2], 0.5 * (c.c_2_plus + c.c_2_minus))
+    x = start_state(c, x0[0], x0[1], x0[2], x0[3], x0[4], 0.5 * (c.c_2_plus + c.c_2_minus))
     m, k = start_mode(c, x), 0
     due = 0 if gain > 0.0 else n  # the sample at which the observer looks next
     written(out, 0, c, x)

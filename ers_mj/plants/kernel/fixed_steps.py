@@ -203,10 +203,12 @@ def _through(c, t, x, drive, closed, load, span, longest):
 
 
 @inline
-def _bent_start(c, theta, w, j):
-    """Both bodies together, and a bristle bent by as much as a motion of this speed would have left it."""
+def _bent_start(c, theta, w, j, twist, over):
+    """The motor's side ahead by a ``twist`` and turning faster by ``over``, and a bristle bent by as much as a motion
+    of this speed would have left it.
+    """
     whole = 0.5 * (c.c_2_plus + c.c_2_minus) / c.k_bristle
-    return Bent(theta, w, j, theta, w, min(max(w / math.sqrt(c.k_bristle), -whole), whole))
+    return Bent(theta, w, j, theta + twist, w + over, min(max(w / math.sqrt(c.k_bristle), -whole), whole))
 
 
 @inline
@@ -222,7 +224,7 @@ def simulate(t, u, enable, load, y, gain, every, plant, refine, x0, out):
     """As event_integrator.simulate, of a plant that has both a motor's side and a bristle."""
     c, n, h0 = plant_in(plant), t.size, t[1] - t[0]
     longest, (_, late) = _step_length(c, refine), split_delay(c, h0)
-    x = _bent_start(c, x0[0], x0[1], x0[2])
+    x = _bent_start(c, x0[0], x0[1], x0[2], x0[3], x0[4])
     for k in range(n):
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x.theta, x.w, x.j, x.theta_m
         if k == n - 1:
@@ -258,7 +260,7 @@ def hold(t, h0, before, now, plant, refine, x):
 
 @kernel(types.void(VECTOR, VECTOR))
 def begin(plant, x):
-    """Fill x (6,) after its first three entries, theta w j."""
-    z = _bent_start(plant_in(plant), x[0], x[1], x[2])
+    """Fill x (6,) after its first three entries, theta w j: both bodies together."""
+    z = _bent_start(plant_in(plant), x[0], x[1], x[2], 0.0, 0.0)
     for i in range(6):
         x[i] = z[i]

@@ -47,14 +47,16 @@ def start_mode(c, x):
 
 
 @inline
-def start_state(c, theta, w, j, friction):
-    """Both bodies together; a bristle bent by as much as a motion of this speed would have left it, at most by what its
-    ``friction`` bends it.
+def start_state(c, theta, w, j, twist, over, friction):
+    """The motor's side ahead by a ``twist`` and turning faster by ``over``; a bristle bent by as much as a motion of
+    this speed would have left it, at most by what its ``friction`` bends it.
     """
     if has_bristle(c):
         slip = friction / c.k_bristle
         return State(theta, w, j, theta - min(max(w / math.sqrt(c.k_bristle), -slip), slip), 0.0)
-    return State(theta, w, j, theta, w if is_parted(c) else 0.0)
+    if is_parted(c):
+        return State(theta, w, j, theta + twist, w + over)
+    return State(theta, w, j, theta, 0.0)
 
 
 @unit(types.Tuple((X, M))(C, F, X, M, F))

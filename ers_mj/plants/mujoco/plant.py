@@ -86,7 +86,7 @@ class MechanicalPlant:
         Args:
             t: sample times (N,) [s], strictly increasing; they need not be uniform.
             u: input (N,), before the drive's effects.
-            start: (theta, omega[, drive acceleration]), the play centred.
+            start: (theta, omega[, drive acceleration[, twist, its speed]]), the play centred where no twist is given.
             enable: (N,) bool, false an open circuit.
             load: (N,) a known acceleration of the rudder.
             y, gain, every: what was measured (N,) and how the observer follows it (see stepping.Observer).
@@ -156,8 +156,7 @@ class MechanicalPlant:
         """{joint: (position, velocity)} with the output at theta, the drive before the play at theta_m, and one speed
         of both.
         """
-        pose = {name: (q, dq * omega) for name, (q, dq) in self._skeleton.pose(theta_m).items()}
-        return self._start((theta, omega)) | pose | {"gap": (theta - theta_m, 0.0)}
+        return self._start((theta, omega, 0.0, theta_m - theta, 0.0))
 
     # -- building --
 
@@ -236,11 +235,13 @@ class MechanicalPlant:
 
     def _start(self, start) -> dict[str, tuple[float, float]]:
         """{joint: (position, velocity)} and, under "drive" and "bristle", (acceleration or deflection, 0) for (theta,
-        omega[, drive]).
+        omega[, drive[, twist, its speed]]).
         """
         c = self._lowered
-        theta, omega, drive = (*start, 0.0)[:3] if start is not None else (c.theta_0, 0.0, 0.0)
-        joints = {name: (q, dq * omega) for name, (q, dq) in self._skeleton.pose(theta).items()}
+        given = (c.theta_0, 0.0) if start is None else tuple(start)
+        theta, omega, drive, twist, over = (*given, 0.0, 0.0, 0.0)[:5]
+        pose = self._skeleton.pose(theta + twist)
+        joints = {name: (q, dq * (omega + over)) for name, (q, dq) in pose.items()} | {"gap": (-twist, -over)}
         joints["lever_up"] = (
             max(theta, c.theta_0),
             omega if theta > c.theta_0 else max(omega, 0.0) * (theta == c.theta_0),
