@@ -88,6 +88,12 @@ class Case:
     def inertia(self) -> float | None:
         return self.datasheet.parameters.get("J") if self.datasheet is not None else None
 
+    @cached_property
+    def scatter(self) -> float:
+        """By what share the datasheet's letters are off, as far as what follows from them could be told."""
+        told = {name: self.model.values[name] for owner, name in self.errors if owner == "base"}
+        return self.datasheet.scatter(told) if self.datasheet is not None else 0.0
+
     @property
     def noise(self) -> float:
         traces = [fold.held_out for fold in self.confirmed.parts]

@@ -162,7 +162,8 @@ def _effect(case: Case, name: str) -> dict:
 def _effect_parameters(case: Case, name: str):
     values, errors = dict(case.model.effects_of())[name], case.errors
     for parameter, value in zip(BY_NAME[name].parameters, values):
-        factor = case.inertia if case.inertia and parameter.kind in PER_INERTIA else 1.0
+        as_torque = bool(case.inertia) and parameter.kind in PER_INERTIA
+        factor, doubt = (case.inertia or 1.0, 1.96 * case.scatter) if as_torque else (1.0, 0.0)
         finite = bool(np.isfinite(value))
         low_high = errors.get((name, parameter.name))
         is_told = finite and low_high is not None and not (parameter.positive and is_no_size(*low_high, case.policy))
@@ -173,11 +174,17 @@ def _effect_parameters(case: Case, name: str):
                 | {
                     "value": float(value) * factor if finite else None,
                     "unit": unit_of(parameter.kind, case.output_unit, case.input_unit, bool(case.inertia)),
-                    "ci95": [float(v) * factor for v in low_high] if is_told else [None, None],
+                    "ci95": _as_told(float(value), low_high, factor, doubt) if is_told and low_high else [None, None],
                     "meaning": parameter.meaning,
                 }
             ),
         }
+
+
+def _as_told(value: float, ends: tuple[float, float], factor: float, doubt: float) -> list[float]:
+    """An interval times the datasheet's inertia, which no recording tells and which is off by a share ``doubt``."""
+    low, high = (math.hypot(value - end, doubt * value) for end in ends)
+    return [(value - low) * factor, (value + high) * factor]
 
 
 def _per_recording(case: Case, name: str, parameter: Parameter, factor: float) -> dict:

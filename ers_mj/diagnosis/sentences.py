@@ -31,12 +31,27 @@ def sentence(case: Case, missing: Sequence[dict], found: Sequence[Place]) -> str
     if case.verdict == "missing_physics":
         return _of_what_is_missing(case, "; ".join(m["sentence"] for m in missing))
     place = next((p.sentence for p in found if p.axis != "subsystem"), "it is spread over the whole record")
+    if alone := _of_training_alone(case):
+        return f"{alone}; {place}."
     much = (
         f"; it acts like {' and '.join(BY_NAME[c.name].sentence for c in case.suspects)}"
         if case.suspects
         else f" (the best explains {case.explained:.0%} of the held-out error)"
     )
     return f"Something acts here that no effect of the library accounts for{much}; {place}."
+
+
+def _of_training_alone(case: Case) -> str:
+    """What explains the training recordings whole and is not named, since nothing that is held out shows it."""
+    cost = case.start.fit.cost
+    best = next((c for found in case.selection.rounds[:1] for c in found[:1] if c.name in BY_NAME), None)
+    if best is None or case.suspects or best.gain < case.policy.nearly_all * cost:
+        return ""
+    name = best.name.replace("_", " ")
+    return (
+        f"A mismatch is left without a name: {name} explains {best.gain / cost:.0%} of what is beyond the noise in the"
+        " training recordings, but nothing that is held out shows it"
+    )
 
 
 def of_its_own(case: Case) -> str:

@@ -30,7 +30,7 @@ class Backlash(Transmission):
             "phi", "ratio", "motor side's share of the friction", positive=False, lower=0.0, upper=0.9, absent=0.1
         ),
         Parameter("f_contact", "frequency", "contact's natural frequency", lower=40.0, upper=1000.0, absent=120.0),
-        Parameter("zeta", "ratio", "contact's damping ratio", lower=0.05, upper=2.0, absent=0.2),
+        Parameter("zeta", "ratio", "contact's damping ratio", lower=0.001, upper=2.0, absent=0.2),
     )
     tries, tangible, is_play = 3, False, True
     parts_damping = True

@@ -191,8 +191,8 @@ class ReducedModel:
 
         ``start`` is (theta, omega[, drive acceleration[, twist, its speed]]), both bodies alike where no twist of the
         motor's side is given; ``load`` (N,) an acceleration; ``enable`` (N,) bool. An
-        observer beside a sensor effect that is not ``instant`` runs twice: what the sensor adds on the first way is
-        taken off the measurement on the second.
+        observer beside a sensor effect that is not ``instant`` goes more than one way: what the sensor adds on one is
+        taken off the measurement on the next.
         """
         return self.outputs(t, u, start, enable=enable, load=load, y=y, gain=gain, every=every)[0]
 
@@ -209,7 +209,7 @@ class ReducedModel:
         followed = self.behind(y) if gain > 0 and self._is_instant else y
         motion, beyond = self._run(t, u, start, Held(enable, load, followed, gain, every), 1)
         read = self.read(t, motion[:, 0])
-        if gain > 0 and not self._is_instant:
+        for _ in range(self._ways - 1 if gain > 0 else 0):
             followed = y - (read - motion[:, 0])
             motion, more = self._run(t, u, start, Held(enable, load, followed, gain, every), 1)
             read, beyond = self.read(t, motion[:, 0]), beyond + more
@@ -237,6 +237,15 @@ class ReducedModel:
     def _is_instant(self) -> bool:
         """Whether the reading tells the output at the same time."""
         return all(BY_NAME[name].instant for name, _ in self.effects if _touches_sensor(name))
+
+    @cached_property
+    def _ways(self) -> int:
+        """How often an observer goes along a recording: behind a lag a second way still sticks and slips by what the
+        first one, that followed a late reading, has shifted.
+        """
+        if self._is_instant:
+            return 1
+        return 3 if any(any(BY_NAME[name].remembers(values)) for name, values in self.effects) else 2
 
     @property
     def is_told_by_motion(self) -> bool:
@@ -268,7 +277,7 @@ class ReducedModel:
         ``outputs``), towards each of the ``others``, with what was ``held`` beside the input (see Held).
 
         Each is multiplied by ``scale``: 1 over the step that made the other model, or 1 for all of a small effect. An
-        observer's second way (see ``theta``) is taken to follow what the other sensor adds, not what the change of the
+        observer's last way (see ``theta``) is taken to follow what the other sensor adds, not what the change of the
         motion makes of it.
         """
         c, on, p = self._lowered
@@ -314,7 +323,7 @@ class ReducedModel:
     def count_outputs(self, t: np.ndarray, followed: bool, beyond: int) -> None:
         """Count what ``priced`` along t (N,) would have simulated, as an observer where ``followed``."""
         self._count(t, self._price, beyond)
-        if followed and not self._is_instant:
+        for _ in range(self._ways - 1 if followed else 0):
             self._count(t, self._price)
 
     def _count(self, t: np.ndarray, per_second: int, beyond: int = 0) -> None:

@@ -122,6 +122,18 @@ class Datasheet:
         """
         return {name: x for name, x in _following(self.parameters).items() if math.isfinite(x)} | dict(self.lumped)
 
+    def scatter(self, identified: Mapping[str, float]) -> float:
+        """Standard deviation of the logarithm of a letter, were all of them off alike and the numbers that were
+        ``identified`` true: the mean square over those that follow from the letters, each by how many it has.
+        """
+        sizes = ("a_1", "a_2", "b", "c_1", "c_2", "tau_e", "ampere")
+        off = [
+            math.log(identified[name] / x) ** 2 / len(FOLLOWS[name][0].split())
+            for name, x in _following(self.parameters).items()
+            if name in sizes and identified.get(name, 0.0) * x > 0.0
+        ]
+        return math.sqrt(sum(off) / len(off)) if off else 0.0
+
     @property
     def emf_damping(self) -> float | None:
         """What the back-EMF damps [1/s], where the letters are given from which it follows."""
