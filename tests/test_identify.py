@@ -338,3 +338,24 @@ def test_a_budget_that_ends_too_early_is_said_to_be_too_small():
     run = from_arrays(columns["t_s"], columns["u_V"], columns["theta_rad"])
     with pytest.raises(InputError, match="within 3 evaluations: allow more"):
         identify([run], read_datasheet("table1"), Settings(budget=3))
+
+
+COGGING = (("cogging", {"A": 30.0, "period": 0.05, "phase": 0.3}),)
+
+
+@pytest.mark.parametrize("plant", ["reduced", "mujoco"])
+def test_effects_of_a_model_act_and_are_held(plant):
+    """They had been dropped without a word, and the letters took what they do."""
+    numbers = {"a_1": 80.0, "a_2": 40.0, "b": 60.0, "c_2": 20.0, "theta_0": 0.0}
+    truth = Datasheet(lumped=numbers, effects=COGGING)
+    u = INPUTS["multisine"](T)
+    columns = simulate_recording(truth, T, u, noise=2e-5, seed=1)
+    recordings = [from_arrays(T, u, columns["theta_rad"])]
+    begun = Datasheet(lumped={**numbers, "a_2": 30.0, "b": 50.0}, effects=COGGING, name="model.toml")
+    found = identify(recordings, begun, Settings(plant=plant))
+    values = {row.name: row.value for row in found.rows}
+    assert values["b"] == pytest.approx(60.0, rel=0.01) and values["a_2"] == pytest.approx(40.0, rel=0.02)
+    assert found.misfit < 3.0 and [name for name, _ in found.model.effects] == ["cogging"]
+    assert any("cogging acts" in warning for warning in found.warnings)
+    without = identify(recordings, replace(begun, effects=()), Settings(plant=plant))
+    assert without.misfit > 30.0

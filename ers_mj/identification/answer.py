@@ -167,10 +167,11 @@ def _model(unknowns: Unknowns, letters: np.ndarray) -> Datasheet:
     """
     values = unknowns.values(letters)
     lumped = {name: float(values[name]) for name in LUMPED}
-    parameters = {} if unknowns.is_lumped else unknowns.everything(letters)
+    held = {"J": unknowns.inertia} if unknowns.effects and unknowns.inertia != 1.0 else {}
     return Datasheet(
-        parameters=parameters,
+        parameters=held if unknowns.is_lumped else unknowns.everything(letters),
         lumped=lumped,
+        effects=tuple(unknowns.effects),
         baseline={name: float(values[name]) for name in ("tau_e", "emf_share")},
         name="model.toml",
     )
@@ -203,6 +204,10 @@ def _sentence(search: Search, misfit: float, settings: Settings) -> str:
 def _warnings(search: Search, x: np.ndarray, misfit: float) -> list[str]:
     lower, upper = search.bounds
     out = [
+        f"{name.replace('_', ' ')} acts as the datasheet has it, its numbers are held (`ers diagnose` fits them)"
+        for name, _ in search.unknowns.effects
+    ]
+    out += [
         f"{name} was left out: these recordings ask for less of it than its bounds allow (--bounds {name}=LOW:HIGH"
         " forces it in)"
         for name in search.unknowns.absent

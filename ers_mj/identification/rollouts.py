@@ -22,6 +22,7 @@ def plant_of(
     c = lumped(unknowns.values(letters))
     return MechanicalPlant(
         c,
+        unknowns.acting(letters),
         parameters=None if unknowns.is_lumped else bodily(unknowns.everything(letters), is_angle, c.b),
         is_angle=is_angle,
         timestep=timestep,
@@ -67,7 +68,7 @@ def _compared(unknowns: Unknowns, letters: np.ndarray, trace: Trace, motion: Mot
     """Residuals (rows,) of one recording in sigmas, 0 where a sample is missing."""
     model = unknowns.model(letters)
     path = np.column_stack([motion.theta, motion.omega, motion.drive, motion.theta_m])
-    parts = [np.where(trace.valid, (trace.y - motion.theta) / trace.sigma, 0.0)]
+    parts = [np.where(trace.valid, (trace.y - motion.measured) / trace.sigma, 0.0)]
     for channel, seen in zip(trace.channels, model.shown(trace, model.plant(), path)):
         parts.append(np.where(np.isfinite(channel.values), (channel.values - seen) / channel.sigma, 0.0))
     return np.concatenate(parts)

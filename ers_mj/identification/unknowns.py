@@ -16,6 +16,7 @@ from ers_mj.errors import InputError
 from ers_mj.estimation.search import opening
 from ers_mj.servo.datasheet import LUMPED, SHEET_UNITS, Datasheet, refuse_impossible
 from ers_mj.servo.model import BASE, Model
+from ers_mj.servo.simulation import EffectSettings, inertia_of, kernel_effects
 
 LETTERS = ("L", "R", "k_s", "T_LH", "F_c", "J", "B", "K_t", "K_e", "theta_0")  # Eq. (1), in the paper's order
 NEEDED = ("J", "B", "K_t", "K_e", "R")  # without them Eq. (1) cannot run
@@ -53,6 +54,8 @@ class Unknowns:
         guessed: which letters nothing but the recordings told beforehand, so that no bounds of theirs are known.
         factors: those of the bounds that were made of the reference.
         absent: letters that were left out since the recordings ask for none of them.
+        effects: (name, {key: value}) [SI] of the datasheet, which act and stay as they are.
+        inertia: J [kg m^2] by which their torques are divided where J is not among the letters.
     """
 
     names: tuple[str, ...]
@@ -65,6 +68,8 @@ class Unknowns:
     guessed: tuple[str, ...] = ()
     factors: tuple[float, float] = FACTORS
     absent: tuple[str, ...] = ()
+    effects: EffectSettings = ()
+    inertia: float = 1.0
 
     @property
     def winding(self) -> str:
@@ -112,7 +117,11 @@ class Unknowns:
 
     def model(self, letters: np.ndarray) -> Model:
         """The model that the searched letters (k,) make."""
-        return Model(self.values(letters), ())
+        return Model(self.values(letters), (), self.acting(letters), frozen=tuple(name for name, _ in self.effects))
+
+    def acting(self, letters: np.ndarray) -> tuple[tuple[str, np.ndarray], ...]:
+        """The datasheet's effects (name, parameters (k,)), their torques per inertia."""
+        return kernel_effects(self.effects, float(self.everything(letters).get("J", self.inertia)))
 
 
 def unknowns_of(
@@ -150,7 +159,9 @@ def unknowns_of(
     lower, upper = np.array([*ends.values()], float).T.copy()
     reference = np.clip([known[name] for name in ends], lower, upper)
     held = {name: x for name, x in known.items() if name not in ends}
-    return Unknowns(tuple(ends), reference, lower, upper, held, tuple(fixed), is_lumped, own, (factors[0], factors[1]))
+    effects, inertia = ((), 1.0) if datasheet is None else (tuple(datasheet.effects), inertia_of(datasheet))
+    told = tuple(ends), reference, lower, upper, held, tuple(fixed), is_lumped, own, (factors[0], factors[1])
+    return Unknowns(*told, effects=effects, inertia=inertia)
 
 
 def _searched(

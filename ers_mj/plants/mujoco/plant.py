@@ -262,8 +262,10 @@ class MechanicalPlant:
     def _positions(self, theta: float) -> dict[str, float]:
         """{joint: position} at theta."""
         home, pose = self._lowered.theta_0, self._skeleton.pose(theta)
-        levers = {"lever_up": max(theta, home), "lever_down": min(theta, home)}
-        return {name: q for name, (q, _) in pose.items()} | levers
+        places = {name: q for name, (q, _) in pose.items()}
+        places |= {"lever_up": max(theta, home), "lever_down": min(theta, home)}
+        joints = {self.model.joint(k).name for k in range(self.model.njnt)}
+        return {name: q for name, q in places.items() if name in joints}
 
     def _motion(self, t: np.ndarray, rows: np.ndarray) -> Motion:
         """Rows (N, 5) of theta, omega, theta_m, motor speed over n, drive -> Motion."""
