@@ -45,6 +45,14 @@ def test_simulate_keeps_the_users_times_and_voltages(place):
     assert recording.y[0] == pytest.approx(np.radians(15), abs=1e-12)
 
 
+def test_a_magnitude_takes_its_sign_from_the_direction(place):
+    u = 8 * np.sin(3 * T)
+    table = np.column_stack([T, np.abs(u), u >= 0.0])
+    np.savetxt("signs.csv", table, delimiter=",", header="t_s,u_V,direction", comments="", fmt="%.17g")
+    assert cli.main("simulate --input signs.csv --out new.csv".split()) == 0
+    np.testing.assert_array_equal(read_recording(place / "new.csv").u, u)
+
+
 def simulated(place, options: str) -> np.ndarray:
     """theta (N,) [rad] of the file that a call of simulate writes."""
     assert cli.main(f"simulate --input steps --out new.csv --force {options}".split()) == 0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ers_mj import cli
-from ers_mj.data.recording import read_input
+from ers_mj.data.input_file import read_input
 from ers_mj.errors import InputError
 from ers_mj.experiment_design import optimal_input as experiment
 from ers_mj.experiment_design.optimal_input import built, planned, reference

@@ -168,6 +168,8 @@ def test_elements_of_lists_and_episodes(tmp_path):
     record = read_recording(file, names, episode=1)
     np.testing.assert_allclose(record.y, -2 * THETA)
     assert any("frame / fps" in problem for problem in record.problems)
+    with pytest.raises(InputError, match=r"#run=0 and the episode 1 were both given"):
+        read_recording(f"{file}#run=0", names, episode=1)
     with pytest.raises(InputError, match=r"choose one as in episodes.parquet#run=0"):
         read_recording(file, names)
     with pytest.raises(InputError, match=r"have 3 elements, there is no observation.state\[3\]"):

@@ -19,7 +19,7 @@ import pyarrow as pa
 
 from ers_mj.data.checks import FEWEST_SAMPLES as FEWEST_SAMPLES
 from ers_mj.data.checks import GAP as GAP
-from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_still, refuse_time
+from ers_mj.data.checks import checked, constants, ignored, locked, problems_of, refuse_still
 from ers_mj.data.columns import (
     COLUMNS,
     CONSTANT,
@@ -40,7 +40,7 @@ from ers_mj.data.inspection import Inspection, inspected
 from ers_mj.data.mapping import Source
 from ers_mj.data.rails import off_rails, rail_spans
 from ers_mj.data.sensor_faults import converter_step
-from ers_mj.data.tables import cell_of, element, listed, numbers, reason, seconds, select_run, split_spec
+from ers_mj.data.tables import cell_of, chosen_run, element, listed, numbers, reason, seconds, select_run, split_spec
 from ers_mj.data.whole import write_whole
 from ers_mj.errors import InputError, brief
 
@@ -169,7 +169,7 @@ def read_recording(
         InputError: whatever makes the file unusable, in one sentence that names it.
     """
     path, run = split_spec(os.fspath(path_or_spec))
-    run = str(episode) if run is None and episode is not None else run
+    run = chosen_run(run, episode, path.name)
     name = path.name if run is None else f"{path.name}#run={run}"
     loaded, digest = load(path, name, dict(mapping or {}), [Path(dbc)] if dbc is not None else [])
     table = select_run(loaded.table, run, name)
@@ -373,28 +373,3 @@ def _array(x: Any, field: str, name: str) -> np.ndarray:
     if array.ndim != 1:
         raise InputError(f"{name}: {field} has shape {array.shape}, (N,) was expected")
     return array
-
-
-@brief
-def read_input(path: str | os.PathLike[str], names: Sequence[str] = ("u_V",)) -> tuple[np.ndarray, np.ndarray]:
-    """Time [s] and input, each (N,), of a CSV or Parquet file with the columns t_s and the first of these ``names``
-    that it has.
-
-    Raises:
-        InputError: the file is no such thing, or has holes, in one sentence.
-    """
-    file = Path(path)
-    table = load(file, file.name)[0].table
-    columns = []
-    for label in ("t_s", next((name for name in names if name in table.column_names), names[0])):
-        if label not in table.column_names:
-            raise InputError(f"{file.name}: there is no column {label}, the columns are {listed(table.column_names)}")
-        x = numbers(table[label], label, file.name)
-        if not np.isfinite(x).all():
-            row = 1 + int(np.argmax(~np.isfinite(x)))
-            raise InputError(f"{file.name}: {label} is missing or infinite in data row {row}, an input has no holes")
-        columns.append(x)
-    if columns[0].size < 2:
-        raise InputError(f"{file.name}: has {columns[0].size} samples, at least 2 are needed")
-    refuse_time(columns[0], "t_s", file.name)
-    return columns[0], columns[1]

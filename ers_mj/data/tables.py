@@ -43,6 +43,18 @@ def read_content(path: Path) -> bytes:
 RUNS = ("run", "episode_index", "episode")  # columns that tell the rows of several recordings apart
 
 
+def chosen_run(run: str | None, episode: str | int | None, name: str) -> str | None:
+    """The run that a path names behind #run=, or the episode that is asked for beside it.
+
+    Raises:
+        InputError: both are, and are not the same.
+    """
+    asked = None if episode is None else str(episode)
+    if run is not None and asked is not None and run != asked:
+        raise InputError(f"{name}: #run={run} and the episode {asked} were both given, one of them was expected")
+    return run if run is not None else asked
+
+
 def select_run(table: pa.Table, run: str | None, name: str) -> pa.Table:
     """The rows of one run; the whole table where it holds one and none is asked for."""
     column = next((c for c in RUNS if c in table.column_names), None)

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 import numpy as np
 
 from ers_mj.data.columns import input_name, output_name
-from ers_mj.data.recording import Recording, from_columns, read_input, write_recording
+from ers_mj.data.input_file import read_input
+from ers_mj.data.recording import Recording, from_columns, write_recording
 from ers_mj.door.known import Known, known
 from ers_mj.door.results import frame, framed
 from ers_mj.door.saving import make_room, plain, refuse_table
