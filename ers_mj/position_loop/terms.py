@@ -84,6 +84,7 @@ class Sizes:
     dead_times: tuple[float, ...] = (0.004, 0.012)  # [s]
     bristles: tuple[float, ...] = (3.0, 1.0, 0.1)  # of the widest that shows without a loop, which goes on driving
     bands: tuple[float, ...] = (0.35, 1.0, 2.5)  # of the stiction width c_2 / K, or of c_2
+    lost: float = 0.7  # of the friction that the bridge is taken for
     lags: tuple[float, ...] = (0.003, 0.008)  # [s] of the speed that the firmware damps
     pushes: tuple[float, ...] = (1.2, 2.0)  # of friction
     currents: tuple[float, ...] = (0.9, 0.7)  # of the largest drive
@@ -226,10 +227,14 @@ def _giving(model: LoopModel) -> Iterator[LoopModel]:
 
 
 def _asleep(model: LoopModel) -> Iterator[LoopModel]:
-    """The firmware that ignores small errors, and the bridge that ignores small drives."""
+    """The firmware that ignores small errors, and the bridge that ignores small drives: as it pushes, what it loses is
+    one with friction, which had to stand for both.
+    """
     for size in SIZES.bands:
         yield model.having(band=size * model["c_2"] / model["K"])
         yield model.having(idle=size * model["c_2"])
+    if "c_2" in model.free:
+        yield model.having(idle=SIZES.lost * model["c_2"], c_2=(1.0 - SIZES.lost) * model["c_2"])
 
 
 def ways_round(model: LoopModel, runs: Sequence[Run]) -> list[Callable[[LoopModel], LoopModel]]:
