@@ -13,6 +13,7 @@ from ers_mj.data.recording import Recording
 from ers_mj.decisions import verdict as rules
 from ers_mj.decisions.thresholds import POLICY, Policy
 from ers_mj.diagnosis.errors_told import errors_told
+from ers_mj.effects.gravity_imbalance import GravityImbalance
 from ers_mj.plants.mujoco.looped import LoopedPlant
 from ers_mj.plants.mujoco.plant import MechanicalPlant
 from ers_mj.position_loop import beside
@@ -108,7 +109,10 @@ class LoopCase:
 
     @cached_property
     def left_before(self) -> dict[str, float]:
-        return {"output": self._remembered(self.base)}
+        """What is left without the law that most is left without: what the loop itself does has no other form."""
+        laws = {name for name in self.model.names if name != GravityImbalance.name}
+        without = [left.fit.model for left in self.selection.left if left.name in laws]
+        return {"output": max(map(self._remembered, without), default=0.0)}
 
     @cached_property
     def left(self) -> dict[str, float]:
