@@ -26,7 +26,12 @@ def headline(found: Study) -> str:
 
 
 def notes(found: Study) -> list[str]:
-    """What a reader should know of the plants."""
+    """What a reader should know of the plants, or of a firmware's loop."""
+    if not found.plants:
+        return [
+            "Limits of the drive and of the reference's speed and dead bands are left out of margins and responses: a"
+            " recording that meets them is off by them."
+        ]
     out = []
     for view in found.plants:
         if (first := found.plants[0].linear.name) != view.linear.name:
