@@ -395,7 +395,6 @@ def test_an_overdamped_loop_tells_how_late_it_follows_though_not_how_stiff_it_is
 
 def test_a_rival_that_parts_the_damping_moves_none_of_it():
     found = identify_loop(recorded({"K": 900.0, "a_2": 20.0, "c_2": 8.0}))
-    model = found.fit.model
-    rival = model.having(D=0.7 * model["a_2"], a_2=0.3 * model["a_2"])
+    rival = found.fit.model.having(D=0.7 * found.fit.model["a_2"], a_2=0.3 * found.fit.model["a_2"])
     plain, beside = (Intervals.of(found.fit, found.data, rivals=r).told("", "a_2") for r in ((), [(1.0, rival)]))
     assert plain.ci95 == pytest.approx(beside.ci95)

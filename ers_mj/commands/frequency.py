@@ -81,7 +81,10 @@ def _add_what(parser: argparse.ArgumentParser) -> None:
         "--design", metavar="TOML", help="what the controllers know of the plant (default the datasheet itself)"
     )
     parser.add_argument(
-        "--controller", type=several(str, "controller"), metavar="NAME,...", help="as of ers trial (default all)"
+        "--controller",
+        type=several(str, "controller"),
+        metavar="NAME,...",
+        help="as of ers trial (default all; of a model with a [loop] its own firmware)",
     )
     parser.add_argument(
         "--plant",

@@ -54,23 +54,17 @@ def refuse_beside_a_loop(arguments: argparse.Namespace, datasheet: Datasheet) ->
     """Raise InputError for an option that a servo with a loop of its own has no place for."""
     from ers_mj.control.firmware import NAME
 
-    plain: dict[str, object] = {
-        "design": None,
-        "umax": 24.0,
-        "gap": 0.0,
-        "linkage": "constant",
-        "inductance": "off",
-        "effect": [],
-    }
+    plain = {"umax": 24.0, "gap": 0.0, "linkage": "constant", "inductance": "off", "effect": [], "design": None}
     laws = {"delay_ms": 0.0, "filter_ms": 0.5, "gains": "", "pid": ""}
-    for name, default in (plain | laws | {"noise_deg": 0.0, "quantum_deg": 0.0, "plants": 0}).items():
-        if getattr(arguments, name, default) != default:
-            option = {"umax": "umax-V"}.get(name, name).replace("_", "-")
-            raise InputError(
-                f"--{option}: {datasheet.name} closes a position loop of its own ([loop]), which is the controller and"
-                " stands in the file with the plant"
-            )
-    refuse_unknown("--controller", arguments.controller or (), (NAME,))
+    alone = {"noise_deg": 0.0, "quantum_deg": 0.0, "plants": 0}
+    given = [name for name, x in (plain | laws | alone).items() if getattr(arguments, name, x) != x]
+    given += ["controller"] if set(arguments.controller or ()) - {NAME} else []
+    if given:
+        option = {"umax": "umax-V"}.get(given[0], given[0]).replace("_", "-")
+        raise InputError(
+            f"--{option}: {datasheet.name} closes a position loop of its own ([loop]), which is the controller"
+            f" ({NAME}) and stands in the file with the plant"
+        )
 
 
 def chosen_controllers(arguments: argparse.Namespace, datasheet: Datasheet) -> list[str]:

@@ -90,7 +90,7 @@ def _add_what(parser: argparse.ArgumentParser) -> None:
         metavar="NAME|FILE.py,...",
         help=(
             "ftrc, ftrc-literal, pid, pid-ff, hinf, time-optimal, or a Python file with a class derived from"
-            " ers_mj.control.controllers.Controller (default all of ours)"
+            " ers_mj.control.controllers.Controller (default all of ours); a model with a [loop] runs its own firmware"
         ),
     )
     parser.add_argument(

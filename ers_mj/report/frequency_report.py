@@ -32,7 +32,7 @@ def frequency_page(document: Mapping, found: Study) -> str:
     restart_ids()
     sections = [
         _loops(document, found),
-        _plants(document, found) if found.plants else page.listed(document["notes"]),
+        _plants(document, found) if found.plants else page.section("Plants", "", page.listed(document["notes"])),
         _cycles(document, found),
         *(_recording(c) for c in found.recordings),
     ]
